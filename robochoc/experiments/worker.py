@@ -17,8 +17,7 @@ import msgspec
 from robochoc.experiments.execute import TaskRunner
 from robochoc.experiments.frames import read_frame, write_frame
 from robochoc.experiments.task import Status, Task
-from robochoc.system.orphans import signal_when_orphaned
-from robochoc.system.signals import leave_ctrl_c_to_the_parent
+from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 _MB = 2**20
 

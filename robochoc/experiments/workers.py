@@ -19,7 +19,7 @@ import msgspec
 
 from robochoc.experiments.frames import FrameBuffer, write_frame
 from robochoc.experiments.task import Row, Status, Task
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 
 SETUP_S = 60.0
 """Seconds beyond its limit, for reading, compiling and ending, after which a run's worker is killed."""
@@ -121,7 +121,7 @@ class _Worker:
         command = [sys.executable, "-P", "-m", "robochoc.experiments.worker"]
         words = [str(theirs.fileno()), str(os.getpid()), str(memory_mb or 0)]
         # In a separate session, so that Ctrl-C on a terminal reaches only the parent, which ends the workers.
-        with theirs, signals_held():
+        with theirs, signals_delayed():
             self._process = subprocess.Popen(  # noqa: S603 - our own module
                 [*command, *words],
                 stdin=subprocess.DEVNULL,

@@ -39,7 +39,7 @@ class Given(Event, frozen=True):
     (`solver/explanation.py`), and `quiet` says whether no message of the epoch before was lost. `seed`, `settings`
     and `aside` (the withdrawal cost) are the run's parameters (`solver/agent_problem.py`). What a file cannot say
     stands beside the files, for all robots: `shown`, by name, own variables that neighbours see though the robot's file
-    does not say so, and `empty`, the variables that have no value left (`journal/given.py`). Costs are integers of 0 or
+    does not say so, and `empty`, the variables that have no value left (`journal/team_events.py`). Costs are integers of 0 or
     more that are minimised; `told_in` says how they are told to the user, where that is otherwise: whether they are
     maximised, their decimal places, and what is added to the sum (`model/costs.py`).
     """

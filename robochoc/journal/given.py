@@ -121,7 +121,7 @@ def run_parameters_of(given: Given) -> RunParameters:
     return RunParameters(given.seed, given.settings, given.aside)
 
 
-def told_by(given: Given | None, cost: float) -> Cost | float:
+def cost_in_user_units(given: Given | None, cost: float) -> Cost | float:
     """Return `cost`, as protocols count it, in the user's numbers, as far as `given` says how."""
     if given is None or given.told_in is UNSET:
         return cost

@@ -98,7 +98,7 @@ def lines_of(journal: Journal) -> Iterator[bytes]:
     for event in journal.events:
         yield encode(event) + b"\n"
     if journal.outcome is not None:
-        yield encode(Ended.of(journal.outcome)) + b"\n"
+        yield encode(Ended.from_outcome(journal.outcome)) + b"\n"
 
 
 class Follower:

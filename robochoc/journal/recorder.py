@@ -18,7 +18,7 @@ from robochoc.journal.blocks import BEGINNING, MAX_BLOCK_BYTES, PREAMBLE, frame_
 from robochoc.journal.columns import columns_of
 from robochoc.journal.entries import Ended, Header, JournalEntry
 from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Improved, Refused, Sent, actor
-from robochoc.journal.given import GivenProblemError, TeamReader
+from robochoc.journal.team_events import GivenProblemError, TeamReader
 from robochoc.model.outcome import Outcome
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
@@ -89,7 +89,7 @@ class JournalRecorder:
             if self._weighed:
                 self._pending, self._weighed = [*self._improved(self._weighed, self._given)], None
             if self.outcome is not None:
-                self._pending.append(Ended.of(self.outcome))
+                self._pending.append(Ended.from_outcome(self.outcome))
             self._close_block()
             self._closed = True
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from robochoc.journal.events import Decided, Received, Sent
-from robochoc.journal.given import run_parameters_of
+from robochoc.journal.team_events import run_parameters_of
 from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from robochoc.communication.host import Host
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import AnyEvent, Given, Lost
-from robochoc.journal.given import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
+from robochoc.journal.team_events import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.journal.journal import Header
 from robochoc.model.change import team_after_events
 from robochoc.model.costs import normalized

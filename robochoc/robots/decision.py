@@ -12,7 +12,7 @@ import msgspec
 
 from robochoc.communication.search_result import Progress
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard
-from robochoc.journal.given import TeamReader
+from robochoc.journal.team_events import TeamReader
 from robochoc.journal.recorder import interfaces_given
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import INFINITE, Team
@@ -20,7 +20,7 @@ from robochoc.robots.sink import Fields
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.run.recording import objective_to_record
-from robochoc.system.stopping import request_stop, stop_heard
+from robochoc.system.stopping import request_stop, stop_handled
 from robochoc.verification.objective import Objective
 
 PERIOD_S = 0.5
@@ -47,7 +47,7 @@ class CancellableDecision:
     def __call__(self, team: Team, options: Options) -> Outcome:
         """Return the outcome. Raises the errors of `solve`."""
         feedback = None if self._send_text is None else _Feedback(team, options, self._send_text)
-        with stop_heard():
+        with stop_handled():
             self._set_team(team.name)
             try:
                 if feedback is None:

@@ -10,7 +10,7 @@ from typing import Any
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Began, Observer
-from robochoc.journal.given import TeamWriter
+from robochoc.journal.team_events import TeamWriter
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, user_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order

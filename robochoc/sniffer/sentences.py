@@ -14,7 +14,7 @@ import msgspec
 from robochoc.formats import InvalidInputError
 from robochoc.journal.entries import Header, JournalEntry
 from robochoc.journal.events import Began, Given, Sent
-from robochoc.journal.given import GivenProblemError, TeamReader
+from robochoc.journal.team_events import GivenProblemError, TeamReader
 from robochoc.protocols.acts import INFORM
 from robochoc.protocols.message import Message
 from robochoc.protocols.wording import Wording

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from robochoc.formats import InvalidInputError
-from robochoc.journal.given import GivenProblemError, TeamReader
+from robochoc.journal.team_events import GivenProblemError, TeamReader
 from robochoc.model.problem import Team
 from robochoc.protocols.order import PseudoTree
 from robochoc.protocols.wording import Wording

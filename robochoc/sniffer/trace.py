@@ -33,7 +33,7 @@ from robochoc.journal.events import (
     Sent,
     Settled,
 )
-from robochoc.journal.given import told_by
+from robochoc.journal.team_events import cost_in_user_units
 from robochoc.journal.journal import Header, Journal
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
@@ -334,7 +334,7 @@ class Trace:
                 note = (event.t, "concluded", f"concluded: {event.verdict.replace('-', ' ')}")
                 self._open_step(event.robot, event).notes.append(note)
             case Heard():
-                cost = told_by(self.runs[-1].given, event.cost) if self.runs else event.cost
+                cost = cost_in_user_units(self.runs[-1].given, event.cost) if self.runs else event.cost
                 note = (event.t, "heard", f"{event.robot} knows an assignment with cost {cost_shown(cost)}")
                 self._open_step(event.robot, event).notes.append(note)
             case Began():

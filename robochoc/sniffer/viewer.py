@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Self
 
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 from robochoc.view.local_address import RedirectFile, loopback_socket, secret_path, url_of
 
 _PATIENCE_S = 2.0
@@ -107,7 +107,7 @@ class Viewer:
 
 def _started(listening: int, journal: int, theirs_in: int, theirs_out: int) -> subprocess.Popen[bytes]:
     """Start the viewer's process with these descriptors, and return it."""
-    with signals_held():  # until the process handles them: Ctrl-C is also sent to it
+    with signals_delayed():  # until the process handles them: Ctrl-C is also sent to it
         return subprocess.Popen(  # noqa: S603 - our own module
             [sys.executable, "-P", "-m", _PROGRAM, str(listening), str(journal)],
             stdin=theirs_in,

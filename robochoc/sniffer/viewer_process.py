@@ -20,8 +20,7 @@ from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
-from robochoc.system.orphans import signal_when_orphaned
-from robochoc.system.signals import leave_ctrl_c_to_the_parent
+from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 
 class _Parent(NamedTuple):

@@ -52,7 +52,7 @@ from robochoc.solver.enumeration import (
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.solver.linear import Formula, Junction, Operand, conjuncts, renamed
 from robochoc.solver.propagation import propagate
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 from robochoc.system.temporary_files import PrivateFolder
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
@@ -302,7 +302,7 @@ class AceProcess:
             raise SolverLostError(f"the solver answered with a {type(message).__name__}")
         return message.xml
 
-    @signals_held()
+    @signals_delayed()
     def close(self) -> None:
         """End the process and remove its files."""
         if self._process is not None:
@@ -344,7 +344,7 @@ class AceProcess:
 
     # The process
 
-    @signals_held()
+    @signals_delayed()
     def _start(self) -> None:
         self._folder = PrivateFolder()
         ours, theirs = socket.socketpair()

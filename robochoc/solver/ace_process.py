@@ -41,8 +41,7 @@ from robochoc.solver.ace_messages import (
     ToAce,
     codes_of,
 )
-from robochoc.system.orphans import signal_when_orphaned
-from robochoc.system.signals import leave_ctrl_c_to_the_parent
+from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 JVM_OPTIONS = (
     "-XX:+UseSerialGC",  # two cores, small heaps: the collector that starts fastest

@@ -35,7 +35,7 @@ from robochoc.solver.encoding import Costs, Network
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.solver.linear import Formula, Junction
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 NAME = "OR-Tools"
@@ -102,7 +102,7 @@ class CpSatSolver:
             if not self._is_context:
                 self.close()
 
-    @signals_held()
+    @signals_delayed()
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
@@ -170,7 +170,7 @@ class CpSatSolver:
             return CpSatAnswer(None, proven=False)
         return message
 
-    @signals_held()
+    @signals_delayed()
     def _start(self) -> socket.socket:
         ours, theirs = socket.socketpair()
         try:

@@ -31,8 +31,7 @@ from robochoc.solver.cp_sat_messages import (
     CpSatTask,
     FromCpSat,
 )
-from robochoc.system.orphans import signal_when_orphaned
-from robochoc.system.signals import leave_ctrl_c_to_the_parent
+from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 WORKERS = 1
 """One thread, for comparable measurements, and since robots need the other cores."""

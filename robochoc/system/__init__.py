@@ -1,1 +1,1 @@
-"""Wrappers of Python and the operating system: files, plug-ins, text for terminals."""
+"""Wrappers of Python and the operating system: files, signals, installed packages, printable text."""

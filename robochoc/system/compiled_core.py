@@ -1,7 +1,7 @@
-"""Which core runs: modules that mypyc has compiled, or the same modules in plain Python.
+"""The choice between the core's modules compiled by mypyc and the same modules in plain Python.
 
-A wheel that was built where there was a C compiler has both (`hatch_build.py`). The compiled ones are taken, unless
-`ROBOCHOC_PURE` is set to something but 0. Child processes inherit it.
+A wheel built with a C compiler contains both (`hatch_build.py`). The compiled modules are used, unless `ROBOCHOC_PURE`
+is set to a value other than 0. Child processes inherit the choice.
 """
 
 from __future__ import annotations
@@ -14,15 +14,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-_ONE_OF_THEM = "robochoc.protocols.protocol"
+_COMPILED_MODULE = "robochoc.protocols.protocol"
+"""One of the modules that are compiled."""
 
 
 class PurePython:
-    """A finder of modules that takes robochoc's modules from their sources, where there are compiled ones as well."""
+    """A module finder that loads robochoc's modules from their sources even if they are compiled as well."""
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        """Return where the source of the module is; None: the usual finders are asked."""
+        """Return the specification of the module's source; None for modules of the usual finders."""
         if not name.startswith("robochoc."):
             return None
         found = PathFinder.find_spec(name, path, target)
@@ -33,30 +34,30 @@ class PurePython:
 
 
 def prefer_sources() -> None:
-    """Let this process take all modules of robochoc that it has not imported yet from their sources."""
+    """Load all robochoc modules that this process has not imported yet from their sources."""
     sys.meta_path.insert(0, PurePython)
 
 
 def is_compiled(found: ModuleSpec) -> bool:
-    """Return whether a module is one that mypyc has compiled."""
+    """Return whether a module is compiled by mypyc."""
     return (found.origin or "").endswith(tuple(EXTENSION_SUFFIXES))
 
 
 def kind_of_core() -> str:
     """Return `compiled core` or `pure Python`."""
-    found = find_spec(_ONE_OF_THEM)
+    found = find_spec(_COMPILED_MODULE)
     return "compiled core" if found is not None and is_compiled(found) else "pure Python"
 
 
 def attributes_of(thing: object) -> Mapping[str, Any]:
-    """Return the attributes of an object, as `vars` does; also of one whose class is compiled and has no `__dict__`."""
+    """Return the attributes of an object like `vars`, also for compiled classes without `__dict__`."""
     names: Sequence[str] = getattr(type(thing), "__mypyc_attrs__", ())
     found = {name: getattr(thing, name) for name in names if name != "__dict__" and hasattr(thing, name)}
     return {**found, **getattr(thing, "__dict__", {})}
 
 
 def docstring(module: ModuleType) -> str:
-    """Return the docstring of a module; of a compiled one, which has none, that of its source."""
+    """Return the docstring of a module. Compiled modules have none: then it is read from the source."""
     file = getattr(module, "__file__", None) or ""
     if module.__doc__ or not file.endswith(tuple(EXTENSION_SUFFIXES)):
         return module.__doc__ or ""

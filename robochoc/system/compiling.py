@@ -1,6 +1,6 @@
-"""Attributes for compiled modules (docs/explanation/design/development.md, "Compiled core"). It is not compiled itself.
+"""Attributes for compiled modules (docs/explanation/design/development.md, "Compiled core"). Not compiled itself.
 
-mypyc knows `mypyc_attr` by its place in `mypy_extensions`. Users of robochoc do not need that package.
+mypyc recognizes `mypyc_attr` by its module `mypy_extensions`. Users of robochoc do not need that package.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 else:
 
     def mypyc_attr(**_: object) -> Callable[[T], T]:
-        """Return a decorator that does nothing: only mypyc reads what it is given."""
+        """Return a decorator without effect: only mypyc reads its arguments."""
         return lambda decorated: decorated
 
 
 def answer_signals() -> None:
-    """Let Python run the handlers of signals: it does so where a function of plain Python begins, such as this one."""
+    """Let Python run pending signal handlers: it does so when a function of plain Python, such as this one, begins."""

@@ -1,4 +1,4 @@
-"""The errors of msgspec in plain words: JSON, TOML values and settings that it refuses."""
+"""msgspec's errors in plain words, for invalid JSON, TOML values and settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TYPES = {
     "array": "a list",
     "object": "an object",
 }
-"""JSON types, by the names that msgspec gives them."""
+"""JSON types, by their names in msgspec."""
 
 _SENTENCES = (
     (r"Invalid (?:enum )?value (?P<value>.*)", "{value} is not allowed{allowed}"),
@@ -32,15 +32,15 @@ _SENTENCES = (
     (r"JSON is malformed: (?P<value>.*)", "it is not valid JSON: {value}"),
     (r"Input data was truncated", "it is not valid JSON: it ends too early"),
 )
-"""The messages of msgspec, and what they become."""
+"""The messages of msgspec, as patterns, and their replacements."""
 
 
 def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  # noqa: ANN401 - a type
     """Return the error, its place, the expected type, and the allowed values if there are few.
 
     Args:
-        error: What msgspec raised.
-        expected: The type that was to be decoded.
+        error: The error raised by msgspec.
+        expected: The type to be decoded.
     """
     text = str(error)
     found = _PLACE.search(text)
@@ -59,19 +59,19 @@ def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  #
 
 
 def place_of(error: msgspec.MsgspecError) -> tuple[str, str]:
-    """Return the place of the value that msgspec refuses, such as `links[1]`, and the name of its unknown field."""
+    """Return the place of the invalid value, such as `links[1]`, and the name of its unknown field, if any."""
     text = str(error)
     place, field = _PLACE.search(text), _UNKNOWN.match(text)
     return place["place"] if place else "", field[1] if field else ""
 
 
 def _named(types: str) -> str:
-    """Return JSON types in words: `int | null` is "an integer or null"."""
+    """Return JSON types in words: "an integer or null" for `int | null`."""
     return " or ".join(_TYPES.get(one, one) for one in types.split(" | "))
 
 
 def _allowed(kind: Any, place: str) -> Sequence[str]:  # noqa: ANN401 - a type
-    """Return the values or fields that are allowed at `place`; empty where they are not listed."""
+    """Return the values or fields that are allowed at `place`; empty if the type does not list them."""
     for step in re.findall(r"\w+|\[[^]]*\]", place):
         kind = _inside(kind, step)
     for option in _options(kind):
@@ -85,7 +85,7 @@ def _allowed(kind: Any, place: str) -> Sequence[str]:  # noqa: ANN401 - a type
 
 
 def _inside(kind: Any, step: str) -> Any:  # noqa: ANN401 - types
-    """Return the type of the field or item `step` of a value of the type `kind`. None: it is not known."""
+    """Return the type of the field or item `step` of a value of the type `kind`; None if it is unknown."""
     for option in _options(kind):
         if step.startswith("[") and get_args(option):
             return get_args(option)[1 if get_origin(option) in {dict, Mapping} else 0]
@@ -104,7 +104,7 @@ def _one_of(values: Sequence[str]) -> str:
 
 def _nearest(name: str, known: Sequence[str]) -> str:
     """Return a hint that names the known name nearest to `name`, or lists all of them."""
-    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+    import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     close = difflib.get_close_matches(name[:40], known, n=1)
     return f"; did you mean '{close[0]}'?" if close else _one_of(known)

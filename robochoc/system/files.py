@@ -1,7 +1,7 @@
-"""Files that are complete or not there, also when the program is killed while it writes.
+"""Files that are either complete or missing, even if the program is killed while it writes.
 
-A new file is written beside the old one, and then takes its place. Where Linux allows it, it has no name until then:
-not even SIGKILL leaves anything behind.
+A new file is written in the same folder, and then replaces the old one. If Linux supports it, the new file has no name
+until then: not even SIGKILL leaves a partial file.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ class PendingFile:
 
     Args:
         path: The file to be replaced. It need not exist.
-        mode: The permissions of the new file, less the umask, from its first byte on. Secrets take 0o600.
+        mode: The permissions of the new file, less the umask, from its first byte on. Secrets need 0o600.
 
     Raises:
-        OSError: if the file cannot be written, or `path` is a folder, a device, a pipe, or where the standard output
-            or error goes.
+        OSError: if the file cannot be written, or `path` is a folder, a device, a pipe, or the target of the standard
+            output or error.
     """
 
     def __init__(self, path: Path, mode: int = 0o666) -> None:
@@ -72,7 +72,7 @@ class PendingFile:
         self.stream = os.fdopen(descriptor, "w+b")
 
     def keep(self) -> None:
-        """Put the file in its place. Raises `OSError`; nothing is left behind then."""
+        """Replace `path` by the file. On an error, raise `OSError` and delete the file."""
         try:
             with errors_naming(self._path):
                 self.stream.flush()
@@ -86,16 +86,16 @@ class PendingFile:
         self.stream.close()
 
     def discard(self) -> None:
-        """Leave nothing behind. Does nothing when the file has been kept or discarded."""
-        with suppress(OSError):  # what is still buffered may not fit
+        """Delete the file, unless it has been kept or discarded."""
+        with suppress(OSError):  # buffered bytes may not fit on the disk
             self.stream.close()
         if self._named is not None:
             self._named.unlink(missing_ok=True)
             self._named = None
 
     def _copied(self) -> Path:
-        """Return a copy with a name: for systems that cannot name an unnamed file. It is the `stream` from now on."""
-        import shutil  # noqa: PLC0415 - start-up: seldom needed
+        """Copy the file to one with a name, which becomes the `stream`, if the system cannot name an unnamed file."""
+        import shutil  # noqa: PLC0415 - start-up: rarely needed
 
         self._named = _beside(self._target)
         mode = os.fstat(self.stream.fileno()).st_mode & 0o777
@@ -109,9 +109,9 @@ class PendingFile:
 
 
 def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
-    """Write `content` to `path`. Readers see the old file or the whole new one.
+    """Write `content` to `path`. Readers see the old file or the complete new one.
 
-    Devices, pipes, and what standard output or error already go to (such as `/dev/stdout`) are written to as they are.
+    Devices, pipes, and targets of standard output or error (such as `/dev/stdout`) are written directly.
 
     Args:
         path: The file to be replaced. It need not exist.
@@ -119,7 +119,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
         mode: The permissions of the new file, as in `PendingFile`.
 
     Raises:
-        OSError: if it cannot be written. Nothing is left behind then.
+        OSError: if it cannot be written. No partial file remains.
     """
     if _is_stream(path):
         with errors_naming(path), os.fdopen(_open_stream(path), "wb") as stream:
@@ -136,11 +136,10 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
 
 
 class AppendableFile:
-    """A file that takes the place of `path` with its `beginning`, and then grows.
+    """A file that replaces `path` with its `beginning`, and then grows.
 
-    Readers see the old file, or the beginning and what was appended since. Devices, pipes and streams are written to
-    as they are, without waiting for their readers. Nothing else is buffered. Processes that are forked
-    meanwhile have the descriptor too.
+    Readers see the old file, or the beginning and the appended bytes. Devices, pipes and streams are written directly,
+    without waiting for their readers; only these are buffered. Processes forked meanwhile inherit the descriptor.
 
     Args:
         path: The file to be replaced. It need not exist.
@@ -148,7 +147,7 @@ class AppendableFile:
         mode: The permissions of the new file, as in `PendingFile`.
 
     Raises:
-        OSError: if it cannot be written. Nothing is left behind then.
+        OSError: if it cannot be written. No partial file remains.
     """
 
     def __init__(self, path: Path, beginning: bytes, mode: int = 0o666) -> None:
@@ -169,15 +168,15 @@ class AppendableFile:
             raise
         copied = file.stream
         file.keep()
-        if file.stream is not copied:  # the copy has taken its place
+        if file.stream is not copied:  # a copy has replaced it
             os.close(self._descriptor)
             self._descriptor = os.open(resolved(path), os.O_WRONLY)
 
     def append(self, content: bytes) -> None:
-        """Write all of `content` at the end. After an interrupt by a signal, the same may be appended again.
+        """Write all of `content` at the end. After an interrupt by a signal, the same content may be appended again.
 
         Raises:
-            OSError: if it cannot be written. Nothing is added to a file then.
+            OSError: if it cannot be written. A file is then unchanged.
         """
         if self._stream:
             self._append_to_stream(self._stream, content)
@@ -216,7 +215,7 @@ class AppendableFile:
 
     def _append_to_stream(self, stream: BackgroundWriter, content: bytes) -> None:
         if self._torn:
-            raise OSError(errno.EIO, "an interrupt came between two bytes")
+            raise OSError(errno.EIO, "an interrupt has left a partial write")
         self._torn = True  # after an interrupt, the written part is unknown
         fits = stream.write(content)
         self._torn = False
@@ -225,12 +224,12 @@ class AppendableFile:
 
 
 def resolved(path: Path) -> Path:
-    """Return `path` as an absolute one, without symbolic links. The file need not exist.
+    """Return the absolute `path` without symbolic links. The file need not exist.
 
-    `Path.resolve` raises `RuntimeError` for links in a circle, or nothing, depending on the version of Python.
+    For circular links, `Path.resolve` raises `RuntimeError` or nothing, depending on the version of Python.
 
     Raises:
-        OSError: if the links lead in a circle.
+        OSError: if the links are circular.
     """
     try:
         path.stat()
@@ -241,18 +240,18 @@ def resolved(path: Path) -> Path:
 
 
 def _is_stream(path: Path) -> bool:
-    """Return whether `path` is written to as it is: a device, a pipe, or what a standard stream goes to."""
+    """Return whether `path` is written directly: a device, a pipe, or the target of a standard stream."""
     return _standard_stream(path) is not None or (path.exists() and not path.is_file())
 
 
 def _open_stream(path: Path) -> int:
-    """Return a descriptor by which the stream at `path` is written to."""
+    """Return a descriptor for writing to the stream at `path`."""
     stream = _standard_stream(path)
     return os.open(path, os.O_WRONLY) if stream is None else os.dup(stream)
 
 
 def _standard_stream(path: Path) -> int | None:
-    """Return the standard stream that goes to `path`: to replace the file would take away what was written there."""
+    """Return the standard stream whose target is `path`: replacing that file would lose its earlier output."""
     for stream in (1, 2):
         with suppress(OSError):
             if os.path.samestat(path.stat(), os.fstat(stream)):
@@ -261,7 +260,7 @@ def _standard_stream(path: Path) -> int | None:
 
 
 def _unnamed(target: Path, mode: int) -> int | None:
-    """Return a descriptor of an unnamed file in the folder of `target`. None: the system has no unnamed files."""
+    """Return a descriptor of an unnamed file in the folder of `target`; None if the system has no unnamed files."""
     if not hasattr(os, "O_TMPFILE"):
         return None
     try:
@@ -273,10 +272,10 @@ def _unnamed(target: Path, mode: int) -> int | None:
 
 
 def _linked(descriptor: int, target: Path) -> Path | None:
-    """Return a new hidden name beside `target` for an unnamed file. None: the system cannot name it."""
+    """Give an unnamed file a new hidden name beside `target`; return None if the system cannot do that."""
     complete = _beside(target)
     try:
-        # Only with a folder's descriptor does Python ask the kernel to follow the link in /proc.
+        # Python asks the kernel to follow the link in /proc only with a folder's descriptor.
         os.link(f"/proc/self/fd/{descriptor}", complete, src_dir_fd=descriptor, follow_symlinks=True)
     except OSError:
         return None
@@ -284,7 +283,7 @@ def _linked(descriptor: int, target: Path) -> Path | None:
 
 
 def _beside(target: Path) -> Path:
-    """Return an unused hidden name in the same folder. It is short, however long the name of `target` is."""
+    """Return an unused, short, hidden name in the same folder."""
     import secrets  # noqa: PLC0415 - start-up: only writers need names
 
     return target.with_name(f".{secrets.token_hex(8)}.part")

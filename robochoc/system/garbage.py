@@ -1,4 +1,4 @@
-"""The cyclic garbage collector of Python, while much is built that stays."""
+"""Settings of Python's cyclic garbage collector while many long-lived objects are created."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-SELDOM = 100_000
-"""Objects that are made, less those that are gone, before the youngest are looked through: Python's is 700."""
+RARE_THRESHOLD = 100_000
+"""The number of new objects, less deleted ones, before a collection of the youngest. Python's default is 700."""
 _active_freezes: list[None] = []
-"""One for each `garbage_frozen` block that is active."""
+"""An item for each active `garbage_frozen` block."""
 
 
 @contextmanager
 def collection_paused() -> Iterator[None]:
-    """Pause the cyclic garbage collector: it would visit millions of new objects again and again, and free none."""
+    """Pause the cyclic garbage collector: it would visit millions of new objects repeatedly, and free none."""
     if not gc.isenabled():
         yield
         return
@@ -28,13 +28,13 @@ def collection_paused() -> Iterator[None]:
 
 @contextmanager
 def collection_seldom() -> Iterator[None]:
-    """Look for cyclic garbage seldom.
+    """Collect cyclic garbage rarely.
 
-    For a search in one thread: what is under way is many times what Python expects of young objects, and stays until
-    it arrives. Each look goes through all of it.
+    For a search in one thread: it has many more pending messages than Python expects young objects, and each collection
+    would visit all of them.
     """
     before = gc.get_threshold()
-    gc.set_threshold(max(SELDOM, before[0]) if before[0] else 0, *before[1:])
+    gc.set_threshold(max(RARE_THRESHOLD, before[0]) if before[0] else 0, *before[1:])
     try:
         yield
     finally:
@@ -43,9 +43,10 @@ def collection_seldom() -> Iterator[None]:
 
 @contextmanager
 def garbage_frozen() -> Iterator[None]:
-    """Processes forked meanwhile do not look through what they inherit for garbage.
+    """Exclude existing objects from garbage collection in processes forked meanwhile.
 
-    To look is to write, and so to copy every page: without this 256 robots take twice as long to start.
+    A collection writes to each object, and thus copies every inherited page: without this, 256 robots take twice as
+    long to start.
     """
     gc.freeze()
     _active_freezes.append(None)
@@ -57,10 +58,10 @@ def garbage_frozen() -> Iterator[None]:
 
 
 def count_as_old() -> None:
-    """Let the collector take all that there is for old, without a look at it: most of it stays.
+    """Make the collector treat all present objects as old, without visiting them: most of them stay.
 
-    Nothing is done where objects are frozen, as they would not be afterwards. `gc.get_freeze_count` visits each frozen
-    object: inside `garbage_frozen` that would take long, and the answer is known.
+    If objects are frozen, this does nothing, because it would unfreeze them. `gc.get_freeze_count` visits each frozen
+    object, so it is not called inside `garbage_frozen`.
     """
     if not _active_freezes and not gc.get_freeze_count():
         gc.freeze()

@@ -1,4 +1,4 @@
-"""Entry points of installed packages, such as protocols and filters. Their code need not be ours."""
+"""Entry points of installed packages, such as protocols and filters, which may be third-party code."""
 
 from __future__ import annotations
 
@@ -9,24 +9,24 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from robochoc.system.entry_points import EntryPoint, entry_points
-from robochoc.system.termination import Terminated
+from robochoc.system.signals import Terminated
 
 Fault = Callable[[object], str]
-"""Returns why a loaded object cannot be used. Empty: it can."""
+"""Returns the reason why a loaded object cannot be used; empty if it can."""
 
 
 class Loaded(NamedTuple):
-    """The object of an entry point, or why it cannot be used."""
+    """The object of an entry point, or the reason why it cannot be used."""
 
     what: object
     broken: str
 
 
 def installed_entry_points(group: str) -> Sequence[EntryPoint]:
-    """Return all that is offered under `group`, in no order.
+    """Return all entry points in `group`, unordered.
 
-    Reading the entry points of all packages takes as long as a small run. They are read again if a package may
-    have come or gone, which changes the folder that holds it.
+    Reading the entry points of all packages takes as long as a small run. They are read again only after a folder on
+    `sys.path` has changed, because a package may have been installed or removed.
     """
     return _read(group, tuple((place, _changed_ns(place)) for place in sys.path))
 
@@ -38,38 +38,38 @@ def _read(group: str, _path: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, .
 
 def _changed_ns(place: str) -> int:
     try:
-        return os.stat(place or os.curdir).st_mtime_ns  # noqa: PTH116 - names of sys.path, often
+        return os.stat(place or os.curdir).st_mtime_ns  # noqa: PTH116 - called often, for names in sys.path
     except OSError:
         return 0
 
 
 def entry_point_names(group: str) -> tuple[str, ...]:
-    """Return the names of all that is installed, ours and others', sorted."""
+    """Return the names of all entry points in `group`, sorted."""
     return tuple(sorted({entry.name for entry in installed_entry_points(group)}))
 
 
 def all_entry_points(group: str) -> list[tuple[EntryPoint, list[EntryPoint]]]:
-    """Return every entry, by name, with those of its name (itself among them)."""
+    """Return all entries, sorted by name, each with all entries of its name."""
     found = sorted(installed_entry_points(group), key=lambda entry: entry.name)
     return [(entry, [other for other in found if other.name == entry.name]) for entry in found]
 
 
 def entry_points_named(group: str, name: str) -> list[EntryPoint]:
-    """Return all entries of that name; more than one where packages do not agree whose it is."""
+    """Return all entries with this name; several if packages conflict."""
     return [entry for entry in installed_entry_points(group) if entry.name == name]
 
 
 def not_installed_message(group: str, kind: str, name: str, *, also: Sequence[str] = (), listed_by: str = "") -> str:
-    """Return that nothing of that name is installed, what is, and what may have been meant.
+    """Return an error message for an unknown name, with the known names and the most similar ones.
 
     Args:
         group: The group of entry points.
-        kind: What the names are, in a word.
-        name: The name that was given.
-        also: Names that are known without being installed.
-        listed_by: The command that lists the names, where they are too many for a message.
+        kind: A noun for the names, such as `protocol`.
+        name: The unknown name.
+        also: Known names that are not entry points.
+        listed_by: The command that lists the names, if they are too many for a message.
     """
-    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+    import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     names = sorted([*entry_point_names(group), *also])
     near = difflib.get_close_matches(name.lower(), names, 3 if listed_by else 1)
@@ -80,10 +80,10 @@ def not_installed_message(group: str, kind: str, name: str, *, also: Sequence[st
 
 
 def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: Fault) -> Loaded:
-    """Return the object of `entry`, or why it cannot be used. One broken package must not hide the others."""
+    """Load the object of `entry`. Errors are returned, because a broken package must not hide the others."""
     if len(namesakes) > 1:
         places = " and ".join(sorted(f"{one.value} ({one.dist.name if one.dist else 'unknown'})" for one in namesakes))
-        return Loaded(None, f"is offered by several packages, and only one may: {places}")
+        return Loaded(None, f"is offered by several packages: {places}; uninstall all but one")
     try:
         found = entry.load()
     except Terminated:
@@ -97,4 +97,4 @@ def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: 
 def _after_an_update(entry: EntryPoint, error: BaseException) -> str:
     """Return the hint for a missing module of robochoc itself."""
     ours = entry.value.startswith("robochoc.") and isinstance(error, ModuleNotFoundError)
-    return "; robochoc has changed since it was installed: say make demo, or pip install -e . again" if ours else ""
+    return "; robochoc has changed since it was installed: run make demo, or pip install -e . again" if ours else ""

@@ -1,50 +1,71 @@
-"""Signals while processes start: Ctrl-C reaches the whole process group, and only the parent answers it."""
+"""Signals of processes: delayed while processes start, left to the parent, sent when the parent has died.
+
+Ctrl-C reaches the whole process group, and only the parent handles it.
+"""
 
 from __future__ import annotations
 
 import _signal  # type: ignore[import-not-found]  # the C part of `signal`, unknown to typeshed
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 _STOPPING = {signal.SIGINT, signal.SIGTERM}
-_holding: set[int] = set()
+_PR_SET_PDEATHSIG = 1
+_delayed_threads: set[int] = set()
 """The threads in which signals are delayed."""
 
 
+class Terminated(SystemExit):
+    """Raised on SIGTERM. Unlike other `SystemExit`s, it is never raised by the code of a package."""
+
+
 @contextmanager
-def signals_held() -> Iterator[None]:
+def signals_delayed() -> Iterator[None]:
     """Delay Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) in the block: unfinished work would be lost.
 
-    A process that is started meanwhile holds them as well, until it calls `leave_ctrl_c_to_the_parent`: they would
-    break off the start of Python with an error of its own.
+    A process that is started in the block inherits the delay until it calls `leave_ctrl_c_to_the_parent`: a signal
+    would interrupt the start of Python with an unrelated error.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     thread = threading.get_ident()
-    is_outermost = thread not in _holding
+    is_outermost = thread not in _delayed_threads
     try:
-        # Within, because it may block them and still raise what a signal just before has to say.
+        # Inside `try`, because it may block the signals and still raise the exception of an earlier one.
         signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
-        _holding.add(thread)
+        _delayed_threads.add(thread)
         yield
     finally:
         if is_outermost:
-            _holding.discard(thread)
+            _delayed_threads.discard(thread)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def are_held(thread: int) -> bool:
+def are_delayed(thread: int) -> bool:
     """Return whether signals are delayed in a thread."""
-    return thread in _holding
+    return thread in _delayed_threads
 
 
 def leave_ctrl_c_to_the_parent() -> None:
-    """In a child process: ignore Ctrl-C, end on SIGTERM, and hold neither of them any longer.
+    """In a child process: ignore Ctrl-C, end on SIGTERM, and end the delay of both.
 
-    By the functions beneath `signal`, which looks up an enumeration's member for each number that comes or goes: 1,000
-    robots would have 0.2 MB each to themselves for that.
+    Uses the C functions of `_signal`: those of `signal` look up an enumeration's member for each number, which costs
+    each of 1,000 robots 0.2 MB of unshared memory.
     """
     _signal.signal(_signal.SIGINT, _signal.SIG_IGN)
     _signal.signal(_signal.SIGTERM, _signal.SIG_DFL)
     _signal.pthread_sigmask(_signal.SIG_UNBLOCK, (_signal.SIGINT, _signal.SIGTERM))
+
+
+def signal_when_orphaned(signum: signal.Signals) -> None:
+    """Have the kernel send `signum` to this process when its parent dies (Linux; no effect elsewhere).
+
+    SIGCONT is harmless, and continues a stopped process (SIGSTOP), which can then detect the end of its parent.
+    Strictly, the kernel watches the parent's thread that has started this process.
+    """
+    import ctypes  # noqa: PLC0415 - start-up: only child processes need it
+
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signum)

@@ -1,4 +1,4 @@
-"""A search can be asked to stop with the best that it has so far, as if its time was over: by the signal `STOP`.
+"""Requests to stop a search with its best result so far, as at its time limit: by the signal `STOP`.
 
     kill -USR1 PID
 
@@ -16,39 +16,39 @@ STOP = signal.SIGUSR1
 
 
 class _Request:
-    """Whether somebody has asked this process."""
+    """The state of the request in this process."""
 
-    made = False
+    is_made = False
 
 
 @contextmanager
-def stop_heard() -> Iterator[None]:
+def stop_handled() -> Iterator[None]:
     """Handle the signal `STOP` inside the context; only possible in the main thread."""
     if threading.current_thread() is not threading.main_thread():
         try:
             yield
         finally:
-            _Request.made = False
+            _Request.is_made = False
         return
 
-    def hear(*_: object) -> None:
-        _Request.made = True
+    def handle(*_: object) -> None:
+        _Request.is_made = True
 
-    before = signal.signal(STOP, hear)
+    before = signal.signal(STOP, handle)
     mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # the parent may have blocked it
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         signal.signal(STOP, before)
-        _Request.made = False
+        _Request.is_made = False
 
 
 def request_stop() -> None:
-    """Ask for it, as the signal does. It holds until `stop_heard` is left."""
-    _Request.made = True
+    """Request a stop like the signal. The request ends with the `stop_handled` block."""
+    _Request.is_made = True
 
 
 def stop_requested() -> bool:
-    """Return whether somebody has asked for it."""
-    return _Request.made
+    """Return whether a stop was requested."""
+    return _Request.is_made

@@ -1,4 +1,4 @@
-"""Output that does not wait for its reader: a pipe without a reader, or a stopped terminal, does not delay a run.
+"""Output that does not wait for its reader: an unread pipe or a stopped terminal does not delay a run.
 
 Bytes that cannot be written at once are buffered in memory, and a thread writes them. The thread exists only while the
 buffer is not empty, so a program whose output is read never has this thread.
@@ -30,7 +30,7 @@ _PIECE = 4096
 class BackgroundWriter:
     """Writes to the descriptor `target` without waiting, up to `limit` bytes ahead of the reader.
 
-    In a forked process, the buffer is empty at first.
+    In a forked process, the buffer is initially empty.
     """
 
     def __init__(self, target: int, limit: int) -> None:
@@ -70,7 +70,7 @@ class BackgroundWriter:
         return True
 
     def finish(self, patience_s: float) -> bool:
-        """Wait until everything is written, or nothing was read for `patience_s` seconds. Return whether it is.
+        """Wait until everything is written; return False if nothing was read for `patience_s` seconds.
 
         Raises:
             OSError: if the content cannot be written.

@@ -1,4 +1,4 @@
-"""Suggestions for mistyped names, and members of enums by their names."""
+"""Suggestions for misspelled names, and members of enums by their names."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ _Member = TypeVar("_Member", bound=StrEnum)
 
 
 def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> str:
-    """Return a hint that names the known word nearest to `word`; if none is near, `fallback`."""
-    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+    """Return a hint with the known word most similar to `word`, or `fallback` if none is similar."""
+    import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     words = [str(one) for one in known]
     near = [one for one in words if one.endswith(f".{word}")] or difflib.get_close_matches(str(word), words, 1)
@@ -24,7 +24,7 @@ def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> s
 
 
 def member(choices: type[_Member], name: str, value: object) -> _Member:
-    """Return the member of `choices` that is called `value`. Raises `OptionError`, which names the nearest member."""
+    """Return the member of `choices` with this `value`. Raises `ValueError` with the most similar member."""
     try:
         return choices(value)  # type: ignore[arg-type]
     except ValueError:

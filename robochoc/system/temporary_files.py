@@ -1,7 +1,7 @@
-"""The folder for temporary files, found without a trace, and what is put there and removed again.
+"""The folder for temporary files, and temporary files and folders that leave no trace.
 
-Python's `tempfile`, when it is first used, tries folders out with a named file. A process that is killed in that moment
-leaves the file. So the folder is found here, and given to `tempfile` each time.
+On first use, Python's `tempfile` tests folders with a named file, which remains if the process is killed at that
+moment. So the folder is found here, and passed to `tempfile` each time.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import IO
 
 _VARIABLES = ("TMPDIR", "TEMP", "TMP")
-_FOLDERS = ("/tmp", "/var/tmp", "/usr/tmp")  # noqa: S108 - a list to choose from; nothing is put there by this name
+_FOLDERS = ("/tmp", "/var/tmp", "/usr/tmp")  # noqa: S108 - candidates; no file has a fixed name there
 
 
 def temporary_folder() -> Path:
-    """Return the folder for temporary files: the first that can be written to, in the order that `tempfile` has.
+    """Return the folder for temporary files: the first writable one, in the order of `tempfile`.
 
     Raises:
         FileNotFoundError: if there is none.
@@ -33,13 +33,13 @@ def temporary_folder() -> Path:
 
 
 def unnamed_file(*, buffered: bool = True) -> IO[bytes]:
-    """Open a new file without a name, to write and read bytes. It is gone when all who have it have closed it.
+    """Open a new unnamed binary file for writing and reading. It is deleted when all its descriptors are closed.
 
     Args:
-        buffered: Whether written bytes may wait in this process.
+        buffered: Whether written bytes may be buffered in this process.
 
     Raises:
-        OSError: if no folder for temporary files can be written to.
+        OSError: if no folder for temporary files is writable.
     """
     return tempfile.TemporaryFile(buffering=-1 if buffered else 0, dir=temporary_folder())
 
@@ -47,9 +47,9 @@ def unnamed_file(*, buffered: bool = True) -> IO[bytes]:
 class PrivateFolder:
     """A new folder that only this user can read. It is removed by `close`, at the latest when this process ends.
 
-    Ctrl-C and SIGTERM may interrupt any line of the main thread; `tempfile.TemporaryDirectory` leaves a folder behind
-    that they meet between its making and its noting, or half removed. Here its removal is noted first, and done in a
-    thread, which they do not interrupt. A process that was forked does not remove it.
+    Ctrl-C and SIGTERM may interrupt any line of the main thread. `tempfile.TemporaryDirectory` leaves a folder behind
+    if they interrupt it between creation and registration, or during removal. Here the removal is registered first,
+    and done in a thread, which they do not interrupt. Forked processes do not remove the folder.
 
     Raises:
         OSError: if it cannot be created.
@@ -67,12 +67,12 @@ class PrivateFolder:
         self.close()
 
     def close(self) -> None:
-        """Remove the folder with all that is in it. Does nothing the second time."""
+        """Remove the folder and its content. A second call does nothing."""
         if self._remove.alive:
             remover = threading.Thread(target=self._remove)
             try:
                 remover.start()
-            except RuntimeError:  # no further thread can be had
+            except RuntimeError:  # no further thread can be started
                 self._remove()
             else:
                 remover.join()

@@ -1,8 +1,7 @@
 """Time limits for computations that do not check the clock, such as preparation with many nested loops in Python.
 
-A check of the clock could be forgotten in some loop. Instead, a second thread raises `TimeLimitError` in the computing
-thread at any point, as Ctrl-C raises `KeyboardInterrupt`. While signals are delayed (`system/signals.py`), so is the
-error.
+A loop might lack a check of the clock. Instead, a second thread raises `TimeLimitError` in the computing thread at any
+point, as Ctrl-C raises `KeyboardInterrupt`. While signals are delayed (`system/signals.py`), so is the error.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 from robochoc.system.errors import RobochocError
-from robochoc.system.signals import are_held
+from robochoc.system.signals import are_delayed
 
 AGAIN_S = 0.05
 """The interval at which the error is raised again, in seconds: Python drops an exception in a destructor."""
@@ -27,7 +26,7 @@ Result = TypeVar("Result")
 
 
 class TimeLimitError(RobochocError):
-    """The time of a computation was over before its result."""
+    """The time limit of a computation was reached before its result."""
 
 
 def computed_by(
@@ -51,7 +50,7 @@ def computed_by(
     running, raising = _thread.allocate_lock(), _thread.allocate_lock()
     raised: list[float] = []
     running.acquire()
-    # Python looks for an exception of another thread after a call: `release` comes before the first look.
+    # Python checks for an exception from another thread after a call: `release` precedes the first check.
     try:
         _thread.start_new_thread(_watch, (threading.get_ident(), deadline, running, raising, raised))
         return function(*args, **kwargs)
@@ -70,7 +69,7 @@ def _watch(
     """Raise `TimeLimitError` in a thread from the deadline on, until `running` is released."""
     while not running.acquire(timeout=min(max(AGAIN_S, deadline - time.monotonic()), _LONGEST_WAIT_S)):
         with raising:
-            if running.locked() and not are_held(thread) and time.monotonic() >= deadline:
+            if running.locked() and not are_delayed(thread) and time.monotonic() >= deadline:
                 _ignore_where_dropped()
                 raised.append(deadline)
                 _raise_in(thread, TimeLimitError)
@@ -91,10 +90,10 @@ def _ignore_where_dropped() -> None:
 
 
 def _drop_pending_error() -> None:
-    """Make sure that this thread has no `TimeLimitError` left to be raised later: raise one more, and catch it.
+    """Ensure that no pending `TimeLimitError` is raised later in this thread: raise another one, and catch it.
 
-    `PyThreadState_SetAsyncExc` can also remove the error. But then Python up to 3.12 looks for it again before each
-    function, for ever, which is slow, and does not end where the functions are traced (`sys.setprofile`).
+    `PyThreadState_SetAsyncExc` can also remove the error. But then Python up to 3.12 checks for it before each
+    function, for ever, which is slow, and never ends if functions are traced (`sys.setprofile`).
     """
     interruption: BaseException | None = None
     while True:

@@ -19,7 +19,7 @@ import msgspec
 
 from robochoc.system.errors import RobochocError
 from robochoc.system.files import resolved
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 from robochoc.vehicles.fleet import AtEnd, Fleet
 from robochoc.vehicles.kinds import VehicleKind
 from robochoc.vehicles.limits import END_S, LANDING_S, TURN_S
@@ -71,7 +71,7 @@ class GuardClient:
         self._problem = self._no_ways = ""
         self._is_over = self._ends = self._has_ended = False
         self._received_s = time.monotonic()
-        with signals_held():
+        with signals_delayed():
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-m", "robochoc.vehicles.guard"],
                 stdin=subprocess.PIPE,

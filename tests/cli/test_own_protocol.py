@@ -250,7 +250,7 @@ def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
     package(here, "mine", {"own": "mine:Silent", "abt": "mine:Silent"})
     package(here, "yours", {"own": "yours:Silent"})
     with pytest.raises(
-        UnknownProtocolError, match=r"'own', is offered by several .* only one may: mine:Silent \(mine\) and yours:"
+        UnknownProtocolError, match=r"'own', is offered by several packages: mine:Silent \(mine\) and yours:"
     ):
         protocol_named("own")
     assert list(protocol_names()).count("own") == 1

@@ -190,7 +190,7 @@ def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
     first, second = (offer for offer in installed_protocols() if offer.name == "abt")
     assert {first.package, second.package} == {"others-protocols 1.2", f"robochoc {__version__}"}
     assert first.protocol is second.protocol is installed_protocol("abt").protocol is None
-    assert "several packages, and only one may" in run().stdout
+    assert "is offered by several packages: " in run().stdout
     with pytest.raises(UnknownProtocolError, match=r"others:Other \(others-protocols\)"):
         protocol_named("abt")
 

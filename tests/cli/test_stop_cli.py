@@ -13,7 +13,7 @@ import pytest
 from robochoc.app.sketch.building import model_of
 from robochoc.journal.events import Heard
 from robochoc.journal.reader import Follower
-from robochoc.system.stopping import STOP, stop_heard, stop_requested
+from robochoc.system.stopping import STOP, stop_handled, stop_requested
 from tests.support.faults import PROGRAM, running
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT, robochoc_within
@@ -90,7 +90,7 @@ def told_best_so_far(result: dict[str, Any]) -> None:
 
 def test_that_it_is_heard_meanwhile_only() -> None:
     before = signal.getsignal(STOP)
-    with stop_heard():
+    with stop_handled():
         assert not stop_requested()
         signal.raise_signal(STOP)
         assert stop_requested()

@@ -366,7 +366,7 @@ def test_a_session_that_comes_too_late_is_closed(router: Router, monkeypatch: py
     monkeypatch.setattr(zenoh, "open", slowly)
     monkeypatch.setattr(rmw_zenoh_session, "LATE_S", -4.9)
     monkeypatch.setattr(rmw_zenoh_session.RosSession, "_check_listening", lambda *_: None)
-    with pytest.raises(SinkError, match="does not answer as one"):
+    with pytest.raises(SinkError, match="does not answer as a zenoh router"):
         RmwZenohSink(router.place)
     may_go.set()
     wait_until(lambda: bool(opened) and opened[0].is_closed(), "it is open")

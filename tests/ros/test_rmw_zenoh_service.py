@@ -267,7 +267,7 @@ def test_a_router_that_goes_away_ends_it(monkeypatch: pytest.MonkeyPatch) -> Non
             return bool(told)
 
         wait_until(is_told, "nobody says that the router is gone")
-        assert "is gone" in told[0]
+        assert "is lost" in told[0]
 
 
 @pytest.mark.slow

@@ -39,7 +39,7 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.system.errors import RobochocError
-from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import signal_when_orphaned
 
 
 class OutOfTimeError(RobochocError):

@@ -10,7 +10,7 @@ import runpy
 import signal
 import sys
 
-from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import signal_when_orphaned
 
 
 def main() -> None:

@@ -30,7 +30,7 @@ from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import LIMIT
 from robochoc.cli.reports.improvements import ImprovementReporter
 from robochoc.cli.reports.progress import print_above, progress_line
-from robochoc.system.stopping import stop_heard
+from robochoc.system.stopping import stop_handled
 
 if TYPE_CHECKING:
     from robochoc.communication.network.journal_server import Publication
@@ -146,7 +146,7 @@ def master(
     for option in ("gather_s", "timeout", "deadline"):
         if given[option] is not None and not given[option] > 0:
             raise click.UsageError(f"--{option.removesuffix('_s')} requires a number of seconds greater than 0")
-    with network_errors_as_failures("master"), stop_heard():
+    with network_errors_as_failures("master"), stop_handled():
         plan = _plan(folder, team, given)
         with (
             _publication(sniffable=sniffable) as publication,

@@ -44,7 +44,7 @@ from robochoc.cli.options.solve import (
 from robochoc.cli.options.value_types import Number, WholeNumber
 from robochoc.cli.reports.failures import worst
 from robochoc.cli.reports.live_sniffer import sniffer_request
-from robochoc.system.stopping import stop_heard
+from robochoc.system.stopping import stop_handled
 
 _SECTIONS: Sections = {
     COMMON: (
@@ -229,6 +229,6 @@ def solve(
         more_inputs=source_places(ros.situation),
     )
     check_outputs(outputs, request, options, teams=len(folders))
-    with stop_heard():
+    with stop_handled():
         statuses = [solve_team(folder, options, outputs, request) for folder in folders]
     context.exit(worst(statuses))

@@ -84,7 +84,7 @@ def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
 def _given_team(journal: Journal) -> Team | None:
     """Return the team of a journal, with all robots in their initial state; None if the journal does not contain it."""
     from robochoc.journal.events import Given
-    from robochoc.journal.given import GivenProblemError, TeamReader
+    from robochoc.journal.team_events import GivenProblemError, TeamReader
     from robochoc.model.problem import Team
 
     reader = TeamReader()

@@ -41,7 +41,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
@@ -173,7 +173,7 @@ class LocalNetwork(Session):
             self._master.leave("the run is over", farewell_s=FAREWELL_S)
             wait([process.sentinel for process in self._processes.values()], 0)
         finally:
-            with signals_held():
+            with signals_delayed():
                 self._end_processes()
                 self._master.__exit__(None, None, None)
 
@@ -193,7 +193,7 @@ class LocalNetwork(Session):
             limits = (self._settings.patience_s, self._settings.lease_ms)
             given = NetworkRobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=network_robot_process, name=name, args=(given,), daemon=True)
-            with signals_held():  # a half-started process would wait for ever, and block the end of the program
+            with signals_delayed():  # a half-started process would wait for ever, and block the end of the program
                 process.start()
                 self._processes[name] = process
         threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
@@ -231,7 +231,7 @@ def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
     own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
     context.set_forkserver_preload([*_PRELOAD, *own])
     try:
-        with signals_held():
+        with signals_delayed():
             os.environ[fork_server.SCRATCH] = get_temp_dir()
             try:
                 multiprocessing.forkserver.ensure_running()

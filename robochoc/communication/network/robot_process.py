@@ -18,8 +18,7 @@ from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from robochoc.system.orphans import signal_when_orphaned
-from robochoc.system.signals import leave_ctrl_c_to_the_parent
+from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 START_S = 60.0
 """The longest wait for robots to connect, in seconds."""

@@ -23,7 +23,7 @@ from robochoc.communication.network.access import access_control, journal_qos
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
 from robochoc.system.errors import RobochocError
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 
 START_S = 60.0
 """The longest wait until the router listens, in seconds. If all cores are busy, Python needs seconds to start."""
@@ -113,7 +113,7 @@ class Router:
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
         """Listen, with these rules (see `access_control`) in place of the previous ones. Raises `RouterError`."""
         self.close()
-        with signals_held():
+        with signals_delayed():
             self._process = process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
                 [sys.executable, "-P", "-m", _PROCESS],  # -P: ignore modules in the working directory
                 stdin=subprocess.PIPE,

@@ -15,8 +15,7 @@ import sys
 import zenoh
 
 from robochoc.communication.network.zenoh_config import config
-from robochoc.system.orphans import signal_when_orphaned
-from robochoc.system.signals import leave_ctrl_c_to_the_parent
+from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 READY = "listening"
 RESPONDING = "responding"

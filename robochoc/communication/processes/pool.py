@@ -19,7 +19,7 @@ from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, robot_process, served_robot_process
 from robochoc.communication.resources import allow_descriptors
 from robochoc.solver.errors import UnsupportedError
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 
 StartMethod = Literal["fork", "forkserver"]
 STARTED_AT_ONCE = 16
@@ -57,7 +57,7 @@ class ProcessPool:
         start of a large team.
         """
         prepared: list[RobotLink] = []
-        with signals_held(), ExitStack() as theirs:
+        with signals_delayed(), ExitStack() as theirs:
             try:
                 prepared.extend(self._prepared(start, theirs) for start in starts)
             finally:
@@ -191,7 +191,7 @@ class ProcessPool:
 
         No result is lost, and on a busy machine a process needs long to end by itself.
         """
-        with signals_held():
+        with signals_delayed():
             self._selector.close()
             self._ends.close()
             for robot in self.robots.values():

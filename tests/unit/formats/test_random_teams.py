@@ -14,7 +14,7 @@ import pytest
 
 from robochoc.formats import check_team, read_team, robot_in, robot_xml, write_team
 from robochoc.formats.global_constraints import read_form
-from robochoc.journal.given import TeamReader, TeamWriter
+from robochoc.journal.team_events import TeamReader, TeamWriter
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.costs import normalized, user_cost
 from robochoc.model.expression import SymbolNames, Type, parse

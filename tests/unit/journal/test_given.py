@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Given
-from robochoc.journal.given import GivenProblemError, TeamReader, TeamWriter, invalidated_of, run_parameters_of
+from robochoc.journal.team_events import GivenProblemError, TeamReader, TeamWriter, invalidated_of, run_parameters_of
 from robochoc.model.orders import Order, OrderError, with_order
 from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Robot, Semantics, Team, Variable
 from robochoc.model.team_edits import without_robots

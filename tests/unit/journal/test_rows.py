@@ -13,7 +13,7 @@ import pytest
 import robochoc
 from robochoc.journal.as_rows import COLUMNS
 from robochoc.journal.events import Given, Heard, Improved
-from robochoc.journal.given import told_by
+from robochoc.journal.team_events import cost_in_user_units
 from robochoc.journal.journal import Header, JournalError, read_journal
 from robochoc.journal.reader import lines_of
 from robochoc.journal.recorder import JournalRecorder
@@ -123,7 +123,7 @@ def test_a_journal_tells_costs_as_the_user_counts_them() -> None:
     assert costs == sorted(costs)
     assert costs[-1] == Decimal("3.5")
     given = next(event for event in journal.events if isinstance(event, Given))
-    heard = [told_by(given, event.cost) for event in journal.events if isinstance(event, Heard)]
+    heard = [cost_in_user_units(given, event.cost) for event in journal.events if isinstance(event, Heard)]
     assert heard
     assert heard[-1] == Decimal("3.5")
     assert not replay(journal).contradictions

@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.formats.result import read_result, result_json
-from robochoc.journal.given import TeamReader, TeamWriter
+from robochoc.journal.team_events import TeamReader, TeamWriter
 from robochoc.model.assembly import assemble
 from robochoc.model.costs import normalized
 from robochoc.model.expression import Apply, Constant, Name

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robochoc.system.garbage import SELDOM, collection_paused, collection_seldom, garbage_frozen
+from robochoc.system.garbage import RARE_THRESHOLD, collection_paused, collection_seldom, garbage_frozen
 
 
 class Looped:
@@ -66,7 +66,9 @@ def test_where_it_is_off_it_stays_off() -> None:
 
 
 @pytest.mark.parametrize(
-    ("before", "meanwhile"), [(700, SELDOM), (SELDOM + 1, SELDOM + 1), (0, 0)], ids=["usual", "rarer", "never"]
+    ("before", "meanwhile"),
+    [(700, RARE_THRESHOLD), (RARE_THRESHOLD + 1, RARE_THRESHOLD + 1), (0, 0)],
+    ids=["usual", "rarer", "never"],
 )
 def test_looks_are_seldom_and_then_as_before(before: int, meanwhile: int) -> None:
     gc.set_threshold(before, 10, 10)

@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.robots import connections
 from robochoc.system.installed import load_entry_point
-from robochoc.system.termination import Terminated
+from robochoc.system.signals import Terminated
 
 
 class Struck:
@@ -36,7 +36,7 @@ def test_who_has_updated_an_editable_install_is_told_to_install_again() -> None:
     moved = EntryPoint("abt", "robochoc.protocols.moved_since:ABT", "robochoc.protocols")
     said = load_entry_point(moved, [], lambda _: "").broken
     assert said.startswith("cannot be imported: ModuleNotFoundError")
-    assert said.endswith("; robochoc has changed since it was installed: say make demo, or pip install -e . again")
+    assert said.endswith("; robochoc has changed since it was installed: run make demo, or pip install -e . again")
     other = EntryPoint("own", "no_such_module:Own", "robochoc.protocols")
     assert "changed since" not in load_entry_point(other, [], lambda _: "").broken
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robochoc.system.signals import signals_held
+from robochoc.system.signals import signals_delayed
 from tests.support.limits import HANG_S
 
 CHILD = """
@@ -32,7 +32,7 @@ def _ctrl_c_is_heard() -> Iterator[None]:
 
 @pytest.mark.parametrize(("signum", "says", "status"), [(signal.SIGINT, "past it\n", 0), (signal.SIGTERM, "", -15)])
 def test_a_signal_waits_until_the_child_says_what_it_does(signum: signal.Signals, says: str, status: int) -> None:
-    with signals_held():
+    with signals_delayed():
         child = subprocess.Popen(
             [sys.executable, "-c", CHILD], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
         )
@@ -46,7 +46,7 @@ def test_a_signal_waits_until_the_child_says_what_it_does(signum: signal.Signals
 
 def test_a_signal_is_heard_when_all_is_done() -> None:
     done = []
-    with pytest.raises(KeyboardInterrupt), signals_held():  # noqa: PT012 - the block is what is tested
+    with pytest.raises(KeyboardInterrupt), signals_delayed():  # noqa: PT012 - the block is what is tested
         signal.raise_signal(signal.SIGINT)
         done.append("all")
     assert done == ["all"]
