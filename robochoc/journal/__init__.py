@@ -1,8 +1,8 @@
-"""Events of a run and the journal that keeps them: what happened, from which everything else is computed."""
+"""The events of a run, and the journal that records them."""
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # start-up: `typing` and what reads journals are imported when they are asked for
+TYPE_CHECKING = False  # start-up: `typing` and the reader of journals are imported on first use
 if TYPE_CHECKING:
     from robochoc.journal.as_rows import by_column, rows
 
@@ -10,7 +10,7 @@ __all__ = ["by_column", "rows"]
 
 
 def __getattr__(name: str) -> object:
-    """Import what is asked for."""
+    """Import a function on first use."""
     if name in __all__:
         from robochoc.journal import as_rows  # noqa: PLC0415 - start-up
 

@@ -1,4 +1,4 @@
-"""Journals as rows and columns of plain values, for pandas, polars and the like."""
+"""Journals as rows and columns of plain values, for pandas, polars and similar libraries."""
 
 from __future__ import annotations
 
@@ -15,22 +15,22 @@ COLUMNS = (
     *("run", "epoch", "event", "t", "robot", "other", "type", "content", "bytes", "clock", "checks", "cost"),
     *("assignment", "verdict"),
 )
-"""The keys of every row, in this order."""
+"""The keys of all rows, in this order."""
 
 Row = dict[str, Any]
-"""What happened: by key a text, a number, or None where an event of that kind has no such thing."""
+"""An event as texts and numbers by key. Values that its kind lacks are None."""
 
 
 def rows(path: Path | str) -> list[Row]:
-    """Return the events of a journal, one row each, in their order.
+    """Return the events of a journal in order, one row each.
 
     All rows have the same keys: the number of the `run` and its `epoch`, the kind of `event` (`Sent`, `Received`,
-    `Settled`, `Decided`, ...), its time `t`, the `robot` that did it, the `other` robot of a message, the message's
-    `type`, its `content` and an `assignment` as JSON text, `bytes`, `clock` (NCCCs), `checks`, `cost`, `verdict`.
-    A warning says where a journal is damaged; the rows are those before.
+    `Settled`, `Decided`, ...), its time `t`, the acting `robot`, the `other` robot of a message, the message's `type`,
+    its `content` and an `assignment` as JSON text, `bytes`, `clock` (NCCCs), `checks`, `cost`, `verdict`. If the
+    journal is damaged, a warning contains the place, and the rows before it are returned.
 
     Args:
-        path: The journal's file, as `--journal` writes it.
+        path: The journal's file, as written by `--journal`.
 
     Raises:
         JournalError: if the file is not a journal.
@@ -49,24 +49,23 @@ def rows(path: Path | str) -> list[Row]:
 
 
 def by_column(path: Path | str) -> dict[str, list[Any]]:
-    """Return the same as `rows`, column by column."""
+    """Return the events of a journal as columns, with the keys of `rows`."""
     found = rows(path)
     return {name: [row[name] for row in found] for name in COLUMNS}
 
 
 def _row(event: AnyEvent, run: int, epoch: int) -> Row:
-    said: dict[str, Any] = msgspec.structs.asdict(event)
-    robot = actor(event) or said.get("robot")
-    pair = [said[side] for side in ("sender", "receiver") if side in said]
+    fields: dict[str, Any] = msgspec.structs.asdict(event)
+    robot = actor(event) or fields.get("robot")
+    pair = [fields[side] for side in ("sender", "receiver") if side in fields]
     row: Row = dict.fromkeys(COLUMNS)
-    row.update(
-        (name, said[name]) for name in ("t", "type", "bytes", "clock", "checks", "cost", "verdict") if name in said
-    )
+    copied = ("t", "type", "bytes", "clock", "checks", "cost", "verdict")
+    row.update((name, fields[name]) for name in copied if name in fields)
     row.update(run=run, epoch=epoch, event=type(event).__name__, robot=robot)
     row.update(other=next((name for name in pair if name != robot), robot if pair else None))
     if isinstance(event, Bounded):
         row["cost"] = event.bound
     for name in ("content", "assignment"):
-        if name in said:
-            row[name] = msgspec.json.encode(said[name]).decode()
+        if name in fields:
+            row[name] = msgspec.json.encode(fields[name]).decode()
     return row

@@ -1,7 +1,7 @@
 """The content of a journal's block: its entries in columns, as msgpack (docs/guides/journal.md).
 
-Most entries are of four kinds. What entries of these have in common stands side by side, as that is packed best; all
-others are written as they are. A block is read without those before it.
+Most entries are of four kinds. The values of each of their fields are stored together, which compresses best; other
+entries are stored one by one. Each block can be read without the previous ones.
 """
 
 from __future__ import annotations
@@ -34,10 +34,10 @@ class BlockError(RobochocError, ValueError):
 
 
 class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen=True, kw_only=True):
-    """Columns, each in the order of the entries. Texts stand once, in `words`; elsewhere is their place in it.
+    """Columns, each in the order of the entries. Texts are stored once, in `words`, and referred to by their index.
 
-    A shape is a message's type and the names of its fields, their `values` stand one after the other. `actors` are
-    the senders, receivers, or robots whose entries they are, `partners` the others of messages.
+    A shape is a message's type and the names of its fields; their `values` are stored one after the other. `actors` are
+    the robots of the entries (senders or receivers), `partners` the other robots of messages, `says` their shapes.
     """
 
     words: list[str]
@@ -56,11 +56,11 @@ class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen
     others: list[JournalEntry]
 
 
-class _Numbers(dict[Any, int]):
-    """Numbers things from 0 on, in the order in which they are first asked for."""
+class _Numbering(dict[Any, int]):
+    """Numbers keys from 0 on, in the order of their first use."""
 
-    def __missing__(self, thing: object) -> int:
-        self[thing] = number = len(self)
+    def __missing__(self, key: object) -> int:
+        self[key] = number = len(self)
         return number
 
 
@@ -69,22 +69,22 @@ _json = msgspec.json.Encoder(decimal_format="number").encode
 
 
 def columns_of(entries: Iterable[JournalEntry], *, exact: bool) -> bytes:
-    """Return what a block of `entries` holds. Unless `exact`, times are rounded to the nanosecond: clocks know no more.
+    """Return the content of a block of `entries`. Unless `exact`, times are rounded to the nanosecond, as of clocks.
 
-    Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for what `entries_of` would not read again:
-    robots on other machines may tell of anything, and what follows must not be lost with it.
+    Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for entries that `entries_of` would reject:
+    robots on other machines may report anything, and later entries must not be lost with them.
     """
     columns = _Columns()
-    columns.take(entries)
+    columns.add(entries)
     columns.check()
     return columns.packed(exact=exact)
 
 
 class _Columns:
-    """Columns that grow."""
+    """Columns to which entries are added."""
 
     def __init__(self) -> None:
-        self.words, self.shapes = _Numbers(), _Numbers()
+        self.words, self.shapes = _Numbering(), _Numbering()
         self.kinds = bytearray()
         self.times: list[float] = []
         self.clocks: list[int] = []
@@ -98,8 +98,8 @@ class _Columns:
         self.assignments: list[dict[str, int]] = []
         self.others: list[JournalEntry] = []
 
-    def take(self, entries: Iterable[JournalEntry]) -> None:
-        """Add `entries`. This loop is what a journal costs the run, so it asks for exact types, and calls little."""
+    def add(self, entries: Iterable[JournalEntry]) -> None:
+        """Add `entries`. This loop is the cost of a journal in a run, so it compares exact types, and has few calls."""
         kinds, times, clocks, actors = self.kinds.append, self.times.append, self.clocks.append, self.actors.append
         partners, says, words, shapes = self.partners.append, self.says.append, self.words, self.shapes
         values, sizes = self.values.extend, self.sizes.append
@@ -136,15 +136,15 @@ class _Columns:
             clocks(entry.clock)
 
     def check(self) -> None:
-        """Raise where there is something that cannot be read again."""
+        """Raise an exception if the entries could not be read again."""
         _json(self.values)
-        _whole(self.clocks)
-        _whole(self.checked)
+        _int64s(self.clocks)
+        _int64s(self.checked)
         _finite(entry.t for entry in self.others)
 
     def packed(self, *, exact: bool) -> bytes:
-        """Return all of it, as msgpack."""
-        shapes = [[self.words[word] for word in shape] for shape in self.shapes]  # which may add words
+        """Return all columns as msgpack."""
+        shapes = [[self.words[word] for word in shape] for shape in self.shapes]  # may add words
         scale, times = _scaled(self.times, exact=exact)
         return _encode(
             _Block(
@@ -167,25 +167,25 @@ class _Columns:
 
 
 def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000_000_000], list[int] | bytes]:
-    """Return times as a scale and the steps between whole numbers of 1 / scale, or (0) as the doubles that they are."""
+    """Return times as a scale and the differences between integers of 1 / scale, or with scale 0 as doubles."""
     times = array("d", times)
     if all(map(float.is_integer, times)) and _fit_in_steps(times, 1):
         return 1, _steps(map(int, times))
     if not exact and all(map(isfinite, times)) and _fit_in_steps(times, NANOSECONDS):
         return 1_000_000_000, _steps([round(t * NANOSECONDS) for t in times])
-    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # a clock of unknown origin may give no number
+    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # an untrusted clock may return NaN
     if sys.byteorder == "big":
         doubles.byteswap()
     return 0, doubles.tobytes()
 
 
 def _fit_in_steps(times: Iterable[float], scale: int) -> bool:
-    """Return whether steps between `times` fit into 64 bits, in units of 1 / `scale`."""
+    """Return whether the differences between `times`, in units of 1 / `scale`, fit into 64 bits."""
     return all(abs(t) * scale < _LARGEST // 2 for t in times)
 
 
 def _steps(numbers: Iterable[int]) -> list[int]:
-    """Return each number less the one before it."""
+    """Return the difference of each number from the previous one."""
     numbers = list(numbers)
     return list(map(sub, numbers, [0, *numbers]))
 
@@ -194,21 +194,21 @@ _decode = msgspec.msgpack.Decoder(_Block).decode
 
 
 def entries_of(content: bytes) -> list[JournalEntry]:
-    """Return the entries of a block that holds `content`.
+    """Return the entries of a block with `content`.
 
     Raises:
-        BlockError: if `content` is not what `columns_of` writes.
+        BlockError: if `content` was not written by `columns_of`.
     """
     try:
         block = _decode(content)
-        _json(block.values)  # msgpack can hold what no message can: keys that are no text, extensions
-        return list(_Entries(block))
+        _json(block.values)  # msgpack may contain what messages cannot: keys that are not texts, extensions
+        return list(_EntryDecoder(block))
     except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, RecursionError, LookupError) as error:
         raise BlockError(str(error)) from error
 
 
-class _Entries:
-    """The entries of a block, one after the other. Raises `ValueError` or `LookupError` where columns do not fit."""
+class _EntryDecoder:
+    """Iterates over the entries of a block. Raises `ValueError` or `LookupError` if columns are inconsistent."""
 
     def __init__(self, block: _Block) -> None:
         sent, received, settled, decided, others = map(block.kinds.count, range(5))
@@ -222,10 +222,10 @@ class _Entries:
         _fit(block.assignments, decided)
         _fit(block.others, others)
         if sent + received + settled + decided != timed:
-            raise ValueError("there are kinds of entries that are not known")
+            raise ValueError("a kind of entries is unknown")
         self._block = block
-        self._shapes = [_named(shape, block.words) for shape in block.shapes]
-        self._times, self._clocks = _times(block), _whole(accumulate(block.clocks))
+        self._shapes = [_message_shape(shape, block.words) for shape in block.shapes]
+        self._times, self._clocks = _times(block), _int64s(accumulate(block.clocks))
         _fit(self._times, timed)
         _finite((*self._times, *(entry.t for entry in block.others)))
 
@@ -246,7 +246,7 @@ class _Entries:
                 word, fields = shapes[next(says)]
                 receiver = words[next(partners)]
                 left -= len(fields)
-                content = dict(zip(fields, values, strict=False))  # `values` goes on with the next message's
+                content = dict(zip(fields, values, strict=False))  # `values` continues with the next message
                 yield Sent(
                     t=t, sender=actor, receiver=receiver, type=word, content=content, bytes=next(sizes), clock=clock
                 )
@@ -254,25 +254,25 @@ class _Entries:
                 word, _ = shapes[next(says)]
                 yield Received(t=t, sender=words[next(partners)], receiver=actor, type=word, clock=clock)
             elif kind == SETTLED:
-                (so_far,) = _whole([checked.get(actor, 0) + next(checks)])
+                (so_far,) = _int64s([checked.get(actor, 0) + next(checks)])
                 checked[actor] = so_far
                 yield Settled(t=t, robot=actor, clock=clock, checks=so_far)
             else:
                 yield Decided(t=t, robot=actor, assignment=next(assignments), clock=clock)
         if left:
-            raise ValueError("messages have more or fewer fields than there are values")
+            raise ValueError("the number of values differs from the number of the messages' fields")
 
 
 def _fit(column: Sequence[object], count: int) -> None:
     if len(column) != count:
-        raise ValueError(f"a column has {len(column)} places, not {count}")
+        raise ValueError(f"a column has {len(column)} items, not {count}")
 
 
-def _named(shape: Sequence[int], words: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+def _message_shape(shape: Sequence[int], words: Sequence[str]) -> tuple[str, tuple[str, ...]]:
     """Return a message's type, and the names of its fields."""
     name, *fields = (words[place] for place in shape)
     if len({*fields}) < len(fields):
-        raise ValueError(f"a message of type {name!r} has two fields of one name")
+        raise ValueError(f"a message of type {name!r} has two fields with the same name")
     return name, tuple(fields)
 
 
@@ -288,7 +288,7 @@ def _times(block: _Block) -> Sequence[float]:
         return doubles
     if not block.scale:
         raise ValueError("times are whole numbers, but have no scale")
-    return [number / block.scale for number in _whole(accumulate(block.times))]
+    return [number / block.scale for number in _int64s(accumulate(block.times))]
 
 
 def _finite(times: Iterable[float]) -> None:
@@ -296,8 +296,8 @@ def _finite(times: Iterable[float]) -> None:
         raise ValueError("a time is not a number")
 
 
-def _whole(numbers: Iterable[int]) -> list[int]:
-    """Return `numbers`, all of 64 bits. Raises `ValueError`."""
+def _int64s(numbers: Iterable[int]) -> list[int]:
+    """Return `numbers`; raise `ValueError` if one does not fit into 64 bits."""
     numbers = list(numbers)
     if numbers and not (min(numbers) >= -_LARGEST and max(numbers) < _LARGEST):
         raise ValueError("a count is too large")

@@ -12,23 +12,23 @@ from robochoc.model.outcome import Outcome
 from robochoc.system.errors import RobochocError
 
 VERSION = 2
-"""The version of the entries' meaning. It grows when one is added or changed; readers refuse unknown versions."""
+"""The version of the entries' meaning. It is increased if an entry is added or changed. Readers reject others."""
 STAMPED_LATE = 1
-"""In this version the `clock` of a sent message was that of the end of the step; and it came after the decision."""
+"""In this version, the `clock` of a sent message was that at the end of the step, and it followed the decision."""
 BOUNDED = 3
-"""The version of journals that hold `Bounded` events, which are written where they are asked for."""
+"""The version of journals with `Bounded` events, which are recorded on request only."""
 _BITS = 63
-"""Longer integers are written as texts: msgpack has 64 bits."""
+"""Longer integers are written as texts, because msgpack has 64 bits."""
 READ = (STAMPED_LATE, VERSION, BOUNDED)
-"""Versions that are read."""
+"""The versions that can be read."""
 
 
 class JournalError(RobochocError, ValueError):
-    """The file is not a journal, has another version, or is unreadable from the start."""
+    """The file is not a journal, has an unknown version, or is unreadable from the beginning."""
 
 
 class Header(Event, frozen=True, kw_only=True, tag="Journal"):
-    """The header of a journal: what was run, and the version of the format."""
+    """The header of a journal: the team, the options of the run, and the version of the format."""
 
     t: float = 0
     team: str
@@ -36,24 +36,24 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     runtime: str
     seed: int
     order: str | tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    """The priority order, by name or as the list of robots; left out where it was the files'."""
+    """The priority order, as a name or a list of robots; omitted for the order in the files."""
     channel: str | msgspec.UnsetType = msgspec.UNSET
-    """The channel model, where there was one: then the times of the search's events are in simulated seconds."""
+    """The channel model, if any. With one, the times of the search's events are in simulated seconds."""
     message_loss: float | msgspec.UnsetType = msgspec.UNSET
-    """The probability that a message was lost, where some could be: those have no `Received`."""
+    """The probability of a message's loss, if messages could be lost. Lost messages have no `Received`."""
     version: int = VERSION
 
 
 class Ended(Event, frozen=True, kw_only=True):
-    """The outcome of the run. It is missing in the journal of a run that broke off."""
+    """The outcome of the run. It is missing in the journal of an interrupted run."""
 
     t: float = 0
     outcome: Outcome
     long: dict[str, Decimal] | msgspec.UnsetType = msgspec.UNSET
-    """Numbers of solutions and of optima with more than 64 bits, which `outcome` lacks; left out if there are none."""
+    """Numbers of solutions and optima with more than 64 bits, which `outcome` lacks; omitted if there are none."""
 
     @classmethod
-    def of(cls, outcome: Outcome) -> Ended:
+    def from_outcome(cls, outcome: Outcome) -> Ended:
         """Return the entry for an outcome."""
         long: dict[str, Decimal] = {}
         if outcome.count is not None and outcome.count.bit_length() > _BITS:
@@ -64,8 +64,8 @@ class Ended(Event, frozen=True, kw_only=True):
         return cls(outcome=outcome, long=long or msgspec.UNSET)
 
     @property
-    def whole(self) -> Outcome:
-        """The outcome, with all of its numbers."""
+    def complete_outcome(self) -> Outcome:
+        """The outcome, including the numbers in `long`."""
         outcome, long = self.outcome, self.long or {}
         if "count" in long:
             outcome = replace(outcome, count=int(long["count"]))
@@ -75,4 +75,4 @@ class Ended(Event, frozen=True, kw_only=True):
 
 
 JournalEntry = AnyEvent | Header | Ended
-"""One entry."""
+"""An entry of a journal."""

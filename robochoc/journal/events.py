@@ -11,17 +11,16 @@ from msgspec import UNSET, UnsetType
 
 
 class Event(msgspec.Struct, frozen=True, tag=True, tag_field="event", kw_only=True):
-    """Base of all events. `t`: in processes seconds since the start of the run, in the simulator steps."""
+    """The base of all events. `t`: seconds since the start of the run; in the simulator, steps."""
 
     t: float
 
 
 class Began(Event, frozen=True):
-    """A run of `protocol` begins, or its epoch `epoch`, which `opened_by` has opened.
+    """A run of `protocol` begins, or its epoch `epoch`, which was opened by `opened_by`.
 
-    Withdrawing is a run of its own after the search.
-    Counts start again from 0; times are compared within a run, or an epoch, only. `minimises`: costs are what it is
-    about, so there may be `Improved` events.
+    Withdrawing is a separate run after the search. All counts restart at 0. Times can only be compared within a run or
+    an epoch. `minimises`: the run minimises costs, so there may be `Improved` events.
     """
 
     protocol: str
@@ -31,17 +30,21 @@ class Began(Event, frozen=True):
 
 
 class Given(Event, frozen=True):
-    """The problem that robots get when a run, or an epoch, begins, after its `Began`. It is enough for a replay.
+    """The robots' problems at the beginning of a run or an epoch, after its `Began`. They suffice for a replay.
 
-    `order` is the priority order, with all robots of the team; `robots` holds the XML files, by name, of those
-    whose file is another than in the `Given` before (or all; empty, with the reason in `why`: it could not be
-    written). Robots in `fresh` start again; `void_keys` and `void_agents` are what no longer stands
-    (`solver/explanation.py`), and `quiet` says whether no message of the epoch before was lost. `seed`, `settings`
-    and `aside` (the withdrawal cost) are the run's parameters (`solver/agent_problem.py`). What a file cannot say
-    stands beside the files, for all robots: `shown`, by name, own variables that neighbours see though the robot's file
-    does not say so, and `empty`, the variables that have no value left (`journal/team_events.py`). Costs are integers of 0 or
-    more that are minimised; `told_in` says how they are told to the user, where that is otherwise: whether they are
-    maximised, their decimal places, and what is added to the sum (`model/costs.py`).
+    Attributes:
+        order: The priority order, with all robots of the team.
+        robots: The XML files, by robot, that differ from the previous `Given`, or all files. If the problems cannot be
+            written, this is empty and `why` is the reason.
+        seed: A parameter of the run (`solver/agent_problem.py`), as `settings` and `aside`, the withdrawal cost.
+        fresh: The robots that start again.
+        void_keys: Invalidated parts of the previous epoch (`solver/explanation.py`), as `void_agents`.
+        quiet: Whether no message of the previous epoch was lost.
+        shown: By robot, its variables that neighbours see although its file does not show it.
+        empty: The variables without remaining values, which a file cannot express (`journal/team_events.py`).
+        told_in: The user's units of costs, if they differ from the protocols' integers of 0 or more, which are
+            minimised: whether costs are maximised, their decimal places, and a constant that is added to the sum
+            (`model/costs.py`).
     """
 
     order: tuple[str, ...]
@@ -60,20 +63,20 @@ class Given(Event, frozen=True):
 
 
 class Registered(Event, frozen=True):
-    """A robot has confirmed that it is there."""
+    """A robot has registered with the master."""
 
     robot: str
 
 
 class DroppedOut(Event, frozen=True):
-    """A registered robot is gone, because of `why`, before the team was complete: the master waits for it again."""
+    """A registered robot has left for the reason `why` before the team was complete. The master waits for it again."""
 
     robot: str
     why: str
 
 
 class Sent(Event, frozen=True):
-    """`sender` has sent a message; `clock` is its NCCC clock, `content` the message's fields."""
+    """`sender` has sent a message with the fields `content`; `clock` is its NCCC clock."""
 
     sender: str
     receiver: str
@@ -84,7 +87,7 @@ class Sent(Event, frozen=True):
 
 
 class Received(Event, frozen=True):
-    """`receiver` has taken a message in; `clock` is its NCCC clock afterwards."""
+    """`receiver` has processed a message; `clock` is its NCCC clock afterwards."""
 
     sender: str
     receiver: str
@@ -93,7 +96,7 @@ class Received(Event, frozen=True):
 
 
 class Decided(Event, frozen=True):
-    """A robot has changed its value; an empty `assignment` means that it has none."""
+    """A robot has changed its value. With an empty `assignment` it has no value."""
 
     robot: str
     assignment: dict[str, int]
@@ -101,10 +104,10 @@ class Decided(Event, frozen=True):
 
 
 class Heard(Event, frozen=True):
-    """A robot has found, or received, an assignment of all robots that is cheaper than those before: an incumbent.
+    """A robot has found or received an incumbent: an assignment of all robots that is cheaper than all before.
 
-    `values` are the robots' values as others see them (null: a withdrawn one). The cost is what protocols count
-    (`Given.told_in`).
+    `values` are the robots' values as visible to others (null for a withdrawn robot). The cost is in the protocols'
+    units (`Given.told_in`).
     """
 
     robot: str
@@ -113,11 +116,10 @@ class Heard(Event, frozen=True):
 
 
 class Bounded(Event, frozen=True):
-    """A robot knows that no assignment of the robots that `bound` is for costs less; it was less before.
+    """A robot has proven a higher lower bound for the costs of a part of the team.
 
-    Where several robots know bounds, each is for a part of the team, and their sum is for all of it
-    (`protocols/findings.py`). It is reported where it was asked for. The cost is what protocols count
-    (`Given.told_in`).
+    If several robots have bounds, their sum is a bound for the team (`protocols/findings.py`). The event is recorded
+    on request only. The bound is in the protocols' units (`Given.told_in`).
     """
 
     robot: str
@@ -125,10 +127,10 @@ class Bounded(Event, frozen=True):
 
 
 class Improved(Event, frozen=True):
-    """The present assignment, or an incumbent that a robot has received, is cheaper than all before.
+    """The present assignment, or an incumbent received by a robot, is cheaper than all before.
 
-    A robot without a value counts as withdrawn. No robot reports this event: it follows from others, and stands in
-    journals only. Of an incumbent, variables that no neighbour sees are not known. The cost is in the user's numbers.
+    A robot without a value counts as withdrawn. The event is computed from others, in journals only; no robot reports
+    it. An incumbent lacks the variables that no neighbour sees. The cost is in the user's units.
     """
 
     cost: int | Decimal
@@ -136,7 +138,7 @@ class Improved(Event, frozen=True):
 
 
 class Settled(Event, frozen=True):
-    """A robot has dealt with its packet: its NCCC clock, and its constraint checks since the start of the run."""
+    """A robot has processed its packet: its NCCC clock, and its constraint checks since the start of the run."""
 
     robot: str
     clock: int
@@ -144,23 +146,23 @@ class Settled(Event, frozen=True):
 
 
 class Concluded(Event, frozen=True):
-    """A robot alone concluded the verdict of the search."""
+    """A robot has concluded the verdict of the search by itself."""
 
     robot: str
     verdict: str
 
 
 class Lost(Event, frozen=True):
-    """A robot's process has ended before the run did."""
+    """A robot's process has ended before the end of the run."""
 
     robot: str
     why: str
 
 
 class Granted(Event, frozen=True):
-    """The Authority has granted `who` `what`; there `t` is Unix time, as the Authority outlives runs.
+    """The Authority has granted `what` to `who`. Its events have Unix times in `t`, as the Authority outlives runs.
 
-    `origin` is where the request came from, as `address:port`; empty where it was no network.
+    `origin` is the origin of the request, as `address:port`; empty if it did not come over a network.
     """
 
     who: str
@@ -169,10 +171,9 @@ class Granted(Event, frozen=True):
 
 
 class Refused(Event, frozen=True):
-    """`who` claimed to be allowed `what`, and is not, because `why`. `t` and `origin` as in `Granted`.
+    """The request of `who` for `what` was refused, for the reason `why`. `t` and `origin` as in `Granted`.
 
-    `who` is what the other side said of itself, so it may be anybody's name, or `unknown`. Refusals in a run have the
-    run's time.
+    `who` is the unverified name that the other side has given, or `unknown`. Refusals in a run have the run's time.
     """
 
     who: str
@@ -202,7 +203,7 @@ Observer = Callable[[AnyEvent], None]
 
 
 def actor(event: AnyEvent) -> str | None:
-    """Return the robot whose step `event` is part of. None: it is not part of a step."""
+    """Return the robot whose step contains `event`; None if the event is not part of a step."""
     match event:
         case Sent():
             return event.sender

@@ -1,8 +1,8 @@
 """The journal: all events of a run, in a compact file that can be read while it is written, and after a crash.
 
-The first entry says what was run, the last one how it ended. Statistics, pictures and golden tests are computed from
-it; robots do not know that it is kept. The file is described in docs/guides/journal.md; its text form is one JSON
-object a line.
+The first entry is a header, the last one the outcome. Statistics, pictures and golden tests are computed from the
+journal, independently of the robots. docs/guides/journal.md describes the file. Its text form is one JSON object per
+line.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ __all__ = [
 
 
 def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
-    """Return the messages, bytes, NCCCs and checks in the events. Wall-clock time, which they lack, is 0."""
+    """Return the counts of messages, bytes, NCCCs and checks in the events. The wall-clock time is unknown, and 0."""
     total = Metrics()
     messages: Counter[str] = Counter()
     size = largest = ncccs = 0

@@ -1,4 +1,4 @@
-"""Reading journals: those that are whole, those that broke off, and those that are still being written."""
+"""Reading journals that are complete, incomplete, or still being written."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ from robochoc.model.outcome import Outcome
 from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.garbage import collection_paused
 
-MOST_ENTRIES = 30_000_000
-"""`read_journal` keeps no more: about 10 million messages, of which each takes a kilobyte of memory."""
+ENTRIES_MAX = 30_000_000
+"""The most entries that `read_journal` reads: about 10 million messages, of a kilobyte of memory each."""
 LONGEST_LINE = 256 * 2**20
-"""No line of the text form is longer, in bytes."""
+"""The longest line of the text form, in bytes."""
 _PIECE = 2**20
 _TEXT = b'{"event":"Journal"'
 
 
 @dataclass(frozen=True)
 class Journal:
-    """A journal that has been read. `outcome` is None when the run broke off.
+    """The content of a journal. `outcome` is None if the run was interrupted.
 
-    `damage` says why it ends early, and where: after a crash, or in a file that was altered. None: it is whole. The
-    events are those before the damage. `truncated`: only the end is missing, as after a crash; nothing was altered.
+    `damage` is the reason and the place of a premature end, after a crash or in an altered file; None if the journal is
+    complete. The events are those before the damage. `truncated`: only the end is missing, as after a crash.
     """
 
     header: Header
@@ -45,43 +45,42 @@ class Journal:
 
 
 def is_journal(content: bytes) -> bool:
-    """Return whether `content` begins as a journal does, in either form."""
+    """Return whether `content` begins like a journal in one of its two forms."""
     return content.startswith((MAGIC, _TEXT))
 
 
 def read_journal(content: bytes) -> Journal:
-    """Read what `Recorder` has written, or the lines that `lines_of` gives.
+    """Read the output of `JournalRecorder`, or the lines of `lines_of`.
 
-    Within a run, from one `Began` to the next, events are put in the order of their times; those of equal times stay
-    in the order in which they came, which is each robot's own (`Improved` were written last, and so come after all of
-    their time).
+    Within a run, from one `Began` to the next, events are sorted by their times. Events with equal times stay in the
+    recorded order, which preserves each robot's order (`Improved` events, recorded last, follow all of their time).
 
     Raises:
-        JournalError: where not even the header can be read.
+        JournalError: if the header cannot be read.
     """
     with collection_paused():
         follower = Follower(io.BytesIO(content))
-        lines = follower.read(MOST_ENTRIES)
+        lines = follower.read(ENTRIES_MAX)
         damage = follower.damage
         truncated = False
-        if len(lines) > MOST_ENTRIES:
-            damage = f"it has more than {MOST_ENTRIES:,} entries, of which the first are read"
+        if len(lines) > ENTRIES_MAX:
+            damage = f"it has more than {ENTRIES_MAX:,} entries; only the first ones are read"
             truncated = True
-            del lines[MOST_ENTRIES:]
+            del lines[ENTRIES_MAX:]
         elif damage is None:
             rest, damage = follower.finish()
             truncated = follower.truncated
             lines += rest
         first, last = lines[0], lines[-1]
-        if not isinstance(first, Header):  # the follower has seen to it
+        if not isinstance(first, Header):  # checked by the follower
             raise JournalError("it has no header")
-        outcome = last.whole if isinstance(last, Ended) else None
-        events = cast("list[AnyEvent]", lines[1:-1] if outcome is not None else lines[1:])  # so has it here
+        outcome = last.complete_outcome if isinstance(last, Ended) else None
+        events = cast("list[AnyEvent]", lines[1:-1] if outcome is not None else lines[1:])  # checked as well
         return Journal(first, tuple(sorted_by_time(events)), outcome, damage, truncated)
 
 
 def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
-    """Yield events of a journal, as they were written; each run's come in the order of their times, `Began` first."""
+    """Yield the events of a journal, sorted by time within each run, which begins with its `Began`."""
     events = list(events)
     begun = [place for place, event in enumerate(events) if type(event) is Began]
     by_time = attrgetter("t")
@@ -92,7 +91,7 @@ def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
 
 
 def lines_of(journal: Journal) -> Iterator[bytes]:
-    """Yield the text form of a journal: one JSON object a line."""
+    """Yield the text form of a journal: one JSON object per line."""
     encode = msgspec.json.Encoder(decimal_format="number").encode
     yield encode(journal.header) + b"\n"
     for event in journal.events:
@@ -104,31 +103,31 @@ def lines_of(journal: Journal) -> Iterator[bytes]:
 class Follower:
     """Reads a journal, of either form, while it is written.
 
-    `file` is not closed. Where it can be, it is read at an offset of the follower's own (`os.pread`), so it may be one
-    that another process appends to through the same descriptor.
+    `file` is not closed. If possible, it is read at a separate offset (`os.pread`), so another process may append to it
+    through the same descriptor.
     """
 
     damage: str | None = None
-    """The first damage that was found, with its place. None: no damage so far."""
+    """The first damage and its place; None if there is none so far."""
     truncated: bool = False
     """True if the only damage is that the end of the journal is missing."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._source = _source(file)
-        self._form: _Form | None = None
-        self._began = self._over = False
+        self._format: _Format | None = None
+        self._has_header = self._is_over = False
 
     def read(self, most: int | None = None) -> list[JournalEntry]:
-        """Return the entries that are complete since the last call, in the file's order. The first is the `Header`.
+        """Return the entries completed since the last call, in the file's order. The first one is the `Header`.
 
-        What is appended to a file from now on is left to the next call: its writer may be faster than this reader.
-        Stops after the block with which there are more than `most`.
+        Bytes appended during the call are left to the next one: the writer may be faster than this reader. Stops after
+        the block that exceeds `most` entries.
 
         Raises:
             JournalError: if the file is not a journal.
         """
         lines: list[JournalEntry] = []
-        self._source.look()
+        self._source.update_end()
         while self.damage is None and (most is None or len(lines) <= most):
             found = self._next()
             if found is None:
@@ -137,103 +136,103 @@ class Follower:
         return lines
 
     def finish(self) -> tuple[list[JournalEntry], str | None]:
-        """Return the remaining entries, and the damage if there is any.
+        """Return the remaining entries of a file that is no longer written, and the damage if any.
 
-        Nothing more is written. Raises `JournalError`.
+        Raises `JournalError`.
         """
-        if self._form is None:
+        if self._format is None:
             raise JournalError("it is empty")
         lines: list[JournalEntry] = []
         if self.damage is None:
             try:
-                lines += self._fitting(self._form.rest())
+                lines += self._checked(self._format.rest())
             except JournalDamagedError as damaged:
-                self._break_off(damaged)
-        if not self._began:
+                self._stop_at(damaged)
+        if not self._has_header:
             raise JournalError("it ends before its header")
         return lines, self.damage
 
     @property
     def is_over(self) -> bool:
-        """Return whether the journal is complete: it holds the outcome of the run."""
-        return self._over
+        """Whether the journal is complete, that is, contains the outcome of the run."""
+        return self._is_over
 
     def _next(self) -> Sequence[JournalEntry] | None:
-        """Return the next entries; None: there are none yet."""
+        """Return the next entries; None if there are none yet."""
         while True:
             try:
-                if self._form and (lines := self._form.next()) is not None:
-                    return self._fitting(lines)
+                if self._format and (lines := self._format.next()) is not None:
+                    return self._checked(lines)
             except JournalDamagedError as damaged:
-                self._break_off(damaged)
+                self._stop_at(damaged)
                 return None
             piece = self._source.piece()
             if not piece:
                 return None
-            if self._form is None:
-                self._form = _Blocks() if piece[:1] == MAGIC[:1] else _Text()
-            self._form.feed(piece)
+            if self._format is None:
+                self._format = _Blocks() if piece[:1] == MAGIC[:1] else _Text()
+            self._format.feed(piece)
 
-    def _break_off(self, damaged: JournalDamagedError) -> None:
-        if not self._began:
+    def _stop_at(self, damaged: JournalDamagedError) -> None:
+        if not self._has_header:
             raise JournalError(str(damaged)) from damaged
-        self.damage = f"{self._place}: more follows the end" if self._over else str(damaged)
-        self.truncated = isinstance(damaged, JournalTruncatedError) and not self._over
+        self.damage = f"{self._place}: more follows the end" if self._is_over else str(damaged)
+        self.truncated = isinstance(damaged, JournalTruncatedError) and not self._is_over
 
     @property
     def _place(self) -> str:
-        return self._form.place if self._form else ""
+        return self._format.place if self._format else ""
 
-    def _fitting(self, lines: Sequence[JournalEntry]) -> Sequence[JournalEntry]:
-        """Return `lines`, if they may follow those before: a header, events, an end.
+    def _checked(self, lines: Sequence[JournalEntry]) -> Sequence[JournalEntry]:
+        """Return `lines` after a check of their order: a header, events, an end.
 
         Raises `JournalError`, `JournalDamagedError`.
         """
-        if self._began and not self._over and {*map(type, lines)}.isdisjoint((Header, Ended)):
-            return lines  # nearly always, and there may be millions
-        began, over = self._began, self._over
+        if self._has_header and not self._is_over and {*map(type, lines)}.isdisjoint((Header, Ended)):
+            return lines  # the usual case, for up to millions of lines
+        has_header, is_over = self._has_header, self._is_over
         for line in lines:
-            if over:
+            if is_over:
                 raise JournalDamagedError(f"{self._place}: more follows the end")
-            if isinstance(line, Header) == began:
-                if began:
+            if isinstance(line, Header) == has_header:
+                if has_header:
                     raise JournalDamagedError(f"{self._place}: a second header")
                 raise JournalError(f"{self._place}: expected the header of a journal")
             if isinstance(line, Header) and line.version not in READ:
                 known = " and ".join(map(str, READ))
-                raise JournalError(f"its entries are of version {line.version}, and this robochoc reads {known}")
-            began, over = True, isinstance(line, Ended)
-        self._began, self._over = began, over
+                raise JournalError(f"its entries have the version {line.version}, but this robochoc reads {known}")
+            has_header, is_over = True, isinstance(line, Ended)
+        self._has_header, self._is_over = has_header, is_over
         return lines
 
 
 class _Stream:
-    """Reads `file`, which is in memory, or a pipe, piece by piece."""
+    """Reads `file`, a pipe or bytes in memory, piece by piece."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
 
-    def look(self) -> None:
-        """Nobody knows how long it is."""
+    def update_end(self) -> None:
+        """Do nothing: the length is unknown."""
 
     def piece(self) -> bytes:
-        """Return the next piece; an empty one: there is none yet."""
+        """Return the next piece; empty if there is none yet."""
         return self._file.read(_PIECE)
 
 
 class _Stored:
-    """Reads a file that has a length, piece by piece, up to the end that it had at the last look."""
+    """Reads a file with a known length piece by piece, up to its end at the last `update_end`."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self._place = self._end = 0
 
-    def look(self) -> None:
-        """Take notice of what has been appended."""
+    def update_end(self) -> None:
+        """Include the bytes appended so far."""
         self._end = os.fstat(self._descriptor).st_size
 
     def piece(self) -> bytes:
-        """Return the next piece; an empty one: there was no more."""
+        """Return the next piece; empty at the end."""
         piece = os.pread(self._descriptor, max(0, min(_PIECE, self._end - self._place)), self._place)
         self._place += len(piece)
         return piece
@@ -243,26 +242,26 @@ def _source(file: BinaryIO) -> _Stream | _Stored:
     try:
         descriptor = file.fileno()
         os.pread(descriptor, 0, 0)
-    except (OSError, AttributeError):  # it is in memory, or a pipe
+    except (OSError, AttributeError):  # in memory, or a pipe
         return _Stream(file)
     return _Stored(descriptor)
 
 
-class _Form(Protocol):
-    """One of the two forms of journals."""
+class _Format(Protocol):
+    """A reader of one of the two forms of journals."""
 
     def feed(self, piece: bytes) -> None:
         """Append the next bytes."""
 
     def next(self) -> Sequence[JournalEntry] | None:
-        """Return the next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
+        """Return the next entries; None if they are incomplete. Raises `JournalError`, `JournalDamagedError`."""
 
     def rest(self) -> Sequence[JournalEntry]:
         """Return the entries that are complete without further bytes. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
     def place(self) -> str:
-        """Return where the last entries stood."""
+        """The place of the last entries."""
 
 
 class _Blocks:
@@ -281,7 +280,7 @@ class _Blocks:
         try:
             return entries_of(content)
         except BlockError as bad:
-            raise JournalDamagedError(f"{self.place}: a block holds no entries: {bad}") from bad
+            raise JournalDamagedError(f"{self.place}: a block has no valid entries: {bad}") from bad
 
     def rest(self) -> Sequence[JournalEntry]:
         if self._unframer.rest:
@@ -290,7 +289,7 @@ class _Blocks:
 
 
 class _Text:
-    """The text form: one JSON object a line."""
+    """The text form: one JSON object per line."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
@@ -331,7 +330,7 @@ class _Text:
         except msgspec.MsgspecError as error:
             raise JournalDamagedError(f"{self.place}: {describe_decode_error(error, None)}") from error
         except RecursionError as error:
-            raise JournalDamagedError(f"{self.place}: it is nested too deep") from error
+            raise JournalDamagedError(f"{self.place}: it is nested too deeply") from error
         if not isfinite(entry.t):
             raise JournalDamagedError(f"{self.place}: its time is not a number")
         return (entry,)

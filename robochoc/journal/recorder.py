@@ -1,4 +1,4 @@
-"""Writing journals: block after block, while the run goes on."""
+"""Writing journals block by block during the run."""
 
 from __future__ import annotations
 
@@ -25,69 +25,69 @@ from robochoc.model.problem import INFINITE
 from robochoc.system.files import AppendableFile, errors_naming
 from robochoc.verification.objective import Objective
 
-MOST_IN_A_BLOCK = 8192
-"""Entries; with four times as many ABT's messages are packed 5 to 12 % better, but a crash takes more with it."""
+ENTRIES_PER_BLOCK_MAX = 8192
+"""With four times as many entries, ABT's messages are 5 to 12 % shorter, but a crash loses more of them."""
 SPAN_S = 0.25
 """Seconds after which the next event closes a block. A killed run loses at most the events of this time."""
 
 BlockSink = Callable[[bytes], object]
-"""Takes one whole block after the other; the first time the beginning of the file, too. It may raise `OSError`."""
+"""Receives complete blocks, the first one with the beginning of the file. It may raise `OSError`."""
 
 
 class JournalRecorder:
-    """An observer that writes a journal of the events, while they come, to all `sinks`.
+    """An observer that writes a journal of the events to all `sinks` during the run.
 
-    It may be called by several threads. Without sinks the journal is kept in memory: `content`. With an `objective`,
-    it notes, at the end of each run that minimises, when what the robots had decided was the cheapest so far. A sink
-    that raises `OSError` is asked no more; the run goes on, and the error stands in `failures`.
+    It may be called by several threads. Without sinks the journal is stored in memory, see `content`. With an
+    `objective`, `Improved` events are recorded at the end of each run that minimises. A sink that raises `OSError` is
+    not used again; the run continues, and the error is in `failures`.
     """
 
     outcome: Outcome | None = None
-    """The outcome of the run. Set it before `close`. None: the run is not over, or it broke off."""
+    """The outcome of the run, to be set before `close`. None if the run has not ended, or was interrupted."""
 
     def __init__(
         self, header: Header, objective: Callable[[], Objective] | None = None, sinks: Sequence[BlockSink] = ()
     ) -> None:
         self._memory = io.BytesIO()
-        self._outlets = [_Outlet(sink) for sink in sinks or (self._memory.write,)]
+        self._sinks = [_SinkState(sink) for sink in sinks or (self._memory.write,)]
         self._objective = objective
         self._exact = header.runtime == "simulator"
         self._lock = Lock()
         self._closed = False
-        self._pending: list[JournalEntry] = [_readable(header)]
-        self._weighed: list[AnyEvent] | None = None
+        self._pending: list[JournalEntry] = [_encodable(header)]
+        self._cost_events: list[AnyEvent] | None = None
         self._given: list[Given] = []
         self._digest = BEGINNING
         self._beginning = PREAMBLE
         self._staged: list[bytes] = []
         self._number = 0
-        self._due = 0.0  # so the first event is written at once, and the header with it
+        self._due = 0.0  # the header and the first event are written at once
 
     def __call__(self, event: AnyEvent) -> None:
-        """Take in one event. `Began` opens a run; times are compared within a run only."""
+        """Record an event. `Began` begins a run; times can only be compared within a run."""
         with self._lock:
             self._pending.append(event)
-            if len(self._pending) >= MOST_IN_A_BLOCK or time.monotonic() >= self._due:
+            if len(self._pending) >= ENTRIES_PER_BLOCK_MAX or time.monotonic() >= self._due:
                 self._close_block()
 
     def flush_if_due(self) -> None:
-        """Close the block if it has been open for long. Call this from time to time while no event occurs."""
+        """Close the block if it has been open for `SPAN_S`. To be called at intervals while no events occur."""
         if self._pending and time.monotonic() >= self._due:
             self.flush()
 
     def flush(self) -> None:
-        """Close the block now, if there is anything in it."""
+        """Close the block now, unless it is empty."""
         with self._lock:
             self._close_block()
 
     def close(self) -> None:
-        """Write what is left, and the `outcome`. Later events are not written."""
+        """Write the remaining events and the `outcome`. Later events are not written."""
         with self._lock:
             if self._closed:
                 return
-            self._close_block()  # also what was staged when an interrupt came
-            if self._weighed:
-                self._pending, self._weighed = [*self._improved(self._weighed, self._given)], None
+            self._close_block()  # also writes blocks that were staged before an interrupt
+            if self._cost_events:
+                self._pending, self._cost_events = [*self._improvements(self._cost_events, self._given)], None
             if self.outcome is not None:
                 self._pending.append(Ended.from_outcome(self.outcome))
             self._close_block()
@@ -95,80 +95,80 @@ class JournalRecorder:
 
     @property
     def is_empty(self) -> bool:
-        """Return whether no event was recorded. Then no file is written, and an old file stays."""
+        """Whether no event was recorded. Then no file is written, and an old file remains."""
         return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:
-        """Close, and return the journal, where it was kept in memory."""
+        """Close, and return the journal if it was stored in memory."""
         self.close()
         return self._memory.getvalue()
 
     @property
     def failures(self) -> list[OSError]:
-        """Return why sinks are asked no more."""
-        return [outlet.failure for outlet in self._outlets if outlet.failure]
+        """The errors of sinks that are not used any more."""
+        return [sink.failure for sink in self._sinks if sink.failure]
 
     def _close_block(self) -> None:
-        """Make blocks of what is pending, and pass them on.
+        """Make blocks of the pending entries, and write them to the sinks.
 
-        An exception of a signal's may come between any two calls. So each change of state is a single statement that
-        calls nothing, and what was begun is ended the next time.
+        The exception of a signal may occur between any two calls. So each change of state is a single statement
+        without calls, and unfinished work is completed the next time.
         """
         self._pass_on()
         if not self._pending or self._closed:
             return
-        if all(outlet.failure for outlet in self._outlets):
+        if all(sink.failure for sink in self._sinks):
             self._pending = []
             return
-        lines, weighed, given = self._told(self._pending)
+        lines, cost_events, given = self._with_improvements(self._pending)
         blocks, digest = self._packed(lines)
         due = time.monotonic() + SPAN_S
-        self._pending, self._weighed, self._given, self._digest, self._staged, self._due = (
-            [], weighed, given, digest, blocks, due,
+        self._pending, self._cost_events, self._given, self._digest, self._staged, self._due = (
+            [], cost_events, given, digest, blocks, due,
         )  # fmt: skip
         self._pass_on()
 
     def _pass_on(self) -> None:
-        for outlet in self._outlets:
-            outlet.take(self._staged, self._number)
+        for sink in self._sinks:
+            sink.write(self._staged, self._number)
         number = self._number + len(self._staged)
         self._staged, self._number = [], number
 
-    def _told(self, pending: list[JournalEntry]) -> tuple[Sequence[JournalEntry], list[AnyEvent] | None, list[Given]]:
-        """Return `pending` with improvements where a run ends, and the events and problems of the open run.
+    def _with_improvements(
+        self, pending: list[JournalEntry]
+    ) -> tuple[Sequence[JournalEntry], list[AnyEvent] | None, list[Given]]:
+        """Return `pending` with the improvements of completed runs, the cost events of the open run, and all `Given`.
 
-        The third is all that robots have been given.
-
-        Improvements follow from the order of events, which is known once all of a run have come.
+        Improvements depend on the order of events, which is known when a run is complete.
         """
         if self._objective is None:
             return pending, None, []
-        weighed = None if self._weighed is None else [*self._weighed]
+        cost_events = None if self._cost_events is None else [*self._cost_events]
         given = [*self._given]
         lines: list[JournalEntry] = []
         for entry in pending:
             match entry:
                 case Began():
-                    lines += self._improved(weighed or (), given)
-                    weighed = [] if entry.minimises is True else None
+                    lines += self._improvements(cost_events or (), given)
+                    cost_events = [] if entry.minimises is True else None
                 case Given():
                     given.append(entry)
-                case Decided() | Heard() if weighed is not None:
-                    weighed.append(entry)
+                case Decided() | Heard() if cost_events is not None:
+                    cost_events.append(entry)
                 case _:
                     pass
             lines.append(entry)
-        return lines, weighed, given
+        return lines, cost_events, given
 
-    def _improved(self, weighed: Sequence[AnyEvent], given: Sequence[Given]) -> Iterator[Improved]:
-        if self._objective is None or not weighed:
+    def _improvements(self, cost_events: Sequence[AnyEvent], given: Sequence[Given]) -> Iterator[Improved]:
+        if self._objective is None or not cost_events:
             return
-        heard = any(isinstance(event, Heard) for event in weighed)
-        events = [*(given if heard else ()), *sorted(weighed, key=attrgetter("t"))]
+        has_incumbents = any(isinstance(event, Heard) for event in cost_events)
+        events = [*(given if has_incumbents else ()), *sorted(cost_events, key=attrgetter("t"))]
         yield from (event for event in improvements(events, self._objective()) if isinstance(event, Improved))
 
     def _packed(self, lines: Sequence[JournalEntry]) -> tuple[list[bytes], bytes]:
-        """Return blocks of `lines`, and the checksum of the last."""
+        """Return blocks of `lines`, and the checksum of the last block."""
         blocks, digest = [], self._digest
         for content in _contents(lines, exact=self._exact):
             block, digest = frame_block(content, digest)
@@ -179,10 +179,9 @@ class JournalRecorder:
 
 
 class JournalFile:
-    """A sink that is a file. With the first block it takes the place of what was there; then it grows.
+    """A file as sink. The first block replaces an existing file; further blocks are appended.
 
-    Devices, pipes, and standard streams are written to as they are, as `write_atomically` does. Errors say which
-    file.
+    Devices, pipes, and standard streams are written directly, as by `write_atomically`. Errors contain the file's name.
     """
 
     def __init__(self, path: Path) -> None:
@@ -191,7 +190,7 @@ class JournalFile:
         self._closed = False
 
     def write(self, block: bytes) -> None:
-        """Take in the next block. Raises `OSError`."""
+        """Write the next block. Raises `OSError`."""
         if self._closed:
             raise OSError(errno.EBADF, os.strerror(errno.EBADF), str(self._path))
         with errors_naming(self._path):
@@ -208,44 +207,44 @@ class JournalFile:
                 file.close()
 
 
-class _Outlet:
-    """A sink, and how many blocks it has had."""
+class _SinkState:
+    """A sink, and the number of blocks written to it."""
 
     failure: OSError | None = None
 
     def __init__(self, sink: BlockSink) -> None:
         self._sink = sink
-        self._had = 0
+        self._written = 0
 
-    def take(self, blocks: Sequence[bytes], number: int) -> None:
-        """Pass on those of `blocks`, the first of which is the journal's `number`-th, that it has not had."""
-        while not self.failure and self._had < number + len(blocks):
+    def write(self, blocks: Sequence[bytes], number: int) -> None:
+        """Write those of `blocks` that are missing in the sink. The first one has the `number` in the journal."""
+        while not self.failure and self._written < number + len(blocks):
             try:
-                self._sink(blocks[self._had - number])
-                self._had += 1
+                self._sink(blocks[self._written - number])
+                self._written += 1
             except OSError as error:
                 self.failure = error
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """Yield `events`, and an `Improved` after each that makes the assignment cheaper than ever.
+    """Yield `events`, and an `Improved` after each event that makes the assignment cheaper than all before.
 
-    What robots were given says which variables they show: `objective` may be of the team as the files have it.
+    `objective` may be that of the team's files: `Given` events define the variables that robots show.
     """
     best = INFINITE
     reader = TeamReader()
     now: Mapping[str, Mapping[str, int]] | None
-    own: dict[str, dict[str, int]] = {}
+    decided: dict[str, dict[str, int]] = {}
     several = list(events)
     for event, following in zip(several, [*several[1:], None], strict=True):
         yield event
         match event:
             case Decided():
-                own[event.robot] = event.assignment
+                decided[event.robot] = event.assignment
                 objective.change({event.robot: event.assignment})
                 if objective.in_step and isinstance(following, Decided) and following.t == event.t:
                     continue
-                cost, now = objective.cost, own
+                cost, now = objective.cost, decided
             case Heard():
                 cost, now = event.cost, objective.shown(event.values)
             case Given():
@@ -260,20 +259,20 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
 
 
 def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
-    """Return the variables that the robots in `given` show; of none, if it cannot be read."""
+    """Return the variables that the robots in `given` show; empty if it cannot be read."""
     try:
         return {robot.name: robot.interface for robot in reader.team(given).robots}
     except GivenProblemError:
         return {}
 
 
-def _readable(header: Header) -> Header:
-    """Return `header`, with the team's name made encodable: the folder's name may not be valid text."""
+def _encodable(header: Header) -> Header:
+    """Return `header` with a team's name that can be encoded: a folder's name may be invalid text."""
     return msgspec.structs.replace(header, team=header.team.encode(errors="replace").decode())
 
 
 def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
-    """Yield what the blocks of `lines` hold: one, or as many as it takes."""
+    """Yield the contents of one or more blocks for `lines`."""
     try:
         content = columns_of(lines, exact=exact)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
@@ -285,18 +284,15 @@ def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
         why = f"it has {len(content):,} bytes, more than {MAX_BLOCK_BYTES:,}"
     if len(lines) == 1:
         with suppress(TypeError, ValueError, OverflowError, RecursionError):
-            yield columns_of([_instead(lines[0], why)], exact=exact)
+            yield columns_of([_replacement(lines[0], why)], exact=exact)
         return
     middle = len(lines) // 2
     yield from _contents(lines[:middle], exact=exact)
     yield from _contents(lines[middle:], exact=exact)
 
 
-def _instead(line: JournalEntry, why: str) -> JournalEntry:
-    """Return a replacement for an entry that cannot be encoded.
-
-    Raises `ValueError` where there is nothing.
-    """
+def _replacement(line: JournalEntry, why: str) -> JournalEntry:
+    """Return a replacement for an entry that cannot be encoded. Raises `ValueError` if there is none."""
     match line:
         case Sent():
             return msgspec.structs.replace(line, content={"left out": why})

@@ -7,8 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 from robochoc.journal.events import Decided, Received, Sent
-from robochoc.journal.team_events import run_parameters_of
 from robochoc.journal.journal import Journal
+from robochoc.journal.team_events import run_parameters_of
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel
 from robochoc.privacy.losses import Kind, Loss, PrivacyReport, loss_between

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from robochoc.communication.host import Host
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import AnyEvent, Given, Lost
-from robochoc.journal.team_events import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.journal.journal import Header
+from robochoc.journal.team_events import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.model.change import team_after_events
 from robochoc.model.costs import normalized
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities

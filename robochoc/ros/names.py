@@ -128,7 +128,7 @@ def _clash(topic: str, first: Drone, second: Drone) -> str:
         names = [f"{drone.name} ({drone.robot})" if drone.robot else drone.name for drone in (first, second)]
         clash = f"{names[0]} and {names[1]} both publish on {second.topic.name!r}: give each its own topic"
     else:
-        clash = f"{_description(first)} and {_description(second)} would have the topic {topic} in ROS: rename one"
+        clash = f"{_description(first)} and {_description(second)} would both have the topic {topic} in ROS: rename one"
     return on_one_line(clash)
 
 

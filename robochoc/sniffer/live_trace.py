@@ -132,7 +132,7 @@ class LiveTrace:
                 case Header():
                     self.trace = Trace(line, self._generation)
                 case Ended():
-                    self._outcome = line.whole
+                    self._outcome = line.complete_outcome
                 case _:
                     if line.t < self._last and not isinstance(line, Began):
                         self._disordered = True

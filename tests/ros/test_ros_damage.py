@@ -87,7 +87,7 @@ HOSTILE = (
             ours(),
             "cdr",
             bytes(999),
-            "999 bytes are no geometry_msgs/",
+            "999 bytes are not a geometry_msgs/",
         ),
     ],
 )

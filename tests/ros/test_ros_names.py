@@ -95,7 +95,7 @@ def test_a_waypoint_that_is_called_like_a_report_is_no_report() -> None:
 def test_a_clash_names_topics_robots_and_the_way_out() -> None:
     with pytest.raises(NameClashError) as clash:
         TopicNames([drone("A", "/a.1/w", "North"), drone("B", "/a_1/w", "South")])
-    told = "topic '/a.1/w' of North and topic '/a_1/w' of South would have the topic /a_1/w in ROS: rename one"
+    told = "topic '/a.1/w' of North and topic '/a_1/w' of South would both have the topic /a_1/w in ROS: rename one"
     assert str(clash.value) == told
 
 
@@ -112,7 +112,7 @@ def test_a_report_does_not_run_into_a_waypoint() -> None:
 
 
 def test_drones_without_topics_clash_by_their_names() -> None:
-    with pytest.raises(NameClashError, match=r"drone 'a\.b' of .* and drone 'a b' of .* on /a_b/"):
+    with pytest.raises(NameClashError, match=r"drone 'a\.b' of .* and drone 'a b' of .* topic /a_b/"):
         TopicNames([drone("a.b", None), drone("a b", None)])
 
 

@@ -244,9 +244,9 @@ def test_a_block_that_claims_too_much_is_refused(sizes: tuple[int, int]) -> None
 
 
 def test_other_versions_are_refused_with_both_numbers() -> None:
-    with pytest.raises(JournalError, match="of format 9, and this robochoc reads format 1"):
+    with pytest.raises(JournalError, match="the format 9, but this robochoc reads format 1"):
         read_journal(made(columns(HEADER), preamble=PREAMBLE[:8] + struct.pack("<HH", 9, 0)))
-    with pytest.raises(JournalError, match="entries are of version 7, and this robochoc reads 1 and 2"):
+    with pytest.raises(JournalError, match="entries have the version 7, but this robochoc reads 1 and 2"):
         read_journal(made(columns(msgspec.structs.replace(HEADER, version=7))))
     with pytest.raises(JournalError, match="checksum"):
         read_journal(PREAMBLE[:10] + b"\x01\x00" + made(columns(HEADER))[12:])

@@ -1,9 +1,9 @@
-"""The problem that robots get when a run begins: a team as an event, for replays, and back.
+"""Teams as `Given` events, which contain the robots' problems for replays, and back.
 
-Robots travel as the XML files that they could have come from. What such a file cannot say stands beside them: the
-priority order, variables that neighbours see though nothing in the robot's own file says so, and domains that a
-scenario has emptied. Two things are not kept, as no robot looks at them: what definitions and domains are called
-(where two of a file have one name, one gets another), and which lines of which file they came from.
+Robots are recorded as equivalent XML files. The event contains separately what a file cannot express: the priority
+order, variables that neighbours see although the robot's file does not show it, and domains that a scenario has
+emptied. Two facts are not recorded, because robots do not use them: the names of definitions and domains (duplicate
+names in a file are changed), and their lines in the original files.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from robochoc.solver.explanation import Invalidated
 from robochoc.system.errors import RobochocError
 
 NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
-_STAND_IN = (range(1),)
-"""The domain that is written for an empty one, which a file cannot have."""
+_PLACEHOLDER = (range(1),)
+"""The domain written in place of an empty one, which a file cannot have."""
 
 
 class GivenProblemError(RobochocError, ValueError):
@@ -34,7 +34,7 @@ class GivenProblemError(RobochocError, ValueError):
 
 
 class TeamWriter:
-    """Writes what robots are given. Of their files only those that have changed since the last time."""
+    """Writes `Given` events. Each contains only the robots' files that have changed since the previous event."""
 
     def __init__(self) -> None:
         self._robots: dict[str, Robot] = {}
@@ -49,7 +49,7 @@ class TeamWriter:
         fresh: Collection[str] = (),
         quiet: bool = True,
     ) -> Given:
-        """Return the event with the problem of `team`, in its order. `why`: the reason if it cannot be written."""
+        """Return the event with the problem of `team`. If it cannot be written, the event's `why` is the reason."""
         event = Given(
             t=0,
             order=team.order,
@@ -69,13 +69,13 @@ class TeamWriter:
             files = {robot.name: self._file(robot) for robot in team.robots}
         except ValueError as error:
             return msgspec.structs.replace(event, why=str(error))
-        news = {name: file for name, file in files.items() if self._files.get(name) != file}
+        changed = {name: file for name, file in files.items() if self._files.get(name) != file}
         self._robots.update((robot.name, robot) for robot in team.robots)
-        self._files.update(news)
-        return msgspec.structs.replace(event, robots=news)
+        self._files.update(changed)
+        return msgspec.structs.replace(event, robots=changed)
 
     def _file(self, robot: Robot) -> str:
-        """Return the robot's file; an equal robot's is not written again."""
+        """Return the robot's file. If the robot has not changed, the previous file is reused."""
         if self._robots.get(robot.name) == robot:
             return self._files[robot.name]
         try:
@@ -85,14 +85,14 @@ class TeamWriter:
 
 
 class TeamReader:
-    """Reads what `TeamWriter` says, one event after the other."""
+    """Reads the events of a `TeamWriter`, in their order."""
 
     def __init__(self, name: str = "") -> None:
         self._name = name
         self._robots: dict[str, Robot] = {}
 
     def team(self, given: Given) -> Team:
-        """Return the team, in its order. Raises `GivenProblemError`."""
+        """Return the team after the next event. Raises `GivenProblemError`."""
         if given.why:
             raise GivenProblemError(f"the robots' problems could not be written: {given.why}")
         for name, content in given.robots.items():
@@ -122,7 +122,7 @@ def run_parameters_of(given: Given) -> RunParameters:
 
 
 def cost_in_user_units(given: Given | None, cost: float) -> Cost | float:
-    """Return `cost`, as protocols count it, in the user's numbers, as far as `given` says how."""
+    """Convert the cost of a protocol to the user's units, if `given` contains them."""
     if given is None or given.told_in is UNSET:
         return cost
     units = CostUnits(*given.told_in)
@@ -135,38 +135,38 @@ def invalidated_of(given: Given) -> Invalidated:
 
 
 def _as_given(robot: Robot, shown: tuple[str, ...], empty: Collection[str]) -> Robot:
-    """Return `robot` with what its file cannot say."""
+    """Return `robot` with the properties that its file cannot express."""
     if not (shown or any(variable.name in empty for variable in robot.variables)):
         return robot
     return replace(robot, shown=shown, variables=_with_domain(robot, empty, ()))
 
 
 def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]) -> tuple[Variable, ...]:
-    """Return the variables of `robot`, those in `names` with the domain `ranges`."""
+    """Return the variables of `robot`. Those in `names` have the domain `ranges`."""
     return tuple(
         replace(variable, domain=replace(variable.domain, ranges=ranges)) if variable.name in names else variable
         for variable in robot.variables
     )
 
 
-# What a file can say
+# Conversion to a file
 
 
 def _writable(robot: Robot) -> Robot:
-    """Return `robot` as a file can say it: no domain is empty. Raises `ValueError`."""
+    """Return `robot` without empty domains, as files require. Raises `ValueError` if no file can express it."""
     for name in (robot.name, *(variable.name for variable in robot.variables)):
         if not is_name(name):
             raise ValueError(f"{name!r} cannot be a name in a file")
     empty = [variable.name for variable in robot.variables if not variable.domain]
     if empty:
-        robot = replace(robot, variables=_with_domain(robot, empty, _STAND_IN))
+        robot = replace(robot, variables=_with_domain(robot, empty, _PLACEHOLDER))
     for constraint in robot.constraints():
         _check_costs(constraint)
     return robot
 
 
 def _check_costs(constraint: Constraint) -> None:
-    """Raise `ValueError` for a cost that comes back from a file as another number: 5.0 as 5, which is sent shorter."""
+    """Raise `ValueError` for a cost that a file does not preserve: 5.0 is read as 5, which is shorter in messages."""
     definition = constraint.definition
     costs = (*definition.costs, definition.default_cost) if isinstance(definition, Relation) else (constraint.cost,)
     for cost in costs:
@@ -178,9 +178,9 @@ def _check_costs(constraint: Constraint) -> None:
 
 
 def _check(team: Team) -> None:
-    """Raise `GivenProblemError` where files that are right by themselves do not go together."""
+    """Raise `GivenProblemError` if the files, each valid by itself, are inconsistent."""
     if len(team.order) != len(set(team.order)):
-        raise GivenProblemError("a robot stands twice in the order")
+        raise GivenProblemError("a robot occurs twice in the order")
     if len(team.owner) != sum(len(robot.variables) for robot in team.robots):
         raise GivenProblemError("a variable belongs to two robots")
     for robot in team.robots:
@@ -188,4 +188,4 @@ def _check(team: Team) -> None:
         names += [name for constraint in robot.constraints() for name in constraint.variables]
         unknown = [name for name in names if name not in team and name not in team.owner]
         if unknown:
-            raise GivenProblemError(f"{robot.name} was given something on {unknown[0]}, which is not in the team")
+            raise GivenProblemError(f"the problem of {robot.name} contains {unknown[0]}, which is not in the team")

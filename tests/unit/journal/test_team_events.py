@@ -133,7 +133,7 @@ def test_one_that_can_be_written_after_it_is_told_whole() -> None:
     [
         ({"order": ("Robot1.1", "Robot9.9")}, "the problem of Robot9.9 is missing"),
         ({"order": ("Robot1.1", "Robot1.1")}, "twice in the order"),
-        ({"order": ("Robot1.1",)}, "Robot1.1 was given something on Robot"),
+        ({"order": ("Robot1.1",)}, "the problem of Robot1.1 contains Robot"),
         ({"robots": {"Robot1.1": "<instance/>"}}, "the problem of Robot1.1 cannot be read: Robot1.1.xml"),
         ({"robots": {"../Robot1.1": "<instance/>"}}, "cannot be a robot's name"),
         ({"robots": {"Robot1.1": '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'}}, "a DOCTYPE is not accepted"),
