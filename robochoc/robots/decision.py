@@ -12,8 +12,8 @@ import msgspec
 
 from robochoc.communication.search_result import Progress
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard
-from robochoc.journal.team_events import TeamReader
 from robochoc.journal.recorder import interfaces_given
+from robochoc.journal.team_events import TeamReader
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import INFINITE, Team
 from robochoc.robots.sink import Fields

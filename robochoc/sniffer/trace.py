@@ -33,8 +33,8 @@ from robochoc.journal.events import (
     Sent,
     Settled,
 )
-from robochoc.journal.team_events import cost_in_user_units
 from robochoc.journal.journal import Header, Journal
+from robochoc.journal.team_events import cost_in_user_units
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.columns import NOT_YET, Contents, floats, longs, shorts

@@ -13,10 +13,10 @@ import pytest
 import robochoc
 from robochoc.journal.as_rows import COLUMNS
 from robochoc.journal.events import Given, Heard, Improved
-from robochoc.journal.team_events import cost_in_user_units
 from robochoc.journal.journal import Header, JournalError, read_journal
 from robochoc.journal.reader import lines_of
 from robochoc.journal.recorder import JournalRecorder
+from robochoc.journal.team_events import cost_in_user_units
 from robochoc.model.assembly import assemble
 from robochoc.model.costs import normalized
 from robochoc.model.expression import Type, parse

@@ -14,7 +14,7 @@ import pytest
 
 from robochoc.system.compiled_core import PurePython, attributes_of, docstring, is_compiled, kind_of_core
 
-CORE = ("protocols.protocol", "protocols.satisfaction.abt", "solver.compiled", "communication.host")
+CORE = ("protocols.protocol", "protocols.satisfaction.abt", "solver.local_problem", "communication.host")
 
 
 class Slotted:

@@ -36,7 +36,7 @@ ARGUMENTS: dict[str, object] = {
     "Mapping[str, str]": {"a": "process ended", "b": "no answer"},
     "Iterable[Diagnostic]": [Diagnostic("a.xml", 3, "wrong", "do this"), Diagnostic("a.xml", 1, "odd", "")],
     "SourceLine | None": SourceLine("a.py", 7),
-    "Codes | None": (1, 0),
+    "tuple[int, ...] | None": (1, 0),
     "etree._Element": etree.fromstring("<a><b c='1'>text</b></a>"),
     "Reason": next(iter(Reason)),
     "Trouble": Trouble(About.RULE, "1", "trouble.no-robots"),
