@@ -1,11 +1,11 @@
-"""A team goes in, an outcome comes out: everything that solves goes through here.
+"""Runs: `solve` returns the outcome of a team. Every part of the program that solves a problem calls it.
 
-`solve` and its `Options` are imported when they are asked for, so that the command line starts quickly.
+`solve` and its `Options` are imported on first use, so that the command line starts quickly.
 """
 
 from __future__ import annotations
 
-TYPE_CHECKING = False  # that of `typing` would be imported for nothing else
+TYPE_CHECKING = False  # without an import of `typing`
 if TYPE_CHECKING:
     from robochoc.run.defaults import CENTRAL
     from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal

@@ -29,15 +29,14 @@ def alternatives(
 ) -> str:
     """Return the alternatives to the protocol of `options`, as the end of a sentence that rejects it.
 
-    Every protocol is asked as if it had been chosen, but for those that take small problems only. The three that suit
-    best are named.
+    The three most suitable ones are named. Protocols for small problems only are left out.
 
     Args:
-        team: the team with its scenario.
-        options: the options that were refused.
-        complete: whether the protocol must be complete.
-        costs: whether it must minimise costs.
-        narrow: whether its tables must not be as wide as DPOP's, which were refused for memory.
+        team: The team with its scenario.
+        options: The refused options.
+        complete: Whether the protocol must be complete.
+        costs: Whether it must minimise costs.
+        narrow: Whether its tables must be narrower than DPOP's, which were refused for their memory.
     """
     names = [
         offer.name
@@ -63,8 +62,8 @@ def alternatives(
 def _suited(names: Sequence[str], team: Team, options: Options) -> list[str]:
     """Return `names`, the most suitable first.
 
-    That is the protocol which would be chosen for the team; then those of the same room as the one that was refused,
-    those that are chosen for some teams, and complete ones.
+    First comes the protocol that `auto` would choose; then those of the same family as the refused one, those that
+    `auto` chooses for some teams, and complete ones.
     """
     try:
         facts = Facts(normalized(team), loss=options.message_loss)
@@ -72,24 +71,24 @@ def _suited(names: Sequence[str], team: Team, options: Options) -> list[str]:
         chosen = []
     else:
         chosen = [rule.protocol for rule in RULES if rule.protocol in names and not rule.unmet(facts)]
-    rooms = {one.name: _room(one) for one in installed_protocols()}
+    families = {one.name: _family(one) for one in installed_protocols()}
     complete = {one.name for one in installed_protocols() if one.protocol and one.protocol.traits.complete}
     usual = {rule.protocol for rule in RULES}
 
     def rank(name: str) -> tuple[bool, bool, bool, bool, str]:
-        is_kin = rooms[name] == rooms.get(options.protocol)
+        is_kin = families[name] == families.get(options.protocol)
         return name not in chosen[:1], not is_kin, name not in usual, name not in complete, name
 
     return sorted(names, key=rank)
 
 
-def _room(one: InstalledProtocol) -> str:
-    """Return the package in which a protocol stands with others of its kind."""
+def _family(one: InstalledProtocol) -> str:
+    """Return the package of a protocol's family."""
     return one.protocol.__module__.rpartition(".")[0] if one.protocol else ""
 
 
 def fits(team: Team, options: Options, traits: Traits) -> bool:
-    """Return whether a protocol with these traits would take the team, in the search as well."""
+    """Return whether a protocol with these traits accepts the team, before and during the search."""
     try:
         refuse_team(team, options, traits)
     except UnsupportedError:
@@ -98,14 +97,14 @@ def fits(team: Team, options: Options, traits: Traits) -> bool:
 
 
 def refuse_team(team: Team, options: Options, traits: Traits) -> None:
-    """Raise `UnsupportedError` if a protocol with these traits would not take the team, also for refusals later on."""
+    """Raise `UnsupportedError` if a protocol with these traits would refuse the team, before or during the search."""
     refuse_unfit(team, options, traits)
     if traits.tables:
         check_exact(max_total(team, options))
 
 
 def _central_solver_fits(team: Team, options: Options) -> bool:
-    """Return whether the central solver would take the team, for sure."""
+    """Return whether the central solver certainly accepts the team."""
     if options.runtime != Runtime.PROCESSES:
         return False
     central = replace(options, protocol=CENTRAL)

@@ -1,8 +1,8 @@
-"""The choice of protocol and order for a team, where none was asked for (`--protocol auto`). No other module chooses.
+"""The choice of protocol and order for a team, if the user names none (`--protocol auto`). No other module chooses.
 
-`RULES` (`run/choice_rules.py`) are asked from the first to the last. The first one that holds, and whose protocol
-accepts the team and the options (`run/compatibility`), decides. Where none does, any installed protocol that accepts
-them is taken, complete ones first.
+`RULES` (`run/choice_rules.py`) are tried from the first to the last. The first rule that holds, and whose protocol
+accepts the team and the options (`run/compatibility`), decides. If there is none, any installed protocol that accepts
+them is chosen, complete ones first.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.system.plain_text import counted
 
-SOMEBODY = "it accepts the team with these options, and what suits the team better does not"
-NOBODY = "no protocol accepts the team with these options"
+ACCEPTS = "it accepts the team with these options, unlike the protocols that suit the team better"
+NONE_ACCEPTS = "no protocol accepts the team with these options"
 
 FAILURES = (
     CompileError, CompileTimeoutError, TooManySolutionsError, SolverLostError, SolverMissingError,
     TeamCompileTimeoutError, UnsupportedError,
 )  # fmt: skip
-"""Errors that compiling domains may raise. The run reports them."""
+"""Errors of compiling domains. The choice ignores them, since the run reports them."""
 
 
 @dataclass(frozen=True)
@@ -42,9 +42,9 @@ class ProtocolChoice:
     """The choice for a team, with the reasons.
 
     Attributes:
-        options: How to run: with the name of a protocol, and an order where one was chosen.
-        facts: What is known of the team, in words. Empty where the protocol was asked for.
-        rejected: Other protocols, and why each was not taken.
+        options: How to run, with the name of a protocol, and an order if one was chosen.
+        facts: The facts about the team, in words. Empty if the user named the protocol.
+        rejected: The rejected protocols, each with the reason.
     """
 
     options: Options
@@ -53,13 +53,13 @@ class ProtocolChoice:
 
 
 def choose(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> ProtocolChoice:
-    """Return how to run: `options`, with a protocol and an order where they leave these open.
+    """Return `options` with a protocol and an order, chosen where they leave these open.
 
     Args:
-        team: The team with its scenario; it is valid.
+        team: The valid team with its scenario.
         options: How to run.
-        environment: Whether something outside changes the problem.
-        ordered: Whether somebody has given the team its order. Otherwise one is chosen for any protocol.
+        environment: Whether an environment changes the problem.
+        ordered: Whether the user chose the order of the team. Otherwise one is chosen for any protocol.
     """
     if options.protocol == AUTO:
         choice = _decided(team, options, environment=environment)
@@ -67,14 +67,14 @@ def choose(team: Team, options: Options, *, environment: bool = False, ordered: 
         choice = ProtocolChoice(options)
     else:
         facts = Facts(team, environment)
-        choice = ProtocolChoice(_with_order(options, facts, Order.MAX_DEGREE, "nobody has given the robots an order"))
+        choice = ProtocolChoice(_with_order(options, facts, Order.MAX_DEGREE, "the imported file orders no robots"))
     if choice.options.order == Order.GIVEN:
         choice = replace(choice, options=replace(choice.options, order=None))
     return choice
 
 
 def choose_without_analysis(team: Team, options: Options) -> ProtocolChoice:
-    """Return the choice when there is no time to analyse a team: the default protocol and the given order."""
+    """Return the choice if there is no time to analyse the team: the default protocol and the given order."""
     order = None if options.order == Order.GIVEN else options.order
     if options.protocol != AUTO:
         return ProtocolChoice(replace(options, order=order))
@@ -84,7 +84,7 @@ def choose_without_analysis(team: Team, options: Options) -> ProtocolChoice:
 
 
 def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoice:
-    """Return the choice where protocol and order are open."""
+    """Return the choice if the protocol is open."""
     try:
         team = normalized(team)
     except UnboundedCostError:  # the run refuses it
@@ -96,40 +96,45 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
         if not against:
             rejected.pop(rule.protocol, None)
             return _choice(facts, options, (rule.protocol, rule.why), rejected)
-        if against != LOSSY.otherwise:  # if no message is lost, nothing is worth reporting
+        if against != LOSSY.otherwise:  # without losses the rule is not worth reporting
             rejected.setdefault(rule.protocol, []).append(against)
-    for name in _others(bearing_loss=facts.loss > 0):
+    for name in _others(tolerating_loss=facts.loss > 0):
         if accepts(name, team, options):
             rejected.pop(name, None)
-            return _choice(facts, options, (name, SOMEBODY), rejected)
-    usual = DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL  # its refusal names who accepts the team
-    return _choice(facts, options, (usual, NOBODY), {})
+            return _choice(facts, options, (name, ACCEPTS), rejected)
+    usual = (
+        DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL
+    )  # its refusal names the protocols that accept the team
+    return _choice(facts, options, (usual, NONE_ACCEPTS), {})
 
 
 def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
-    """Return how to run a team whose constraints are known to its robots alone, who refuse what does not suit them."""
+    """Return the choice for a team whose robots do not disclose their constraints: each robot checks its own."""
     if options.protocol != AUTO:
         return ProtocolChoice(options)
     if options.message_loss:
-        name, why = _bearing_loss(options.message_loss, costs=Facts(team).has_costs)
+        name, why = _loss_tolerant(options.message_loss, costs=Facts(team).has_costs)
     elif Facts(team).has_costs:
-        name, why = DEFAULT_COST_PROTOCOL, "there are costs; the robots keep their constraints, so no more is known"
+        name, why = (
+            DEFAULT_COST_PROTOCOL,
+            "there are costs; the robots do not disclose their constraints",
+        )
     else:
-        name, why = DEFAULT_PROTOCOL, "it takes all kinds of constraints, and the robots keep theirs"
+        name, why = DEFAULT_PROTOCOL, "it supports all kinds of constraints, and the robots do not disclose theirs"
     return ProtocolChoice(replace(options, protocol=name, chosen={"protocol": why}))
 
 
-def _bearing_loss(loss: float, *, costs: bool) -> tuple[str, str]:
-    """Return a protocol that bears lost messages, for robots that keep their constraints, and why it is taken."""
+def _loss_tolerant(loss: float, *, costs: bool) -> tuple[str, str]:
+    """Return a protocol that tolerates lost messages, for undisclosed constraints, and the reason."""
     without_costs = "gdba" if loss <= FEW_LOSSES else "dsa"
     name = "regret-matching" if costs else without_costs
-    return name, "messages may be lost, and it bears that; the robots keep their constraints, so no more is known"
+    return name, "messages may be lost, which it tolerates; the robots do not disclose their constraints"
 
 
-def _others(*, bearing_loss: bool) -> list[str]:
-    """Return the installed protocols, complete ones first; before these, on request, those that bear loss."""
+def _others(*, tolerating_loss: bool) -> list[str]:
+    """Return the installed protocols, complete ones first; before these, on request, those that tolerate loss."""
     found = [
-        (bearing_loss and not one.protocol.traits.bears_loss, not one.protocol.traits.complete, one.name)
+        (tolerating_loss and not one.protocol.traits.bears_loss, not one.protocol.traits.complete, one.name)
         for one in installed_protocols()
         if one.protocol
     ]
@@ -166,21 +171,21 @@ def _choice(
 ORDERS = MappingProxyType(
     {"sfb": Order.MIN_WIDTH, "afb": Order.MIN_WIDTH, "abt": Order.MAX_DEGREE, "afc-ng": Order.MAX_DEGREE}
 )
-"""The orders that suit the protocols. Others build trees, or have no use for one."""
+"""The orders that suit the protocols. Other protocols build trees, or use no order."""
 
 ORDERS_TEXT = (
     "order, if none is asked for: max-degree for abt, afc-ng and afb; min-width for sfb, with costs max-degree, with",
     "--withdraw dom-deg. The files' order stays for the others, and where constraints are partially known, the problem",
     "changes, or --withdraw maximal asks who is placed first",
 )
-"""What `_with_suitable_order` and `_with_order` do, in lines for people."""
+"""The rules of `_with_suitable_order` and `_with_order`, in lines for the user."""
 
 STATIC = frozenset({"sbt", "abt", "afc", "afc-ng", "afc-tree", "disfc", "syncbb", "afb", "sfb"})
-"""Protocols whose robots keep the order all the time, so that a poor one costs much."""
+"""Protocols with a static order, so that a poor order is expensive."""
 
 
 def faster_order(team: Team, options: Options) -> Order | None:
-    """Return an order in which `options` are usually faster than in the files' one. None: they name one, or none is.
+    """Return an order that is usually faster than that of the files. None: `options` name one, or there is none.
 
     Args:
         team: The team with its scenario.
@@ -193,7 +198,7 @@ def faster_order(team: Team, options: Options) -> Order | None:
 
 
 def _with_suitable_order(options: Options, facts: Facts) -> Options:
-    """Return `options` with the order that suits the protocol, if it has one."""
+    """Return `options` with the order that suits the protocol, if there is one."""
     order = ORDERS.get(options.protocol)
     if options.protocol == DEFAULT_COST_PROTOCOL and options.withdraw == Withdrawal.MINIMUM:
         order = Order.DOM_DEG  # a withdrawal is found soon
@@ -207,15 +212,15 @@ def _with_suitable_order(options: Options, facts: Facts) -> Options:
 def _with_order(options: Options, facts: Facts, order: Order, why: str) -> Options:
     """Return `options` with `order`, unless that of the team must be kept."""
     if options.withdraw == Withdrawal.MAXIMAL or facts.changes or facts.partially_known:
-        return options  # it says who is placed first; changes speak of it; PKC links are not turned
+        return options  # priorities decide withdrawals, changes depend on the order, and PKC links cannot be reversed
     return replace(options, order=order, chosen={**options.chosen, "order": why})
 
 
-# What is known
+# Facts
 
 
 def _compiled_sizes(team: Team, options: Options) -> Sizes | None:
-    """Return the sizes of the robots' compiled domains; None where these are not found."""
+    """Return the sizes of the robots' compiled domains; None if they cannot be compiled."""
     context = RunContext(options)
     try:
         compiled = context.team_compiler().compile(team, every=True)
@@ -225,7 +230,7 @@ def _compiled_sizes(team: Team, options: Options) -> Sizes | None:
 
 
 def _in_words(facts: Facts) -> Iterator[str]:
-    """Yield what is known of the team."""
+    """Yield the facts about the team, in words."""
     mean = 2 * facts.links / max(facts.robots, 1)
     pairs = f"{counted(facts.links, 'pair')} of neighbours ({mean:.3g} each in the mean)"
     yield f"{counted(facts.robots, 'robot')}, {pairs}"

@@ -1,6 +1,6 @@
-"""The rules by which a protocol is chosen for a team (`run/choice.py`), and the sizes that they speak of.
+"""The rules by which a protocol is chosen for a team (`run/choice.py`), and their thresholds.
 
-`RULES` are asked from the first to the last. The figures behind them: docs/guides/which-protocol.md.
+`RULES` are tried from the first to the last. The measurements behind them: docs/guides/which-protocol.md.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LONG_ROW = 65_536
 """The values of all robots together up to which many partial assignments of SFB go into a message."""
 
 FEW_LOSSES = 0.1
-"""The share of lost messages up to which `gdba` finds more solutions than `dsa`: who misses a gain does not move."""
+"""The share of lost messages up to which `gdba` finds more solutions than `dsa`, whose robots move without a gain."""
 
 
 class Condition(NamedTuple):
@@ -45,7 +45,7 @@ class Condition(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """A protocol for teams of one sort: what is asked of them, and why it is taken."""
+    """A rule of `auto`: a protocol, the conditions on the team, and the reason."""
 
     protocol: str
     conditions: tuple[Condition, ...]
@@ -100,17 +100,17 @@ RULES = (
             FORBIDS_NOTHING,
             Condition(lambda f: f.largest_table <= MAX_TUPLES, "domains that are not large", "domains are large"),
         ),
-        "messages may be lost: it goes on with the last ones that it has, and ends at lower costs than others that do",
+        "messages may be lost: it continues with the latest ones received, and ends at lower costs than others that do",
     ),
     Rule(
         "regret-matching",
         (LOSSY, COSTS),
-        "messages may be lost, and it needs none in particular; where hard constraints have to hold, it finds most",
+        "messages may be lost, and it depends on no single one; with hard constraints it finds the most solutions",
     ),
     Rule(
         "acls",
         (LOSSY, PARTIAL),
-        "messages may be lost, and constraints are partially known: of those that bear both, it ends lowest",
+        "messages may be lost, and constraints are partially known: it supports both, and ends at the lowest costs",
     ),
     Rule(
         "gdba",
@@ -122,14 +122,16 @@ RULES = (
                 f"more than {FEW_LOSSES:.0%} of the messages are lost",
             ),
         ),
-        "messages may be lost, and it goes on without them; of those that do, it finds most solutions",
+        "messages may be lost, and it continues without them; of the protocols that do, it finds the most solutions",
     ),
     Rule(
         "dsa",
         (LOSSY,),
-        "many messages may be lost: its robots move on the last values that they know",
+        "many messages may be lost: its robots decide by the latest values received",
     ),
-    Rule("dba", (LOSSY, NO_COSTS), "messages may be lost, and others that bear it do not accept the options"),
+    Rule(
+        "dba", (LOSSY, NO_COSTS), "messages may be lost, and other protocols that tolerate it do not accept the options"
+    ),
     Rule(
         "disfc",
         (
@@ -142,7 +144,7 @@ RULES = (
         ),
         "constraints are partially known: it supports them, and sends no value",
     ),
-    Rule("abt", (PARTIAL,), "constraints are partially known, and it takes them"),
+    Rule("abt", (PARTIAL,), "constraints are partially known, and it supports them"),
     Rule(
         "acls",
         (
@@ -166,7 +168,7 @@ RULES = (
         (
             CHANGES,
             NO_COSTS,
-            Condition(lambda f: not f.environment, "changes that files name", "something outside changes the problem"),
+            Condition(lambda f: not f.environment, "changes that files name", "an environment changes the problem"),
             Condition(
                 lambda f: f.robots <= FEW_TO_BEGIN_ANEW,
                 f"at most {FEW_TO_BEGIN_ANEW} robots",

@@ -16,7 +16,7 @@ from robochoc.solver.encoding import MAX_TUPLES, allows_function, is_soft
 
 _TWO = 2
 LARGE = 1_000_000
-"""A table on a pseudo-tree with more entries is looked at no further."""
+"""The analysis of a pseudo-tree ends at a table with more entries."""
 DRAWS = 100
 """The number of sampled combinations of values that estimates a constraint's tightness."""
 Sizes = Mapping[str, int]
@@ -29,10 +29,10 @@ class Facts:
 
     Attributes:
         team: The team with its scenario.
-        environment: Whether something outside changes the problem.
-        compiled_sizes: Returns the sizes of the robots' compiled domains; None if only those declared are known. It is
-            asked where these are large.
-        loss: The probability that a message is lost on its way.
+        environment: Whether an environment changes the problem.
+        compiled_sizes: Returns the sizes of the robots' compiled domains; None if only the declared sizes are known.
+            It is called if these are large.
+        loss: The probability that a message is lost.
     """
 
     team: Team
@@ -87,7 +87,7 @@ class Facts:
 
     @cached_property
     def sizes(self) -> Sizes:
-        """The number of values of each robot: as declared, or where that is much, as compiled."""
+        """The number of values of each robot: as declared, or as compiled if the declared number is large."""
         if self._largest_table(self.declared_sizes) <= MAX_TUPLES:
             return self.declared_sizes
         return self.compiled_sizes() or self.declared_sizes
@@ -114,11 +114,11 @@ class Facts:
 
     @cached_property
     def constrainedness(self) -> float:
-        """How much of all combinations of values the constraints forbid: around 1 problems are hardest.
+        """The constrainedness: problems around 1 are hardest.
 
-        It is kappa of Gent, MacIntyre, Prosser, Walsh ("The constrainedness of search", AAAI 1996): the bits that the
-        constraints take away, of those that the domains have. Where a constraint has more than `DRAWS` combinations of
-        values, as many are drawn.
+        It is kappa of Gent, MacIntyre, Prosser, Walsh ("The constrainedness of search", AAAI 1996): the bits
+        that the constraints remove, divided by the bits of the domains. For a constraint with more than `DRAWS`
+        combinations of values, as many are sampled.
         """
         domains = {one.name: one.domain for robot in self.first.robots for one in robot.variables}
         bits = sum(math.log2(max(1, len(domain))) for domain in domains.values())
@@ -139,16 +139,16 @@ class Facts:
 
 
 def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> float:
-    """Return the share of combinations of values that `constraint` allows; of none, less than can be drawn."""
+    """Return the share of combinations of values that `constraint` allows; if none is found, half of one sample."""
     columns = [list(domains[name]) for name in constraint.variables]
     many = math.prod(map(len, columns))
     if not many:
         return 1.0
     whole = many <= DRAWS
-    looked_at = product(*columns) if whole else (tuple(map(chance.choice, columns)) for _ in range(DRAWS))
+    sampled = product(*columns) if whole else (tuple(map(chance.choice, columns)) for _ in range(DRAWS))
     allowed = allows_function(constraint, constraint.variables)
     number = many if whole else DRAWS
-    return max(sum(map(allowed, looked_at)), 1 / 2) / number
+    return max(sum(map(allowed, sampled)), 1 / 2) / number
 
 
 def _forbids(constraint: Constraint) -> bool:
@@ -168,13 +168,13 @@ class TreeTables:
 
 
 def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: float = math.inf) -> TreeTables:
-    """Return the tables of DPOP on the tree that `protocols/shared/dfs.py` builds, which needs no robot for that.
+    """Return the tables of DPOP on the tree that `protocols/shared/dfs.py` would build.
 
     Args:
         graph: The neighbours of each robot.
         order: The priority order, which settles ties.
         sizes: The number of values of each robot.
-        enough: Where a table has more entries, the rest is not looked at.
+        enough: The analysis ends at a table with more entries.
     """
     rank = {name: place for place, name in enumerate(order)}
 

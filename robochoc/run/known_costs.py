@@ -1,4 +1,4 @@
-"""The known limits of the minimum cost during a run, from its events: the best cost so far, and a bound."""
+"""The best cost and the lower bound known so far, from the events of a run."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from robochoc.verification.objective import Objective
 class KnownCosts:
     """Follows the events of runs. Costs are in the user's numbers.
 
-    `Began` opens a run, of which nothing is known yet. Those that do not minimise are passed over.
+    `Began` starts a run, without a known cost. Runs that do not minimise are ignored.
 
-    Each robot's bound is for a part of the team that no other robot's bound is for, and costs are 0 or more inside: so
-    the sum of those that are known is a bound for the whole team at any time.
+    The bounds of two robots are for disjoint parts of the team, and the costs inside are 0 or more: so the sum of the
+    known bounds is a bound for the whole team at any time.
 
     Attributes:
-        best: The cost of the cheapest assignment that all robots together had, or one of them knows of. None: there
-            was none.
-        bound: No assignment costs less (where costs are maximised: none is worth more). None: not known.
+        best: The cost of the cheapest assignment that the robots had together, or that a robot has received. None:
+            there was none.
+        bound: A lower bound of the cost (an upper bound if it is maximised). None: not known.
     """
 
     def __init__(self, objective: Objective) -> None:
@@ -31,8 +31,8 @@ class KnownCosts:
         self.best: Cost | None = None
         self.bound: Cost | None = None
 
-    def take(self, event: AnyEvent) -> None:
-        """Take in an event. What cannot be is passed over: journals may come from anywhere."""
+    def add(self, event: AnyEvent) -> None:
+        """Add an event. Impossible events are ignored, since a journal may come from any source."""
         match event:
             case Began():
                 self._begin(event)

@@ -1,4 +1,4 @@
-"""Convert the values of options from texts, numbers of other libraries and lists; refuse other values."""
+"""Converters of the values of options, from texts, numbers of other libraries, and lists. They refuse other values."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.system.suggestions import member
 Converter = Callable[[str, object], object]
 """A function of the name of an option and a value; it returns the value in the type of the option.
 
-It raises `OptionTypeError` for a value of a wrong type, and `OptionError` for one that is not allowed.
+It raises `OptionTypeError` for a value of a wrong type, and `OptionError` for a value that is not allowed.
 """
 
 
@@ -58,7 +58,7 @@ def protocol_name(name: str, value: object) -> str:
         raise OptionTypeError(_refusal(name, value, "the name of an installed protocol, such as 'abt'"))
     if value == AUTO:
         return value
-    from robochoc.run.registry import installed_spelling  # noqa: PLC0415 - start-up; and the registry imports options
+    from robochoc.run.registry import installed_spelling  # noqa: PLC0415 - start-up: few options name a protocol
 
     return installed_spelling(value)
 
@@ -96,7 +96,7 @@ def seconds(name: str, value: object) -> float:
 
 def flag(name: str, value: object) -> bool:
     """Convert a Boolean of any type."""
-    if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's is no Python integer
+    if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's is not a bool
         raise OptionTypeError(_refusal(name, value, "True or False"))
     return bool(value)
 

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 class Runtime(StrEnum):
-    """The runtime: a process for each robot, here or on a network; all robots in one thread; or all in arrays."""
+    """The runtime: one process per robot, here or on a network; all robots in one thread; or all in arrays."""
 
     PROCESSES = "processes"
     SIMULATOR = "simulator"
@@ -44,7 +44,7 @@ class Runtime(StrEnum):
 
 
 class ScheduleName(StrEnum):
-    """The order in which the simulator handles events: by time counted in checks, in cycles, or from any channel next.
+    """The order in which the simulator handles events: by time counted in checks, in cycles, or from a random channel.
 
     In `CONCURRENT` a robot reads its whole inbox before it settles, in `ONE_BY_ONE` it settles after each message.
     """
@@ -58,7 +58,7 @@ class ScheduleName(StrEnum):
 class Withdrawal(StrEnum):
     """The rule that chooses the robots to withdraw when the whole team has no solution.
 
-    A minimum withdrawal: as few as possible, by their weights, and proven; or those that find no place, in priority
+    `MINIMUM`: robots of the least total weight, proven. `MAXIMAL`: the robots without a possible value, in priority
     order.
     """
 
@@ -67,7 +67,7 @@ class Withdrawal(StrEnum):
 
     @classmethod
     def _missing_(cls, value: object) -> Self | None:
-        """Return the member that an earlier version spelt `value`."""
+        """Return the member for the spelling of an earlier version."""
         return cls("minimum") if value == "fewest" else None
 
 
@@ -78,7 +78,7 @@ class Preprocess(StrEnum):
 
 
 class OnLoss(StrEnum):
-    """The consequence of the loss of a robot: the run fails, or the robot leaves and the others go on."""
+    """The consequence of the loss of a robot: the run fails, or the others continue without it."""
 
     FAIL = "fail"
     WITHDRAW = "withdraw"
@@ -103,39 +103,37 @@ class Options:
         ValueError: if a value is not allowed.
 
     Attributes:
-        protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`; or `AUTO`, for one that
-            suits it (`run/choice.py`).
-        runtime: Where the robots live.
-        seed: The seed of the simulator, of `Order.RANDOM`, and of protocols that draw lots.
+        protocol: The name of the protocol, `CENTRAL`, or `AUTO`: chosen for the team (`run/choice.py`).
+        runtime: The runtime of the robots.
+        seed: The seed of the simulator, of `Order.RANDOM`, and of protocols with random decisions.
         timeout: A limit on wall-clock time, in seconds (None: no limit).
-        deadline: The same, when the best assignment that is known counts as an answer (None: there is none).
-        improve: For how many seconds after the deadline the robots search on for what is better (None: not at all).
-        withdraw: Which robots withdraw when the team has no solution (None: none).
-        schedule: How the simulator orders events.
+        deadline: The same; the best assignment known at the deadline is the answer (None: no deadline).
+        improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
+        withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
+        schedule: The order of events in the simulator.
         delay: The longest delay of a message in the simulator, in constraint checks.
         local: Limits on the compilation of each robot's domain.
-        cache: Whether solutions of local problems are kept in the user's cache folder.
-        count: Whether the central solver counts all solutions.
-        central_with: The solver of the merged problem, without robots.
-        verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found; where
-            OR-Tools is installed, it is asked as well.
-        order: The total priority order of the robots, by name or as their names (None: that of the files).
+        cache: Whether solutions of local problems are stored in the user's cache folder.
+        count: Whether solutions, or optima, are counted.
+        central_with: The central solver of `CENTRAL`.
+        verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found; so does
+            OR-Tools if it is installed.
+        order: The total priority order of the robots: its name, or their names (None: the order of the files).
         messages: A limit on the number of messages (None: no limit).
         ncccs: A limit on non-concurrent constraint checks, in the simulator (None: no limit).
         cycles: A limit on cycles, with `ScheduleName.CYCLES` (None: no limit).
-        on_loss: What the loss of a robot means (None: the run fails, unless there are `spares`).
-        spares: How many robots that are lost come back.
-        patience: A robot whose process is stopped (on a network: that is out of reach) for so many seconds is lost
-            (None: it is waited for; on a network 10 seconds).
+        on_loss: The consequence of the loss of a robot (None: the run fails, unless there are `spares`).
+        spares: The number of lost robots that are restarted.
+        patience: The seconds after which a stopped process (on a network: an unreachable robot) is lost (None: no
+            limit; on a network 10 seconds).
         channel: A channel model: the simulator counts seconds of computing and radio.
-        message_loss: The probability that a message is lost, for good (0: as the `channel` says). Ask for `loss`.
+        message_loss: The probability that a message is lost for good (0: that of the `channel`). Read it by `loss`.
         settings: The protocol's settings, as text.
-        kill: Robots whose processes are killed, and when.
-        filters: The names of the channel filters that messages on a network go through, in this order.
-        chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
-        preprocess: What the robots do before the protocol begins (None: nothing).
-        bounds: Whether events tell when a robot comes to know that nothing costs less than so much (processes and
-            simulator).
+        kill: The robots whose processes are killed, with the times.
+        filters: The names of the channel filters for messages on a network, in order of application.
+        chosen: The reasons for a `protocol` or an `order` that the user did not name.
+        preprocess: The preprocessing before the protocol (None: no preprocessing).
+        bounds: Whether events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
     protocol: str = AUTO
@@ -174,20 +172,20 @@ class Options:
 
     @property
     def limit_s(self) -> float | None:
-        """Return the limit on wall-clock time, in seconds, by whichever option; None: there is none."""
+        """Return the limit on wall-clock time, in seconds, from the timeout or the deadline; None: no limit."""
         return self.timeout if self.deadline is None else self.deadline + (self.improve or 0)
 
     @property
     def loss(self) -> float:
-        """Return the probability that a message is lost for good, by the option or by the channel model.
+        """Return the probability that a message is lost for good, by the option or the channel model.
 
-        Where it depends on the link, this is the largest one.
+        If it depends on the link, it is the largest one.
         """
         return self.message_loss or (self.channel.most_loss if self.channel else 0.0)
 
     @property
     def dropped(self) -> float:
-        """Return the probability with which robots drop what they receive: outside the simulator, which loses it."""
+        """Return the probability with which robots drop received messages; 0 in the simulator, which loses them."""
         return 0.0 if self.runtime == Runtime.SIMULATOR else self.message_loss
 
     @property
@@ -197,7 +195,7 @@ class Options:
 
     @property
     def survives_losses(self) -> bool:
-        """Return whether the run goes on when a robot is lost."""
+        """Return whether the run continues when a robot is lost."""
         return self.on_loss == OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)
 
 

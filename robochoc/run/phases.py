@@ -1,7 +1,7 @@
-"""The phases of a run: the search by the protocol asked for, and the one that decides which robots withdraw.
+"""The phases of a run: the search by the chosen protocol, and the search that decides which robots withdraw.
 
 A protocol that minimises costs decides itself which robots withdraw (`Withdrawal.MINIMUM`): the run has one phase.
-Otherwise another protocol takes over once the team is known to have no solution.
+With other protocols there is a second phase by another protocol, once it is known that the team has no solution.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from robochoc.solver.agent_problem import RunParameters
 class RunPhase:
     """One phase of a run.
 
-    `name` is the protocol's name, `parameters` what all robots are given beside the problem. With `withdrawal`, robots
-    may withdraw. `takes_over`: this is not the protocol that was asked for.
+    `name` is the protocol's name, `parameters` are common to all robots. With `withdrawal`, robots may withdraw.
+    `takes_over`: this is the second phase, by another protocol than the chosen one.
     """
 
     name: str
@@ -38,12 +38,12 @@ class RunPhase:
 
 
 def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Callable[[], float]) -> RunPhase:
-    """Return the search by `protocol`, the one that was asked for.
+    """Return the phase of the chosen protocol.
 
     Args:
-        options: how to run.
-        protocol: the class of the protocol that `options` name.
-        withdrawal_cost: returns what the withdrawal of a robot of weight 1 costs.
+        options: How to run.
+        protocol: The class of the protocol that `options` name.
+        withdrawal_cost: Returns the withdrawal cost of a robot of weight 1.
     """
     withdrawal = options.withdraw == Withdrawal.MINIMUM and protocol.traits.costs
     cost = withdrawal_cost() if withdrawal else None
@@ -52,9 +52,9 @@ def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Cal
 
 
 def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> RunPhase:
-    """Return the search that decides which robots withdraw, for a team without a solution.
+    """Return the phase that decides which robots withdraw, for a team without a solution.
 
-    The protocol was not asked for, so it gets no settings. For the arguments see `first_phase`.
+    Its protocol gets no settings, since the user has not chosen it. For the arguments see `first_phase`.
     """
     name = DEFAULT_COST_PROTOCOL if options.withdraw == Withdrawal.MINIMUM else FIRST_FIT
     protocol = protocol_or_stage(name)

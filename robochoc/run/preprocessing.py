@@ -1,10 +1,10 @@
-"""Make domains arc consistent before the protocol that was asked for begins (`--preprocess ac`).
+"""Make domains arc consistent before the chosen protocol begins (`--preprocess ac`).
 
-It is a search of its own, whose findings are the values that are left. The team of the search that follows is the same
-with these values only: so journals and replays of it need nothing else. The answer is checked with the files.
+It is a separate search, whose findings are the remaining values. The following search has the same team with only these
+values, so its journals and replays need nothing else. The answer is checked with the files.
 
-Where the problem changes, it is done anew before each epoch, from the domains of the files. Deletions that rest on what
-is gone come back that way, and to a protocol that goes on they are values that a change has added.
+If the problem changes, it is repeated before each epoch, from the domains of the files. So values come back if the
+reason of their removal is gone; a protocol that continues treats them as values that a change has added.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from robochoc.solver.compiled_team import CompiledTeam
 
 
 def preprocessing_phase(options: Options) -> RunPhase:
-    """Return the search before that of the protocol."""
+    """Return the phase of the preprocessing."""
     return RunPhase(PREPROCESSING, protocol_or_stage(PREPROCESSING), RunParameters(options.seed))
 
 
 def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> int:
-    """Return how many values of the robots are not left."""
+    """Return the number of removed values of all robots."""
     return sum(
         len(robot.domain.values) - len(findings[name].left or ())
         for name, robot in compiled.robots.items()
@@ -40,7 +40,7 @@ def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> 
 
 
 def total_preprocessing(done: Sequence[Preprocessing]) -> Preprocessing | None:
-    """Return the sum of what was done before the epochs of a run; None if that is nothing."""
+    """Return the sum of the preprocessing of all epochs of a run; None if there was none."""
     if not done:
         return None
     spent = reduce(add, [one.metrics for one in done])
@@ -48,10 +48,10 @@ def total_preprocessing(done: Sequence[Preprocessing]) -> Preprocessing | None:
 
 
 def restricted(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Team:
-    """Return the team whose robots show only values that are left.
+    """Return the team with only the remaining values.
 
-    A value of a robot with several variables is a combination of theirs. There each variable keeps what it has in one
-    of the combinations left: that may be more of them, and never fewer.
+    A value of a robot with several variables is a combination of their values. Each variable keeps its values in the
+    remaining combinations; so there may be more combinations than remain, and never fewer.
     """
     robots = []
     for robot in compiled.team.robots:
@@ -64,7 +64,7 @@ def restricted(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Team
 
 
 def _with_values(robot: Robot, kept: Mapping[str, Collection[int]]) -> Robot:
-    """Return `robot` with those of its variables' values that are `kept`."""
+    """Return `robot` with only the values `kept` of its variables."""
     variables = tuple(
         replace(one, domain=_only(one.domain, kept[one.name])) if one.name in kept else one for one in robot.variables
     )
@@ -72,7 +72,7 @@ def _with_values(robot: Robot, kept: Mapping[str, Collection[int]]) -> Robot:
 
 
 def _only(domain: Domain, kept: Collection[int]) -> Domain:
-    """Return `domain` with the values `kept`, in its order."""
+    """Return `domain` with only the values `kept`, in its order."""
     ranges: list[range] = []
     for value in domain:
         if value in kept:

@@ -26,16 +26,16 @@ from robochoc.system.installed import (
 
 GROUP = "robochoc.protocols"
 _STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
-"""Protocols of single stages of a run, which cannot be asked for."""
+"""Protocols of single stages of a run. Users cannot choose them."""
 
 
 class UnknownProtocolError(RobochocError, LookupError):
-    """No installed package offers a protocol of that name, or what it offers cannot be used."""
+    """No installed package offers a protocol of that name, or the protocol cannot be used."""
 
 
 @dataclass(frozen=True)
 class InstalledProtocol:
-    """A protocol that a package offers: the class that `entry` names, or why it cannot be used."""
+    """A protocol that a package offers: the class of `entry`, or the reason why it cannot be used."""
 
     entry: EntryPoint
     protocol: type[Protocol] | None
@@ -64,11 +64,11 @@ def protocol_names() -> tuple[str, ...]:
 
 
 _SPELLINGS = {CENTRAL, AUTO}
-"""A cache of names spelt as in their packages: each look-up of installed protocols takes 0.1 ms."""
+"""A cache of names in the spelling of their packages: each look-up of installed protocols takes 0.1 ms."""
 
 
 def installed_spelling(name: str) -> str:
-    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself where it fits none, or several."""
+    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself if it matches none or several."""
     if name in _SPELLINGS or entry_points_named(GROUP, name):
         _SPELLINGS.add(name)
         return name
@@ -82,7 +82,7 @@ def installed_protocols() -> tuple[InstalledProtocol, ...]:
 
 
 def unknown_protocol(name: str) -> str:
-    """Return that no protocol of that name is installed, and which may have been meant."""
+    """Return the error text that no protocol of that name is installed, with suggestions."""
     return not_installed_message(GROUP, "protocol", name, also=(CENTRAL, AUTO), listed_by="robochoc protocols")
 
 
@@ -95,7 +95,7 @@ def installed_protocol(name: str) -> InstalledProtocol:
 
 
 def protocol_named(name: str) -> type[Protocol]:
-    """Return the class of the protocol called `name`. Raises `UnknownProtocolError`, which lists those there are."""
+    """Return the class of the protocol called `name`. Raises `UnknownProtocolError`, which suggests others."""
     offer = installed_protocol(name)
     if offer.protocol is None:
         raise UnknownProtocolError(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
@@ -147,8 +147,12 @@ def _fault(loaded: object) -> str:
     declared: tuple[object, object] = (loaded.traits, loaded.settings)
     traits, settings = declared
     if not (isinstance(traits, Traits) and isinstance(settings, Settings)):
-        wrong = "settings that are no Settings" if isinstance(traits, Traits) else "traits that are no Traits"
+        wrong = (
+            "settings that are not of the class Settings"
+            if isinstance(traits, Traits)
+            else "traits that are not of the class Traits"
+        )
         return f"declares {wrong}"
     if traits.dynamic is not issubclass(loaded, DynamicProtocol):
-        return "is to be dynamic if it is a DynamicProtocol, and only then"
+        return "must be dynamic if, and only if, it is a DynamicProtocol"
     return ""

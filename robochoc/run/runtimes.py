@@ -1,7 +1,6 @@
 """Runtimes by name: each is a function that opens a session.
 
-It is found by its name and imported when it is asked for. A run needs one runtime, and the network is an extra that the
-core does not depend on.
+Each is imported on first use: a run needs one runtime, and the network is an extra that the core does not depend on.
 """
 
 from __future__ import annotations
@@ -30,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class CommonArguments(TypedDict):
-    """The arguments that the sessions of all runtimes take."""
+    """The arguments of the sessions of all runtimes."""
 
     parameters: RunParameters
     observer: Observer | None
@@ -44,12 +43,12 @@ class SessionRequest:
     Attributes:
         protocol: The protocol by which the robots search.
         team: The team with its compiled domains.
-        parameters: What all robots are given beside the problem.
+        parameters: The parameters common to all robots.
         options: How to run.
-        observer: Gets all events.
-        progress: Gets the number of messages so far, now and then.
+        observer: Receives all events.
+        progress: Receives the number of messages so far, now and then.
         kills: The robots whose processes are to be killed.
-        deadline: When the time of the run is over, on the monotonic clock. None: without a limit.
+        deadline: The end of the time of the run, on the monotonic clock. None: no limit.
     """
 
     protocol: type[Protocol]
@@ -63,7 +62,7 @@ class SessionRequest:
 
     @property
     def common(self) -> CommonArguments:
-        """The arguments that the sessions of all runtimes take."""
+        """The arguments of the sessions of all runtimes."""
         return {"parameters": self.parameters, "observer": self.observer, "progress": self.progress}
 
 
@@ -86,7 +85,7 @@ def open_session(request: SessionRequest) -> Session:
     try:
         opener: OpenSession = resolve_name(OPENERS[name])
     except ModuleNotFoundError as absent:
-        raise UnsupportedError(f"--runtime {name} needs {absent.name}; say: pip install 'robochoc[{name}]'") from None
+        raise UnsupportedError(f"--runtime {name} requires {absent.name}: pip install 'robochoc[{name}]'") from None
     return opener(request)
 
 
@@ -110,7 +109,7 @@ def open_processes(request: SessionRequest) -> Session:
 
 
 def _import_tables(request: SessionRequest) -> None:
-    """Import what computes with tables, if robots will: here once, and not in each of their processes."""
+    """Import the module for tables if robots need it: once here, and not in each of their processes."""
     costs = request.team.team.kind == ProblemKind.DISWCSP or request.parameters.withdrawal_cost is not None
     if costs and request.protocol.traits.tables:
         import_module("robochoc.solver.cost_table")

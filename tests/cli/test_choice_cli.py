@@ -56,7 +56,10 @@ def test_a_file_of_another_tool_gives_no_order(tmp_path: Path) -> None:
     robochoc_within("export", PATROL, "--format", "pydcop", "-o", tmp_path / "patrol.yaml")
     words = ["solve", tmp_path / "patrol.yaml", "--runtime", "simulator", "--protocol", "syncbb", "--json"]
     result = json.loads(robochoc_within(*words).stdout)
-    assert (result["order"], result["chosen"]) == ("max-degree", {"order": "nobody has given the robots an order"})
+    assert (result["order"], result["chosen"]) == (
+        "max-degree",
+        {"order": "the imported file orders no robots"},
+    )
     assert not {"chosen", "order"} & json.loads(robochoc_within(*words, "--order", "given").stdout).keys()
 
 

@@ -169,8 +169,8 @@ def test_what_is_broken_is_shown_with_its_reason() -> None:
             ("zz-leaving", "cannot be imported: SystemExit: 3"),
             ("zz-garbled", "cannot be imported: SyntaxError"),
             ("zz-number", "is not a subclass of Protocol"),
-            ("zz-odd", "traits that are no Traits"),
-            ("zz-static", "is to be dynamic if it is a DynamicProtocol, and only then"),
+            ("zz-odd", "traits that are not of the class Traits"),
+            ("zz-static", "must be dynamic if, and only if, it is a DynamicProtocol"),
         ]:
             with each(name):
                 assert f"{name} " in table.stdout

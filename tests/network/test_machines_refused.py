@@ -164,7 +164,7 @@ def test_a_port_in_use(higher: int, site: Deployment) -> None:
         (["master", "--timeout", "0"], 2, "--timeout requires a number of seconds greater than 0"),
         (["master", "--deadline", "nan"], 2, "--deadline requires a number of seconds greater than 0"),
         (["master", "--deadline", "1", "--timeout", "1"], 2, "--deadline and --timeout both limit the time"),
-        (["master", "--improve", "1"], 2, "--improve goes on after --deadline SECONDS: add it"),
+        (["master", "--improve", "1"], 2, "--improve continues after --deadline SECONDS: add --deadline"),
         (["master", "--deadline", "1", "--improve", "inf"], 2, "inf is not a finite number"),
         (["master", "--deadline", "1", "--private"], 2, "--private hides the values that would be checked; --timeout"),
         (["master", "--robots", "2", "--team", "."], 2, "--robots and --team"),

@@ -171,7 +171,7 @@ def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deploym
         (["{file}", "--no-page"], "--no-page requires --master"),
         (["--master", "127.0.0.1", "--no-page"], "--no-page requires --journal"),
         (["--master", "127.0.0.1", "--team", "{folder}"], "--team requires a JOURNAL"),
-        (["--master", "nowhere:port"], "is no HOST:PORT"),
+        (["--master", "nowhere:port"], "is not of the form HOST:PORT"),
     ],
 )
 def test_what_does_not_go_together(words: list[str], told: str, tmp_path: Path) -> None:

@@ -39,7 +39,7 @@ def _moments(team: Team, events: list[AnyEvent]) -> Iterator[KnownCosts]:
     assert objective is not None
     known = KnownCosts(objective())
     for event in events:
-        known.take(event)
+        known.add(event)
         yield known
 
 

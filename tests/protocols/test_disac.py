@@ -239,12 +239,15 @@ def test_its_journal_is_replayed(protocol: str, team: Team) -> None:
 @looped(
     ("options", "told"),
     [
-        (replace(AC, runtime=Runtime.NETWORK), "--preprocess is of robots in processes or the simulator"),
-        (replace(AC, runtime=Runtime.ARRAYS, protocol="dsa"), "--preprocess is of robots in processes"),
-        (Options(protocol="central", preprocess=Preprocess.AC), "--preprocess is for robots that solve it together"),
+        (replace(AC, runtime=Runtime.NETWORK), "--preprocess is only for robots in processes or in the simulator"),
+        (replace(AC, runtime=Runtime.ARRAYS, protocol="dsa"), "--preprocess is only for robots in processes"),
+        (
+            Options(protocol="central", preprocess=Preprocess.AC),
+            "--preprocess is for robots that solve the problem together",
+        ),
         (
             replace(AC, protocol="sfb", withdraw=Withdrawal.MINIMUM),
-            "--preprocess removes values that do not go with robots",
+            "--preprocess removes values that are possible if other robots withdraw",
         ),
     ],
 )
@@ -254,5 +257,5 @@ def test_what_it_does_not_go_with_is_refused(options: Options, told: str) -> Non
 
 
 def test_partially_known_constraints_and_problems_that_change_are_refused() -> None:
-    with pytest.raises(UnsupportedError, match="--preprocess does not support: drop it"):
+    with pytest.raises(UnsupportedError, match="--preprocess does not support: remove --preprocess"):
         solve(pkc_pair(pkc_part("AB", (1, 1)), pkc_part("AB")), replace(AC, protocol="abt"))

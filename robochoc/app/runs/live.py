@@ -159,7 +159,7 @@ class LiveReader:
         if self._known is None:
             return
         before = self._known.best
-        self._known.take(event)
+        self._known.add(event)
         if self._minimised:
             self._live.bound = self._known.bound
         if self._known.best is None or self._known.best == before:

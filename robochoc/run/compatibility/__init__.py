@@ -1,11 +1,13 @@
-"""The rules on which problems, protocols, runtimes and options can be combined. No other room decides this.
+"""The rules on which problems, protocols, runtimes and options can be combined. No other package decides this.
 
-There are three lists. Each rule has a condition, the reason, and what to do instead:
+Each rule has a condition, the reason, and an alternative:
 
-- `option_rules.py`: options that do not go together, whatever the problem is;
-- `team_rules.py`: options that do not go with the problem, or with what the protocol can do (its traits);
-- the constraints that a protocol must be able to take (`protocols/requirements.py`, where robots on a network, whose
-  files nobody else sees, ask as well).
+- `option_rules.py`: options that cannot be combined with each other, whatever the problem is;
+- `team_rules.py`: options that cannot be combined with the team, or with the traits of the protocol;
+- `setting_rules.py`: settings that the protocol does not have or accept;
+- `channel_rules.py`: channel models that do not fit the team;
+- `protocols/requirements.py`: costs and kinds of constraints that the protocol does not support. Robots on a network
+  check their own files by it, since the master does not see them.
 
-The command line, the API, and robots on a network ask here. Options are named as on the command line.
+The options have their names of the command line in the messages.
 """

@@ -1,4 +1,4 @@
-"""Checks a channel model, which names robots and places, against the team."""
+"""Channel models that do not fit the team: they name unknown robots, or need unknown positions."""
 
 from __future__ import annotations
 
@@ -12,13 +12,11 @@ from robochoc.solver.errors import UnsupportedError
 
 
 def refuse_channel(team: Team, options: Options) -> None:
-    """Refuse a channel model that does not fit the team.
-
-    Robots that the scenario brings are looked at too.
+    """Refuse a channel model that does not fit the team, including the robots that join in its scenario.
 
     Raises:
-        UnsupportedError: when it names a robot that is in the team at no time, or if what is lost depends on distance
-            and it is not known where a robot is.
+        UnsupportedError: if it names a robot that is never in the team, or if losses depend on distance and the
+            position of a robot is unknown.
     """
     channel = options.channel
     if channel is None or options.message_loss:
@@ -27,7 +25,7 @@ def refuse_channel(team: Team, options: Options) -> None:
     robots = {robot.name: robot for epoch in epochs for robot in epoch.robots}
     _refuse_unknown(channel, robots)
     if channel.by_distance:
-        _refuse_nowhere(channel, robots)
+        _refuse_unplaced(channel, robots)
 
 
 def _refuse_unknown(channel: ChannelModel, robots: dict[str, Robot]) -> None:
@@ -39,9 +37,9 @@ def _refuse_unknown(channel: ChannelModel, robots: dict[str, Robot]) -> None:
                 raise UnsupportedError(f"{why} ({suggestion(name, robots, 'robots')})")
 
 
-def _refuse_nowhere(channel: ChannelModel, robots: dict[str, Robot]) -> None:
-    nowhere = [name for name, robot in robots.items() if name not in channel.positions and not has_place(robot)]
-    if nowhere:
-        many = f"{', '.join(nowhere[:3])}{', ...' * (len(nowhere) > 3)}"  # noqa: PLR2004 - as many as fit a line
-        why = f"--channel {channel.name} loses messages by distance, and it is not known where {many} is"
+def _refuse_unplaced(channel: ChannelModel, robots: dict[str, Robot]) -> None:
+    unplaced = [name for name, robot in robots.items() if name not in channel.positions and not has_place(robot)]
+    if unplaced:
+        many = f"{', '.join(unplaced[:3])}{', ...' * (len(unplaced) > 3)}"  # noqa: PLR2004 - fits a line
+        why = f"--channel {channel.name} loses messages by distance, but the position of {many} is unknown"
         raise UnsupportedError(f"{why}; give positions in its file, or topics with x and y in robots' files")

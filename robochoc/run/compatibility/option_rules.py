@@ -1,4 +1,4 @@
-"""Options that do not go together, whatever the problem is."""
+"""Options that cannot be combined, whatever the problem is."""
 
 from __future__ import annotations
 
@@ -22,46 +22,46 @@ class OptionRule(NamedTuple):
 
 
 def _for_robots(option: str, given: Callable[[Options], object]) -> OptionRule:
-    """Return the rule that the central solver has no use for an option."""
-    why = f"{option} is for robots that solve it together, not for --protocol central"
+    """Return the rule that refuses an option with the central solver."""
+    why = f"{option} is for robots that solve the problem together, not for --protocol central"
     return OptionRule(lambda o: o.protocol == CENTRAL and given(o), why)
 
 
 def _not_while_changing(option: str, given: Callable[[Options], object]) -> OptionRule:
-    """Return the rule that an option is not for problems that change with the robots' situation."""
-    return OptionRule(given, f"{option} is for problems that do not change; --situation changes this one")
+    """Return the rule that refuses an option for problems that an environment changes."""
+    return OptionRule(given, f"{option} is for problems that do not change, but --situation changes the problem")
 
 
 def _is_delayed(options: Options) -> bool:
-    """Return whether messages are delayed, or ordered, otherwise than by default."""
+    """Return whether the delays or the order of messages differ from the default."""
     return bool(options.delay) or options.schedule != ScheduleName.CONCURRENT
 
 
 _WITHOUT_PROCESSES = frozenset({Runtime.SIMULATOR, Runtime.ARRAYS})
 
 OPTION_RULES = (
-    OptionRule(lambda o: not LEAST_SEED <= o.seed <= LARGEST_SEED, "--seed is a number of 64 bits: less than 2^64"),
+    OptionRule(lambda o: not LEAST_SEED <= o.seed <= LARGEST_SEED, "--seed must be a 64-bit number, less than 2^64"),
     OptionRule(
         lambda o: o.channel and o.runtime != Runtime.SIMULATOR,
-        "--channel is the simulator's",
+        "--channel is only for the simulator",
         "add --runtime simulator",
     ),
     OptionRule(
         lambda o: o.channel and _is_delayed(o),
-        "--channel says how long messages take",
-        "drop --delay and --schedule",
+        "--channel determines how long messages take",
+        "remove --delay and --schedule",
     ),
     OptionRule(
         lambda o: _is_delayed(o) and o.runtime != Runtime.SIMULATOR,
-        "--delay and --schedule are the simulator's",
+        "--delay and --schedule are only for the simulator",
         "add --runtime simulator",
     ),
     OptionRule(
         lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
-        "--delay is for --schedule concurrent: in a random one any message may take any time, in cycles each takes one",
+        "--delay is only for --schedule concurrent: in random they are arbitrary, in cycles one cycle",
     ),
     OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: give one of them"),
-    OptionRule(lambda o: o.improve and not o.deadline, "--improve goes on after --deadline SECONDS: add it"),
+    OptionRule(lambda o: o.improve and not o.deadline, "--improve continues after --deadline SECONDS: add --deadline"),
     OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
     OptionRule(
         lambda o: o.loss and (o.runtime == Runtime.ARRAYS or o.preprocess or o.wants_anytime),
@@ -69,7 +69,7 @@ OPTION_RULES = (
     ),
     OptionRule(
         lambda o: o.ncccs is not None and o.runtime != Runtime.SIMULATOR,
-        "--ncccs is a limit for the simulator, which knows all clocks",
+        "--ncccs is only for the simulator, which has the clocks of all robots",
         "add --runtime simulator",
     ),
     OptionRule(
@@ -79,12 +79,12 @@ OPTION_RULES = (
     ),
     OptionRule(
         lambda o: o.protocol == CENTRAL and o.verify,
-        "--verify asks the central solver, which is --protocol central itself",
+        "--verify asks the central solver: --protocol central is already its answer",
     ),
     OptionRule(
         lambda o: o.patience is not None and (o.protocol == CENTRAL or o.runtime in _WITHOUT_PROCESSES),
         "--patience is for robots with processes, which can be stopped",
-        "drop it",
+        "remove it",
     ),
     _for_robots("--messages", lambda o: o.messages),
     _for_robots("--ncccs", lambda o: o.ncccs is not None),
@@ -102,27 +102,27 @@ OPTION_RULES = (
     _for_robots("--preprocess", lambda o: o.preprocess),
     OptionRule(
         lambda o: o.preprocess and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
-        "--preprocess is of robots in processes or the simulator",
-        "drop it",
+        "--preprocess is only for robots in processes or in the simulator",
+        "remove it",
     ),
     OptionRule(
         lambda o: o.protocol == CENTRAL and o.withdraw == Withdrawal.MAXIMAL,
-        "--withdraw maximal is settled by the robots, in priority order; the central solver finds a minimum",
-        "--withdraw minimum",
+        "--withdraw maximal is decided by the robots, in priority order, and not by the central solver",
+        "use --withdraw minimum",
     ),
     OptionRule(
         lambda o: o.central_with != CentralSolverName.ACE and o.protocol != CENTRAL,
-        "--with says who decides one model of all files",
+        "--with chooses the central solver",
         "add --protocol central",
     ),
     OptionRule(
         lambda o: o.central_with == CentralSolverName.ORTOOLS and o.count,
-        "--count is of ACE's solutions; OR-Tools does not count",
-        "drop --with",
+        "--count is only for ACE: OR-Tools does not count solutions",
+        "remove --with",
     ),
     OptionRule(
         lambda o: o.count and o.withdraw is not None,
-        "--count is of solutions for all robots; --withdraw asks who can do without",
+        "--count counts solutions for all robots, and cannot be used with --withdraw",
     ),
     OptionRule(
         lambda o: o.filters and o.runtime != Runtime.NETWORK,
@@ -131,31 +131,31 @@ OPTION_RULES = (
     ),
     OptionRule(
         lambda o: o.bounds and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
-        "--bounds is of robots in processes or the simulator",
-        "drop it",
+        "--bounds is only for robots in processes or in the simulator",
+        "remove it",
     ),
     OptionRule(
         lambda o: o.spares and o.runtime == Runtime.NETWORK,
         "--spare starts processes of this machine again",
-        "drop --runtime network",
+        "remove --runtime network",
     ),
     OptionRule(
         lambda o: (o.on_loss or o.spares) and o.runtime in _WITHOUT_PROCESSES,
         "--on-loss and --spare are for processes, which can die",
-        "drop --runtime, or write a scenario.xml",
+        "remove --runtime, or write a scenario.xml",
     ),
     OptionRule(
         lambda o: o.kill and o.runtime in _WITHOUT_PROCESSES,
         "--kill ends a robot's process, and the simulator and arrays have none",
-        "drop --runtime",
+        "remove --runtime",
     ),
     OptionRule(
         lambda o: o.spares and o.on_loss == OnLoss.FAIL,
-        "--spare brings robots back that died; --on-loss fail ends the run instead",
+        "--spare restarts robots that died, and cannot be used with --on-loss fail",
     ),
     OptionRule(
         lambda o: o.withdraw is not None and o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS,
-        "--withdraw is settled by protocols that have no form as arrays",
+        "--withdraw is decided by protocols that have no form as arrays",
         "add --runtime simulator",
     ),
 )
@@ -173,17 +173,17 @@ ENVIRONMENT_RULES = (
 PRIVATE_RULES = (
     OptionRule(
         lambda o: o.deadline,
-        "--deadline uses checked values, and --private hides the values that would be checked",
-        "--timeout",
+        "--deadline requires the values of all robots for its check, but --private hides them",
+        "use --timeout",
     ),
 )
-"""Further combinations that are refused if robots keep their values to themselves."""
+"""Further combinations that are refused if robots do not disclose their values."""
 
 
 def refuse_options(options: Options, *, environment: bool = False, private: bool = False) -> None:
-    """Raise `UnsupportedError` for options that do not go together.
+    """Raise `UnsupportedError` for options that cannot be combined.
 
-    `environment`: one changes the problem. `private`: robots keep their values to themselves.
+    `environment`: an environment changes the problem. `private`: robots do not disclose their values.
     """
     for rule in (*ENVIRONMENT_RULES * environment, *PRIVATE_RULES * private, *OPTION_RULES):
         if rule.refuses(options):

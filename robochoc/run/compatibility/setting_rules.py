@@ -1,4 +1,4 @@
-"""Refuse settings that a protocol does not have, or cannot go with."""
+"""Settings that a protocol does not have, or does not accept."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Options that do not go with the problem, or with what the protocol can do."""
+"""Options that cannot be combined with the team, or with the traits of the protocol."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robochoc.solver.exclusions import allocation_fault
 from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
-"""Costs that add up to more are refused: a message holds integers of 64 bits."""
+"""Costs that can add up to more are refused: messages contain integers of 64 bits."""
 CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 """The problems that the central solver supports."""
 
@@ -48,27 +48,27 @@ class RunCase:
 
     @property
     def has_negative_costs(self) -> bool:
-        """Return whether something was taken out of costs, so that none is negative."""
+        """Return whether costs were shifted, as some are negative."""
         return self.team.user_units.maximize or any(constraint.offset for constraint in self.team.constraints())
 
     @property
     def is_distributed(self) -> bool:
-        """Return whether the robots solve the problem together, without the central solver."""
+        """Return whether the robots solve the problem, not the central solver."""
         return self.options.protocol != CENTRAL
 
     @property
     def minimum_withdrawal(self) -> bool:
-        """Return whether as few robots as possible are to withdraw."""
+        """Return whether a minimum of robots is to withdraw, which the robots decide."""
         return self.is_distributed and self.options.withdraw == Withdrawal.MINIMUM
 
     @cached_property
     def epochs(self) -> tuple[Team, ...]:
-        """The team after each event of its scenario, as far as that is known before."""
+        """The team after each event of its scenario, as far as the events are known before the run."""
         return tuple(team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
 
     @property
     def unknown_kills(self) -> str:
-        """Robots that are to be killed, and are in the team at no time."""
+        """The robots to be killed that are never in the team."""
         return ", ".join(sorted({kill.robot for kill in self.options.kill}.difference(*(e.order for e in self.epochs))))
 
     @property
@@ -83,10 +83,10 @@ def scenario_refusal(team: object, option: str) -> str:
 
 
 class TeamRule(NamedTuple):
-    """A case that is refused: the condition, the reason, and what to do instead.
+    """A run that is refused: the condition, the reason, and an alternative.
 
-    In the reason, `{team}` and `{protocol}` stand for the names, `{case}` for the case. With `other_protocol`, another
-    one could do it; with `complete`, one that proves its answers.
+    The reason may contain `{team}` and `{protocol}`, the names, and `{case}`, the run. `other_protocol`: another
+    protocol may be able to do it; `complete`: only a complete one.
     """
 
     refuses: Callable[[RunCase], object]
@@ -97,7 +97,7 @@ class TeamRule(NamedTuple):
 
 
 def _not_with_scenario(option: str, given: Callable[[Options], object]) -> TeamRule:
-    """Return the rule that an option is not for problems that change over time."""
+    """Return the rule that refuses an option for problems that change over time."""
     return TeamRule(lambda c: c.team.dynamic and given(c.options), scenario_refusal("{team}", option))
 
 
@@ -106,8 +106,8 @@ TEAM_RULES = (
     _not_with_scenario("--count", lambda o: o.count),
     TeamRule(
         lambda c: c.options.preprocess and c.minimum_withdrawal and c.traits.costs,
-        "--preprocess removes values that do not go with robots that may withdraw (--withdraw minimum, {protocol})",
-        "drop --preprocess, or choose a protocol that does not minimise costs",
+        "--preprocess removes values that are possible if other robots withdraw (--withdraw minimum, {protocol})",
+        "remove --preprocess, or choose a protocol that does not minimise costs",
         other_protocol=True,
     ),
     TeamRule(
@@ -115,7 +115,7 @@ TEAM_RULES = (
             c.options.preprocess
             and any(unmet_requirement(robot, DisAC.traits, team.owner) for team in c.epochs for robot in team.robots)
         ),
-        "{team} has partially known constraints (PKC), which --preprocess does not support: drop it",
+        "{team} has partially known constraints (PKC), which --preprocess does not support: remove --preprocess",
     ),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime == Runtime.NETWORK),
     _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS),
@@ -128,21 +128,21 @@ TEAM_RULES = (
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
         lambda c: c.options.count and c.is_distributed and (c.options.runtime == "network" or not c.traits.counts),
-        "--count is for --protocol central, or count-dpop on one machine: across machines it is one robot's word",
+        "--count is for --protocol central, or count-dpop on one machine: across machines the number cannot be checked",
     ),
     TeamRule(
         lambda c: c.options.count and c.has_costs and not c.is_distributed,
-        "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution",
+        "{team} has costs (DCOP), so every assignment that satisfies the hard constraints is a solution",
         "add --protocol count-dpop, which counts optima",
     ),
     TeamRule(
         lambda c: c.is_distributed and (c.traits.costs or c.minimum_withdrawal) and c.max_total >= LARGEST,
-        f"{{team}}'s costs could add up to {LARGEST:,} or more, which no message holds",
-        "scale them down",
+        f"{{team}}'s costs could add up to {LARGEST:,} or more, which does not fit into a message",
+        "scale the costs down",
     ),
     TeamRule(
         lambda c: c.minimum_withdrawal and c.traits.costs and not c.traits.complete,
-        "--withdraw minimum has to be proven, and {protocol} proves nothing",
+        "--withdraw minimum requires a proof, but {protocol} is incomplete",
         other_protocol=True,
         complete=True,
     ),
@@ -153,23 +153,23 @@ TEAM_RULES = (
     ),
     TeamRule(
         lambda c: c.has_costs and c.options.withdraw == Withdrawal.MAXIMAL,
-        "{team} is a DisWCSP; --withdraw maximal knows no costs",
-        "--withdraw minimum does",
+        "{team} has costs (DCOP), which --withdraw maximal ignores",
+        "use --withdraw minimum",
     ),
 )
-"""Problems, and protocols for a problem, that are refused."""
+"""Refused combinations of team, options and protocol."""
 
 
 def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
-    """Raise `UnsupportedError` for what does not go with the team, or with a protocol that has these `traits`.
+    """Raise `UnsupportedError` if the options cannot be combined with the team or with the traits of the protocol.
 
     Args:
-        team: the team with its scenario. Across machines: as far as the master sees it.
-        options: how to run.
-        traits: what the protocol of `options` can do; `CENTRAL_TRAITS` for the central solver.
+        team: The team with its scenario. Across machines: the part of it that the master sees.
+        options: How to run.
+        traits: The traits of the protocol of `options`; `CENTRAL_TRAITS` for the central solver.
 
     Raises:
-        UnfitProtocolError: where another protocol could do it.
+        UnfitProtocolError: if another protocol may be able to do it.
     """
     case = RunCase(team, options, traits)
     for rule in TEAM_RULES:
@@ -178,15 +178,15 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
             why = "; ".join(filter(None, [why, rule.instead]))
             raise UnfitProtocolError(why, complete=rule.complete) if rule.other_protocol else UnsupportedError(why)
     for epoch in case.epochs:
-        for name, able in _takers(case):
-            _refuse_constraints(epoch, name, able)
+        for name, required in _requirements(case):
+            _refuse_constraints(epoch, name, required)
 
 
-def _takers(case: RunCase) -> Iterator[tuple[str, Traits]]:
-    """Yield all protocols that must support the constraints: the protocol, and those that take over from it."""
+def _requirements(case: RunCase) -> Iterator[tuple[str, Traits]]:
+    """Yield all protocols that must support the constraints: the protocol, and those of further phases, with traits."""
     options, traits = case.options, case.traits
     taken_over = case.minimum_withdrawal and not traits.costs
-    if not (taken_over and case.has_costs):  # then soft constraints are left to what takes over
+    if not (taken_over and case.has_costs):  # then the second phase minimises the costs
         yield options.protocol, traits
     if taken_over:
         yield "--withdraw minimum", Traits(costs=True)
@@ -197,7 +197,7 @@ def _takers(case: RunCase) -> Iterator[tuple[str, Traits]]:
 
 
 def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
-    """Raise `UnfitProtocolError` for constraints that the one called `name` cannot take."""
+    """Raise `UnfitProtocolError` for constraints that the protocol or the option `name` does not support."""
     for robot in team.robots:
         unmet = unmet_requirement(robot, traits, team.owner)
         if unmet.endswith(BREAKABLE):

@@ -35,7 +35,7 @@ class Address(NamedTuple):
         elif text.count(":") <= 1:
             host, _, port = text.partition(":")
         if not _is_host(host) or (port and not (port.isdecimal() and 0 < int(port) <= _LARGEST_PORT)):
-            raise AddressError(f"{text!r} is no HOST:PORT, such as 192.168.1.14:{DEFAULT_PORT}")
+            raise AddressError(f"{text!r} is not of the form HOST:PORT, such as 192.168.1.14:{DEFAULT_PORT}")
         return cls(host, int(port) if port else DEFAULT_PORT)
 
     @property

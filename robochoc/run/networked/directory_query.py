@@ -42,10 +42,10 @@ def search_template(slots: Sequence[str]) -> AgentDescription:
     for word in slots:
         slot, equals, value = word.partition("=")
         if not equals or slot not in given or not value:
-            raise TemplateError(f"{word!r} is no SLOT=VALUE; slots are {', '.join(SLOTS)}")
+            raise TemplateError(f"{word!r} is not of the form SLOT=VALUE; the slots are {', '.join(SLOTS)}")
         given[slot].append(value)
     if len(given["name"]) > 1:
-        raise TemplateError("an agent has one name")
+        raise TemplateError("the slot `name` is given twice: an agent has one name")
     services = [ServiceDescription(name=one, type=kind) for kind in ("variable", "topic") for one in given[kind]]
     name = given["name"][0] if given["name"] else ""
     return AgentDescription(

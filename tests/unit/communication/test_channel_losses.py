@@ -162,9 +162,9 @@ def test_a_robot_whose_place_is_not_known_is_refused_and_so_is_a_name_that_is_no
     team = random_csp(4, 3, 0.7, 0.2, 1)
     first, *others = team.order
     everywhere = {name: (0.0, float(place)) for place, name in enumerate(team.order)}
-    with pytest.raises(UnsupportedError, match=f"not known where {', '.join(team.order[:3])}, ... is; give positions"):
+    with pytest.raises(UnsupportedError, match=f"position of {', '.join(team.order[:3])}, ... is unknown; give positions"):
         solve(team, lossy(channel(distance_loss=STEP)))
-    with pytest.raises(UnsupportedError, match=f"not known where {others[-1]} is"):
+    with pytest.raises(UnsupportedError, match=f"position of {others[-1]} is unknown"):
         solve(team, lossy(channel(distance_loss=STEP, positions={name: everywhere[name] for name in team.order[:-1]})))
     with pytest.raises(UnsupportedError, match=rf"positions: there is no robot .* \(did you mean '{first}'"):
         solve(team, lossy(channel(distance_loss=STEP, positions={**everywhere, f"{first}x": (0.0, 0.0)})))
@@ -183,7 +183,7 @@ def joining() -> Team:
 
 def test_a_robot_that_joins_has_its_place_too() -> None:
     places = {"RA": (0.0, 0.0), "RB": (1.0, 0.0), "RC": (50.0, 0.0)}
-    with pytest.raises(UnsupportedError, match="not known where RC is"):
+    with pytest.raises(UnsupportedError, match="position of RC is unknown"):
         solve(joining(), lossy(channel(distance_loss=STEP, positions={"RA": (0.0, 0.0), "RB": (1.0, 0.0)})))
     outcome = solve(joining(), lossy(channel(distance_loss=STEP, positions=places)))
     assert [epoch.metrics.lost_messages > 0 for epoch in outcome.epochs] == [False, True]

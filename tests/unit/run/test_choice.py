@@ -19,7 +19,7 @@ from robochoc.model.orders import Order
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, AddAgent, Change, ProblemKind, Team
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
-from robochoc.run.choice import SOMEBODY, choose, choose_for_private_team
+from robochoc.run.choice import ACCEPTS, choose, choose_for_private_team
 from robochoc.run.facts import Facts, TreeTables
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.errors import UnsupportedError
@@ -152,7 +152,7 @@ def test_where_messages_are_lost_a_protocol_that_bears_it_is_taken_if_one_accept
         able = taken(team, options)
         if any(protocol_named(one).traits.bears_loss for one in able):
             assert protocol_named(found.options.protocol).traits.bears_loss, (kind, number)
-            assert "may be lost" in found.options.chosen["protocol"] or found.options.chosen["protocol"] == SOMEBODY
+            assert "may be lost" in found.options.chosen["protocol"] or found.options.chosen["protocol"] == ACCEPTS
         assert f"messages are lost with a probability of {options.message_loss} at most" in found.facts
 
 

@@ -198,7 +198,7 @@ def test_with_withdrawal_fewer_and_fewer_withdraw(runs: int) -> None:
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        (Options(improve=1), "--improve goes on after --deadline"),
+        (Options(improve=1), "--improve continues after --deadline"),
         (Options(protocol=CENTRAL, deadline=1, improve=1), "--deadline is for robots"),
     ],
 )

@@ -145,28 +145,28 @@ def test_options_of_problems_as_arrays_are_converted() -> None:
 WLAN = CHANNELS["wlan"]
 REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"runtime": Runtime.ARRAYS}, "sfb has no form as arrays; add --runtime simulator, or choose a protocol"),
-    ({"runtime": Runtime.ARRAYS, "protocol": "dsa", "withdraw": Withdrawal.MAXIMAL}, "--withdraw is settled by"),
-    ({"runtime": Runtime.ARRAYS, "delay": 3}, "--delay and --schedule are the simulator's"),
-    ({"runtime": Runtime.ARRAYS, "ncccs": 3}, "--ncccs is a limit for the simulator"),
+    ({"runtime": Runtime.ARRAYS, "protocol": "dsa", "withdraw": Withdrawal.MAXIMAL}, "--withdraw is decided by"),
+    ({"runtime": Runtime.ARRAYS, "delay": 3}, "--delay and --schedule are only for the simulator"),
+    ({"runtime": Runtime.ARRAYS, "ncccs": 3}, "--ncccs is only for the simulator"),
     ({"runtime": Runtime.ARRAYS, "patience": 3.0}, "--patience is for robots with processes"),
     ({"runtime": Runtime.ARRAYS, "spares": 1}, "--on-loss and --spare are for processes, which can die"),
     ({"runtime": Runtime.ARRAYS, "kill": (Kill("RA", 1),)}, "the simulator and arrays have none"),
     ({"runtime": Runtime.ARRAYS, "filters": ("signed",)}, "--filter is for messages that cross a network"),
     ({"channel": WLAN, "runtime": Runtime.PROCESSES}, "add --runtime simulator"),
-    ({"channel": WLAN, "delay": 3}, "drop --delay and --schedule"),
-    ({"delay": 3, "runtime": Runtime.PROCESSES}, "--delay and --schedule are the simulator's"),
-    ({"delay": 3, "schedule": ScheduleName.RANDOM}, "--delay is for --schedule concurrent"),
+    ({"channel": WLAN, "delay": 3}, "remove --delay and --schedule"),
+    ({"delay": 3, "runtime": Runtime.PROCESSES}, "--delay and --schedule are only for the simulator"),
+    ({"delay": 3, "schedule": ScheduleName.RANDOM}, "--delay is only for --schedule concurrent"),
     ({"protocol": "central", "verify": True}, "--verify asks the central solver"),
     ({"patience": 1.0}, "--patience is for robots with processes"),
     ({"protocol": "central", "messages": 5}, "--messages is for robots"),
     ({"protocol": "central", "order": ("RA", "RB")}, "--order is for robots"),
     ({"protocol": "central", "settings": {"cycles": "5"}}, "--set is for robots"),
-    ({"protocol": "central", "withdraw": Withdrawal.MAXIMAL}, "finds a minimum; --withdraw minimum"),
-    ({"protocol": "central", "count": True, "withdraw": Withdrawal.MINIMUM}, "who can do without"),
+    ({"protocol": "central", "withdraw": Withdrawal.MAXIMAL}, "use --withdraw minimum"),
+    ({"protocol": "central", "count": True, "withdraw": Withdrawal.MINIMUM}, "cannot be used with --withdraw"),
     ({"filters": ("signed",)}, "add --runtime network"),
-    ({"spares": 1, "runtime": Runtime.NETWORK}, "drop --runtime network"),
+    ({"spares": 1, "runtime": Runtime.NETWORK}, "remove --runtime network"),
     ({"on_loss": OnLoss.WITHDRAW}, "for processes, which can die"),
-    ({"spares": 1, "on_loss": OnLoss.FAIL, "runtime": Runtime.PROCESSES}, "--on-loss fail ends the run instead"),
+    ({"spares": 1, "on_loss": OnLoss.FAIL, "runtime": Runtime.PROCESSES}, "cannot be used with --on-loss fail"),
 ]
 
 
@@ -187,7 +187,7 @@ def test_no_rule_refuses_the_defaults() -> None:
 
 def test_a_seed_has_64_bits_as_journals_and_networks_tell_it() -> None:
     for seed in [2**64, -(2**63) - 1]:
-        with pytest.raises(UnsupportedError, match="--seed is a number of 64 bits"):
+        with pytest.raises(UnsupportedError, match="--seed must be a 64-bit number"):
             refuse_options(Options(seed=seed))
 
 

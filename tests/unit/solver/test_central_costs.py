@@ -150,7 +150,7 @@ def test_a_soft_constraint_with_too_many_prices_is_refused() -> None:
 
 
 def test_counting_is_for_problems_without_costs() -> None:
-    with pytest.raises(UnsupportedError, match="is a DisWCSP, where every assignment"):
+    with pytest.raises(UnsupportedError, match=r"has costs \(DCOP\), so every assignment"):
         solve(coloring(3, 2, 2), replace(CENTRAL, count=True))
 
 
@@ -239,7 +239,7 @@ def test_everybody_may_have_to_step_aside(solver: AceProcess) -> None:
 
 
 def test_there_is_nothing_to_count_where_robots_step_aside() -> None:
-    with pytest.raises(UnsupportedError, match="--count is of solutions for all robots"):
+    with pytest.raises(UnsupportedError, match="--count counts solutions for all robots"):
         solve(queens3d(3), replace(FEWEST, count=True))
 
 
@@ -348,7 +348,7 @@ def test_the_program_refuses_to_count_costs(tmp_path: Path) -> None:
     write_team(coloring(3, 2, 2), tmp_path / "triangle")
     done = robochoc_within("solve", tmp_path / "triangle", "--protocol", "central", "--count")
     assert (done.returncode, done.stdout) == (2, "")
-    assert "every assignment that breaks nothing hard is a solution" in done.stderr
+    assert "every assignment that satisfies the hard constraints is a solution" in done.stderr
     optimum = robochoc_within("solve", tmp_path / "triangle", "--protocol", "central", "--json")
     assert json.loads(optimum.stdout)["cost"] == 1
 

@@ -125,7 +125,7 @@ def run(*words: str) -> tuple[int, str]:
         ((PATROL, "--protocol", "sfb"), "sfb has no form as arrays"),
         ((PATROL, "--protocol", "dsa", "--journal", "out.journal"), "--runtime arrays sends none"),
         ((PATROL, "--protocol", "dsa", "--sniff"), "--runtime arrays sends none"),
-        ((PATROL, "--protocol", "dsa", "--schedule", str(ScheduleName.CYCLES)), "are the simulator's"),
+        ((PATROL, "--protocol", "dsa", "--schedule", str(ScheduleName.CYCLES)), "are only for the simulator"),
         ((RESCUE, "--protocol", "mgm"), "is for problems that do not change"),
     ],
 )
