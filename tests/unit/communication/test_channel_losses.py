@@ -162,7 +162,8 @@ def test_a_robot_whose_place_is_not_known_is_refused_and_so_is_a_name_that_is_no
     team = random_csp(4, 3, 0.7, 0.2, 1)
     first, *others = team.order
     everywhere = {name: (0.0, float(place)) for place, name in enumerate(team.order)}
-    with pytest.raises(UnsupportedError, match=f"position of {', '.join(team.order[:3])}, ... is unknown; give positions"):
+    unplaced = f"position of {', '.join(team.order[:3])}, ... is unknown; give positions"
+    with pytest.raises(UnsupportedError, match=unplaced):
         solve(team, lossy(channel(distance_loss=STEP)))
     with pytest.raises(UnsupportedError, match=f"position of {others[-1]} is unknown"):
         solve(team, lossy(channel(distance_loss=STEP, positions={name: everywhere[name] for name in team.order[:-1]})))
