@@ -1,1 +1,1 @@
-"""What a user has drawn: a sketch of a team, how it is edited, and what is made of it. No web framework in here."""
+"""Sketches: teams as drawn by the user, with their edits, checks, files and conversions. NiceGUI is not used here."""

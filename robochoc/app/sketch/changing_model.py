@@ -1,8 +1,8 @@
-"""Two sketches as a problem that changes: a model of the first one, with an event that makes it the second one.
+"""A changing problem from two sketches: a model of the first sketch, with an event that converts it to the second one.
 
-Robots leave and come, values go and come, constraints between robots as well (docs/reference/format.md, "Changes over
-time"). What one robot alone must keep to is no constraint that an event could add or take: where it changes, it is said
-by the values that are left. All else cannot be said, and the team has to decide anew: `FromScratchError` says why.
+An event can add and remove robots, values, and constraints between robots (docs/reference/format.md, "Changes over
+time"). It cannot add or remove constraints of a single robot: their changes are expressed by the remaining values.
+Other differences cannot be expressed, so that the team must decide from scratch: `FromScratchError` has the reason.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ from robochoc.modelling.model import Model
 from robochoc.system.errors import RobochocError
 
 Domains = dict[tuple[str, str], list[Value]]
-"""The values that are left, by robot and decision."""
+"""The remaining values, by robot and decision."""
 
 
 class FromScratchError(RobochocError, ValueError):
-    """Events cannot say this difference: the team decides anew. `key` is its text in the catalogue."""
+    """Events cannot express a difference, so that the team must decide from scratch. `key`: the key of the text."""
 
     def __init__(self, key: str, **named: object) -> None:
         super().__init__(key)
@@ -39,7 +39,7 @@ class FromScratchError(RobochocError, ValueError):
 
 @dataclass(frozen=True, eq=False)
 class RuleLink:
-    """What a rule says of some robots: one constraint. `name` is its name in the model."""
+    """The constraint of a rule for some robots. `name`: its name in the model."""
 
     sketch: Sketch
     rule: SketchRule
@@ -48,40 +48,40 @@ class RuleLink:
 
     @cached_property
     def meaning(self) -> tuple[object, ...]:
-        """What it says. Links of equal meaning are the same constraint, whichever rule they are from."""
+        """The content of the constraint. Links with equal contents are the same constraint, also from other rules."""
         rule = self.rule
         settings = {name: value for name, value in rule.settings.items() if name != "radius"}
-        said = msgspec.json.encode(settings, order="sorted")
-        return rule.kind, rule.decision, self.robots, said, rule.cost, rule.private and len(self.robots) > 1
+        encoded = msgspec.json.encode(settings, order="sorted")
+        return rule.kind, rule.decision, self.robots, encoded, rule.cost, rule.private and len(self.robots) > 1
 
     @property
-    def says_values(self) -> bool:
-        """True if it can be said by the values that it leaves to its robot."""
+    def restricts_values(self) -> bool:
+        """True if the constraint can be expressed by the remaining values of its only robot."""
         return len(self.robots) == 1 and self.rule.cost is None and not PALETTE[self.rule.kind].graded
 
     def allows(self, value: Value) -> bool:
-        """Return whether its only robot may have that value."""
+        """Return whether the constraint allows this value of its only robot."""
         return PALETTE[self.rule.kind].holds(Applied(self.sketch, self.rule), (value,))
 
 
 def changing_model(before: Sketch, after: Sketch) -> Model:
-    """Return the model of `before` that becomes `after` once it is solved.
+    """Return the model of `before` with an event that converts it to `after` when it is solved.
 
     Raises:
-        AnewError: if events cannot say the difference.
+        FromScratchError: if events cannot express the difference.
     """
     difference = _Difference(before, after)
     difference.check()
     try:
         model = difference.model()
         _ = model.team
-    except (ModelError, InvalidInputError) as unsayable:
-        raise FromScratchError("whatif.anew-other") from unsayable
+    except (ModelError, InvalidInputError) as invalid:
+        raise FromScratchError("whatif.anew-other") from invalid
     return model
 
 
 class _Difference:
-    """What is not the same in two sketches."""
+    """The differences between two sketches."""
 
     def __init__(self, before: Sketch, after: Sketch) -> None:
         self._before, self._after = before, after
@@ -103,7 +103,7 @@ class _Difference:
         self._added = [*_with_names(_beyond(then_links, [left for _, left in remaining]), taken)]
 
     def _remaining(self, link: RuleLink) -> RuleLink | None:
-        """Return a link without the robots that have left: a count is restated, any other link is dropped (None)."""
+        """Return a link without the robots that have left: a count is restated; None for others, which are dropped."""
         if self._stay.issuperset(link.robots):
             return link
         rest = tuple(name for name in link.robots if name in self._stay)
@@ -111,7 +111,7 @@ class _Difference:
         return replace(link, robots=rest) if rest and is_count else None
 
     def check(self) -> None:
-        """Raise `FromScratchError` if events cannot say the difference."""
+        """Raise `FromScratchError` if events cannot express the difference."""
         if not self._stay:
             raise FromScratchError("whatif.anew-nobody")
         if self._before.area.columns != self._after.area.columns:
@@ -126,37 +126,37 @@ class _Difference:
                 _check_link(link)
 
     def _check_robot(self, name: str) -> None:
-        """Raise `FromScratchError` if a robot that stays decides something else, or counts differently."""
+        """Raise `FromScratchError` if a remaining robot has other decisions, or another weight or rank."""
         was, now = self._before.robot(name), self._after.robot(name)
         decided, decides = ({one.name: one.kind for one in _of(sketch, name)} for sketch in (self._before, self._after))
         if decided != decides:
             raise FromScratchError("whatif.anew-decision", robot=name)
-        assert was is not None  # noqa: S101 - it stays
+        assert was is not None  # noqa: S101 - the robot is in both sketches
         assert now is not None  # noqa: S101 - the same
         if (was.weight, was.rank) != (now.weight, now.rank):
             raise FromScratchError("whatif.anew-importance", robot=name)
         if was.at != now.at and DecisionKind.LEVEL in decided.values() and DecisionKind.PLACE not in decided.values():
-            raise FromScratchError("whatif.anew-moved", robot=name)  # its waypoint is where it stands
+            raise FromScratchError("whatif.anew-moved", robot=name)  # its waypoint depends on its position
 
     def model(self) -> Model:
         """Return the model of the first sketch, with the event.
 
-        What will change for one robot alone is said by values. The event says them before any constraint is made:
-        one that is about a value has to know it.
+        Changed constraints of a single robot are expressed by values. They are added to the event before the
+        constraints, since the value of a constraint must exist.
         """
         before, after = self._before, self._after
         was, now = self._domains(before, self._dropped), self._domains(after, self._added)
         model = self._robots(was)
         event = model.after_solution()
-        self._say_values(model, event, was, now)
+        self._add_value_changes(model, event, was, now)
         for link in self._links:
             if not (self._by_values(link) and link in self._dropped):
                 add_constraint(model, link.rule, link.name, term_of(model, before, link.rule, link.robots), link.robots)
-        self._say(model, event)
+        self._add_other_changes(model, event)
         return model
 
     def _robots(self, domains: Domains) -> Model:
-        """Return a model of the first sketch's robots, which have these values and no constraints."""
+        """Return a model of the first sketch's robots with these values, without constraints."""
         before = self._before
         model = Model(before.name)
         for drawn in before.robots:
@@ -170,8 +170,8 @@ class _Difference:
             add_topic(before, robot)
         return model
 
-    def _say_values(self, model: Model, event: ModelEvent, was: Domains, now: Domains) -> None:
-        """Say which values go and come, of robots that stay."""
+    def _add_value_changes(self, model: Model, event: ModelEvent, was: Domains, now: Domains) -> None:
+        """Add the new and removed values of remaining robots to the event."""
         for (name, decision), values in now.items():
             if name in self._stay:
                 old, variable = was[name, decision], model.robots[name][decision]
@@ -180,15 +180,15 @@ class _Difference:
                 for value in (value for value in old if value not in values):
                     event.remove_value(variable, value)
 
-    def _say(self, model: Model, event: ModelEvent) -> None:
-        """Say which robots and constraints go and come."""
+    def _add_other_changes(self, model: Model, event: ModelEvent) -> None:
+        """Add the new and removed robots and constraints to the event."""
         for link in self._dropped:
-            if not self._stay.issuperset(link.robots):  # before it is restated for the robots that stay
+            if not self._stay.issuperset(link.robots):  # before it is restated for the remaining robots
                 event.remove_constraint(link.name)
         for name in self._leave:
             event.remove_robot(name)
         for link in self._dropped:
-            if self._stay.issuperset(link.robots) and not link.says_values:
+            if self._stay.issuperset(link.robots) and not link.restricts_values:
                 event.remove_constraint(link.name)
         for drawn in self._come:
             robot = event.robot(drawn.name, weight=drawn.weight)
@@ -200,10 +200,10 @@ class _Difference:
                 _add(event, model, link)
 
     def _by_values(self, link: RuleLink) -> bool:
-        return link.says_values and self._stay.issuperset(link.robots)
+        return link.restricts_values and self._stay.issuperset(link.robots)
 
     def _domains(self, sketch: Sketch, links: Sequence[RuleLink]) -> Domains:
-        """Return what the values are, without those that `links` forbid to robots that stay."""
+        """Return the values of a sketch, without those that `links` forbid to remaining robots."""
         found: Domains = {
             (name, decision.name): [*sketch.values(decision)]
             for decision in sketch.decisions
@@ -217,7 +217,7 @@ class _Difference:
 
 
 def links_of(sketch: Sketch) -> Iterator[RuleLink]:
-    """Yield all that the rules of a sketch say, link by link."""
+    """Yield the constraints of all active rules."""
     for rule in sketch.rules:
         if rule.on:
             for name, robots in applied(sketch, rule):
@@ -225,7 +225,7 @@ def links_of(sketch: Sketch) -> Iterator[RuleLink]:
 
 
 def _beyond(links: Collection[RuleLink], others: Collection[RuleLink]) -> Iterator[RuleLink]:
-    """Yield the links that `others` do not have, each as often as it is there more often."""
+    """Yield the links that are not in `others`; links that occur several times are counted."""
     there = Counter(link.meaning for link in others)
     for link in links:
         if there[link.meaning]:
@@ -235,7 +235,7 @@ def _beyond(links: Collection[RuleLink], others: Collection[RuleLink]) -> Iterat
 
 
 def _with_names(links: Iterator[RuleLink], taken: set[str]) -> Iterator[RuleLink]:
-    """Yield the links, each with a name that no other one has: events remove constraints by their names."""
+    """Yield the links with unique names, since events remove constraints by name."""
     for link in links:
         name, number = link.name, 2
         while name in taken:
@@ -245,9 +245,9 @@ def _with_names(links: Iterator[RuleLink], taken: set[str]) -> Iterator[RuleLink
 
 
 def _check_link(link: RuleLink) -> None:
-    """Raise `FromScratchError` if events can neither add nor remove what a rule says of these robots."""
+    """Raise `FromScratchError` if events cannot add or remove the constraint of a link."""
     alone = len(link.robots) == 1
-    if alone and not link.says_values:
+    if alone and not link.restricts_values:
         raise FromScratchError("whatif.anew-wish", robot=link.robots[0])
     if link.rule.private and not alone:
         raise FromScratchError("whatif.anew-private", rule=link.rule.id)
@@ -258,9 +258,9 @@ def _add(event: ModelEvent, model: Model, link: RuleLink) -> None:
     if not PALETTE[link.rule.kind].graded:
         event.add(term, cost=link.rule.cost, name=link.name)
         return
-    (robot,) = link.robots  # an event has no sum to minimise: each value has its price
+    (robot,) = link.robots  # an event has no sum to minimise: each value gets a constraint with its cost
     variable, decision = model.robots[robot][link.rule.decision], link.sketch.decision(link.rule.decision)
-    assert decision is not None  # noqa: S101 - the rule is about it
+    assert decision is not None  # noqa: S101 - an active rule has a decision
     for value in link.sketch.values(decision):
         price = cast("int", PALETTE[link.rule.kind].condition(Applied(link.sketch, link.rule), [value]))  # type: ignore[list-item] # a number counts as it does
         if price:
@@ -268,7 +268,7 @@ def _add(event: ModelEvent, model: Model, link: RuleLink) -> None:
 
 
 def _of(sketch: Sketch, robot: str) -> Iterator[Decision]:
-    """Yield what a robot decides."""
+    """Yield the decisions of a robot."""
     for decision in sketch.decisions:
         if robot in sketch.deciders(decision):
             yield decision

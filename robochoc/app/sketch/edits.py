@@ -18,10 +18,10 @@ from robochoc.system.errors import RobochocError
 
 
 def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
-    """Return the sketch on a map of that size.
+    """Return the sketch with a map of this size. Cells remain at their positions, so that their numbers change.
 
-    Robots that would be outside move to its edge. Decisions and rules forget the cells that are gone: a rule then
-    lacks what `checks` tells, and a decision that has no cell left takes all that are free.
+    Robots outside the new map move to its edge. Removed cells are dropped from decisions and rules: `checks` then
+    reports a missing setting of a rule, and a decision without remaining cells gets all free cells.
     """
     blocked = frozenset(cell for cell in sketch.area.blocked if cell.x < columns and cell.y < rows)
     area = Area(columns, rows, blocked)
@@ -41,17 +41,17 @@ def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
 
 
 class _ResizedMap:
-    """The cells of one map on another one."""
+    """Converts cells of a map to those of a map of another size."""
 
     def __init__(self, before: Area, after: Area) -> None:
         self._before, self._after = before, after
 
     def decision(self, decision: Decision) -> Decision:
-        """Return a decision about the same cells."""
+        """Return a decision with the numbers of its remaining cells on the new map."""
         return msgspec.structs.replace(decision, values=tuple(self._values(decision.values)))
 
     def rule(self, rule: SketchRule) -> SketchRule:
-        """Return a rule about the same cells."""
+        """Return a rule with the numbers of its remaining cells on the new map."""
         settings = dict(rule.settings)
         for opening in PALETTE[rule.kind].openings if rule.kind in PALETTE else ():
             if opening.form != Form.NUMBER and opening.name in settings:

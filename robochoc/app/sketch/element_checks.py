@@ -1,4 +1,4 @@
-"""Whether a sketch is one at all: names, sizes and numbers within bounds. Edits keep to them; files need not."""
+"""Checks of names, sizes and numbers of a sketch. Edits respect these bounds, but files may not."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
 from robochoc.formats.names import MAX_WEIGHT, RESERVED, is_name
 
 MAX_NUMBER = 1_000_000
-"""The largest number that is a value, and minus the smallest one."""
+"""The largest absolute value of a number as a decision's value."""
 
 _FURTHEST = 10**12
-"""No number of a sketch is further from zero, whatever is wrong with it: browsers know them exactly."""
+"""The largest absolute value of any number in a readable sketch; browsers represent such numbers exactly."""
 _LONGEST = 10_000
-"""No text is longer."""
+"""The maximum length of any text in a readable sketch."""
 
 
 def of_bounds(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield what makes a sketch larger than anything here is made for. The other checks are for what has none."""
+    """Yield exceeded bounds of a sketch. The other checks require a sketch within the bounds."""
     if not is_label(sketch.name):
         yield Trouble(About.TEAM, "team", "trouble.team-name", {"name": shortened(sketch.name)})
     area = sketch.area
@@ -42,12 +42,12 @@ def of_bounds(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def is_label(name: str) -> bool:
-    """Return whether `name` can be that of a team, a robot, a decision, or a rule."""
+    """Return whether `name` is a valid name of a team, a robot, a decision, or a rule."""
     return is_name(name) and name != RESERVED and len(name) <= limits.MAX_LABEL
 
 
 def of_names(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield names that cannot be, or that two have."""
+    """Yield invalid and duplicate names."""
     groups: tuple[tuple[About, list[str]], ...] = (
         (About.ROBOT, [robot.name for robot in sketch.robots]),
         (About.DECISION, [decision.name for decision in sketch.decisions]),
@@ -63,7 +63,7 @@ def of_names(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def _clashes(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield decisions that would be called like another one in the team: those of A.B by C, and of A by B.C."""
+    """Yield decisions with an ambiguous variable name: robot `A.B` with `C`, and robot `A` with `B.C`."""
     if not any("." in decision.name for decision in sketch.decisions):
         return
     known: set[str] = set()
@@ -75,7 +75,7 @@ def _clashes(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def of_robots(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield what is wrong with robots by themselves."""
+    """Yield the errors of robots."""
     if not sketch.robots:
         yield Trouble(About.MAP, "map", "trouble.no-robots")
     elif not sketch.decisions:
@@ -98,14 +98,14 @@ def of_robots(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def of_decisions(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield what is wrong with decisions by themselves: with their robots, and with their values."""
+    """Yield the errors of decisions: of their robots and values."""
     known = {robot.name for robot in sketch.robots}
     for decision in sketch.decisions:
         named: dict[str, str | int] = {"name": shortened(decision.name)}
         for key, found in (("unknown", strangers(decision.robots, known)), ("twice", repeated(decision.robots))):
             if found is not None:
-                told = named | {"robot": shortened(found)}
-                yield Trouble(About.DECISION, decision.name, f"trouble.decision-robot-{key}", told)
+                with_robot = named | {"robot": shortened(found)}
+                yield Trouble(About.DECISION, decision.name, f"trouble.decision-robot-{key}", with_robot)
         if not sketch.values(decision):
             key = "trouble.decision-no-cell" if decision.kind == DecisionKind.PLACE else "trouble.decision-empty"
             yield Trouble(About.DECISION, decision.name, key, named)
@@ -113,7 +113,7 @@ def of_decisions(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def _of_values(sketch: Sketch, decision: Decision) -> Iterator[Trouble]:
-    """Yield the first value of a decision that is wrong."""
+    """Yield the first invalid value of a decision, or else its first duplicate value."""
     named: dict[str, str | int] = {"name": shortened(decision.name)}
     for value in decision.values:
         key = _of_value(sketch, decision.kind, value)
@@ -122,8 +122,8 @@ def _of_values(sketch: Sketch, decision: Decision) -> Iterator[Trouble]:
             return
     twice = repeated(decision.values)
     if twice is not None:
-        told = named | {"value": shortened(twice)}
-        yield Trouble(About.DECISION, decision.name, "trouble.decision-value-twice", told)
+        with_value = named | {"value": shortened(twice)}
+        yield Trouble(About.DECISION, decision.name, "trouble.decision-value-twice", with_value)
 
 
 def _of_value(sketch: Sketch, kind: DecisionKind, value: int | str) -> str | None:
@@ -142,17 +142,17 @@ def _of_value(sketch: Sketch, kind: DecisionKind, value: int | str) -> str | Non
 
 
 def strangers(names: Iterable[str], known: set[str]) -> str | None:
-    """Return the first of `names` that is not known."""
+    """Return the first unknown name; None if all are known."""
     return next((name for name in names if name not in known), None)
 
 
 def repeated(items: Sequence[int | str]) -> int | str | None:
-    """Return the first of `items` that is there twice."""
+    """Return the first item that occurs more than once; None if there is none."""
     return next((item for item, count in Counter(items).items() if count > 1), None)
 
 
 def is_sound(sketch: Sketch) -> bool:
-    """Return whether a sketch that was read can be shown at all: no size, text or number in it is beyond all bounds."""
+    """Return whether a sketch from a file can be shown: its sizes, texts and numbers are within the widest bounds."""
     area = sketch.area
     sizes = (
         (len(sketch.robots), limits.MAX_ROBOTS),

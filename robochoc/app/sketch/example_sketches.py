@@ -1,4 +1,4 @@
-"""The sketches of the gallery: small teams that anybody can change. Their words are in `texts/en/examples.toml`."""
+"""The example sketches of the gallery. Their texts are in `texts/en/examples.toml`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ from robochoc.app.texts import say
 
 
 def examples() -> dict[str, Sketch]:
-    """Return the sketches by their keys, in the order of the gallery: those that fly first.
+    """Return the sketches with their stories by key, in the order of the gallery: those with a flight first.
 
-    Each has its story; `title_of` says its title, `shows` what can be learnt from it.
+    `title_of` returns the title of an example, and `shows` its topic.
     """
     return {key: example(key) for key in _MADE}
 
 
 def example(key: str) -> Sketch:
-    """Return one of them. Raises `KeyError` if there is none of that key."""
+    """Return an example. Raises `KeyError` for an unknown key."""
     return msgspec.structs.replace(_MADE[key](), name=key, story=say(f"example.{key}.story"))
 
 
@@ -29,12 +29,12 @@ def title_of(key: str) -> str:
 
 
 def shows(key: str) -> str:
-    """Return what an example shows, in a few words."""
+    """Return the topic of an example, in a few words."""
     return say(f"example.{key}.shows")
 
 
 class _RuleList:
-    """Rules as they are added, each with the next free name."""
+    """A growing list of rules, which are numbered."""
 
     def __init__(self) -> None:
         self.all: tuple[SketchRule, ...] = ()
@@ -48,7 +48,7 @@ class _RuleList:
         private: bool = False,
         **settings: Setting,
     ) -> _RuleList:
-        """Add a rule, and return these."""
+        """Add a rule; return this object, for further calls."""
         made = SketchRule(f"R{len(self.all) + 1}", kind, decision, robots, settings, cost, private)
         self.all = (*self.all, made)
         return self
@@ -73,7 +73,7 @@ def _charging() -> Sketch:
 
 
 def _cube() -> Sketch:
-    """Return a cube of 4: nobody meets another one in a row, in a column or on a long diagonal."""
+    """Return 4 x 4 robots with 4 levels: in rows, columns and long diagonals, all levels are different."""
     side = range(4)
     robots = tuple(SketchRobot(f"D{x + 1}{y + 1}", Cell(x, y)) for y in side for x in side)
     lines = [

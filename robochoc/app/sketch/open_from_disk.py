@@ -24,36 +24,37 @@ from robochoc.model.problem import Team
 from robochoc.system.temporary_files import PrivateFolder
 
 MOST_LISTED = 2 << 20
-"""Bytes of the list of an archive's files: enough for ten thousand of them."""
+"""The maximum size of an archive's list of files: enough for ten thousand files. Python reads the list at once."""
 
 
 class BoundedFile(io.FileIO):
-    """A file of which no more is read at once than `most`.
+    """A file with a limit for each read.
 
     Attributes:
-        most: As many bytes; None: as many as there are.
+        most: The maximum number of bytes of a read. None: no limit.
     """
 
     most: int | None = MOST_LISTED
 
     def read(self, size: int | None = -1) -> bytes:
-        """Read. Raises `ValueError` if it would be too much."""
+        """Read from the file. Raises `ValueError` if more than `most` bytes would be read."""
         if self.most is not None:
             here = self.tell()
             rest = self.seek(0, io.SEEK_END) - here
             self.seek(here)
             if (rest if size is None or size < 0 else min(size, rest)) > self.most:
-                raise ValueError("it lists too many files")
+                raise ValueError(f"its list of files has more than {self.most:,} bytes")
         return super().read(-1 if size is None else size)
 
 
 @contextmanager
 def bounded_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an archive to be read.
+    """Open an untrusted ZIP archive for reading.
 
     Raises:
-        ValueError: if it lists too many files; and what `zipfile.ZipFile` raises.
+        ValueError: if its list of files is too long.
         OSError: if it cannot be read.
+        zipfile.BadZipFile: if it is damaged; and other exceptions of `zipfile.ZipFile`.
     """
     with BoundedFile(path) as file, zipfile.ZipFile(file) as archive:
         file.most = None

@@ -1,6 +1,7 @@
-"""A sketch as a Python program: what somebody would write who knows `robochoc.Model`.
+"""A sketch as a readable Python program that uses `robochoc.Model`.
 
-It makes the same team as `building.model_of`. Nothing that a user has named can leave its quotes.
+The program builds the same team as `building.model_of`. Names given by users are always quoted, so that they cannot
+become code.
 """
 
 from __future__ import annotations
@@ -17,21 +18,21 @@ from robochoc.app.sketch.sentences import sentence
 from robochoc.app.sketch.sketch import Decision, DecisionKind, Sketch, SketchRule
 
 _WIDE = 110
-"""Characters of a line beyond which a list is broken."""
+"""The maximum length of a line; longer lists are split."""
 _A, _B = PythonText("a"), PythonText("b")
 
 
 def python_source(sketch: Sketch) -> str:
-    """Return a program that makes the same model, and solves it. The sketch has no errors (`checks.troubles`)."""
+    """Return a program that builds and solves the model of a sketch without errors (`checks.troubles`)."""
     body = [*_lines(sketch)]
     imports = ["import itertools", ""] if any("in itertools." in line for line in body) else []
     return "\n".join([*imports, "import robochoc", "", *body]) + "\n"
 
 
 def names_in_python(sketch: Sketch) -> dict[str, str]:
-    """Return the names of the dictionaries that have the variables of decisions. No two are the same.
+    """Return the names of the dictionaries with the variables of decisions.
 
-    None is a word that Python, or the program, has.
+    The names are unique, and differ from keywords of Python and from other names in the program.
     """
     found: dict[str, str] = {}
     for decision in sketch.decisions:
@@ -81,7 +82,7 @@ def _robots(sketch: Sketch) -> Iterator[str]:
 
 
 def _broken(before: str, parts: Sequence[object], after: str) -> Iterator[str]:
-    """Yield a list in one line, or in several where it would be too long."""
+    """Yield a list in one line, or in several lines if it is too long."""
     texts = [python_literal(part) for part in parts]
     line = f"{before}[{', '.join(texts)}]{after}"
     if len(line) <= _WIDE:
@@ -118,7 +119,7 @@ def _decision(sketch: Sketch, decision: Decision, dictionary: str) -> Iterator[s
 
 
 def _waypoints(sketch: Sketch, names: dict[str, str]) -> Iterator[str]:
-    """Yield where decisions send robots, in a loop over those that decide the same."""
+    """Yield the waypoints of robots, in a loop over the robots with the same decisions."""
     groups: dict[tuple[str | None, str | None], list[str]] = {}
     for robot in sketch.robots:
         own: dict[DecisionKind, str] = {}
@@ -142,7 +143,7 @@ def _waypoints(sketch: Sketch, names: dict[str, str]) -> Iterator[str]:
 
 
 class _Loop(NamedTuple):
-    """A loop over the links of a rule: its first line around a list, the list, and the robots in a link."""
+    """A loop over the links of a rule: the text before and after a list, the list, and the robots of a link."""
 
     before: str
     names: Sequence[object]
@@ -190,7 +191,7 @@ def _loop(links: Links, bound: tuple[str, ...], pairs: list[tuple[str, ...]]) ->
 
 def _decision_of(sketch: Sketch, rule: SketchRule) -> Decision:
     decision = sketch.decision(rule.decision)
-    assert decision is not None, "checks refuse a rule without its decision"  # noqa: S101
+    assert decision is not None, "the checks reject a rule without a decision"  # noqa: S101
     return decision
 
 
@@ -210,7 +211,7 @@ def _statements(
     robots: Sequence[str | PythonText],
     name: list[str | PythonText],
 ) -> Iterator[str]:
-    """Yield what adds a rule for one link: for the first of its robots, where it is private."""
+    """Yield the statement that adds a rule for one link; a private rule is added to the link's first robot."""
     entry = PALETTE[rule.kind]
     term = entry.condition(Applied(sketch, rule), terms)
     cost = "" if rule.cost is None else f", cost={rule.cost}"

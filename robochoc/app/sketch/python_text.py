@@ -1,7 +1,7 @@
-"""Python that is written by doing: operators over `PythonText` expressions return the text of what they would compute.
+"""Python expressions as text: an operator applied to `PythonText` objects returns the text of the operation.
 
-A rule of the palette is said once. Over the variables of a model it makes a constraint; over expressions of Python it
-writes the line that makes the same one.
+So a rule of the palette is defined once: applied to the variables of a model it returns a constraint, and applied to
+`PythonText` it returns the line of Python that defines this constraint.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ from enum import IntEnum
 from typing import Protocol, Self
 
 _PLAIN = re.compile(r"[A-Za-z0-9_. -]*")
-"""Texts in which nothing needs to be escaped."""
+"""Matches texts without characters that must be escaped."""
 
 
 class Operand(Protocol):
-    """What rules are said over: a term of a model, or a written expression."""
+    """An operand of a rule: a term of a model, or Python text."""
 
     def __add__(self, other: object, /) -> Operand: ...
     def __sub__(self, other: object, /) -> Operand: ...
@@ -30,11 +30,11 @@ class Operand(Protocol):
     def __ge__(self, other: object, /) -> Operand: ...
     def __and__(self, other: object, /) -> Operand: ...
     def is_in(self, values: Iterable[object], /) -> Operand:
-        """Return that this has one of `values`."""
+        """Return the condition that this is one of `values`."""
 
 
 class Binding(IntEnum):
-    """How tightly Python binds, from loose to tight."""
+    """The precedence of an expression in Python, lowest first."""
 
     COMPARISON = 1
     AND = 2
@@ -44,7 +44,7 @@ class Binding(IntEnum):
 
 
 class PythonText:
-    """An expression of Python."""
+    """A Python expression as text."""
 
     def __init__(self, text: str, binding: Binding = Binding.ATOM) -> None:
         self.text, self.binding = text, binding
@@ -95,27 +95,27 @@ class PythonText:
         return hash(self.text)
 
     def is_in(self, values: Iterable[object]) -> PythonText:
-        """Write that this has one of `values`."""
+        """Return the text of the condition that this is one of `values`."""
         return PythonText(f"{self.within(Binding.ATOM)}.is_in({python_literal([*values])})")
 
     @classmethod
     def call(cls, function: str, *arguments: object) -> Self:
-        """Write the call of a function."""
+        """Return the text of a function call."""
         return cls(f"{function}({', '.join(map(python_literal, arguments))})")
 
     def _with(self, operator: str, other: object, binding: Binding) -> PythonText:
         right = other if isinstance(other, PythonText) else PythonText(python_literal(other))
         tighter = Binding(min(binding + 1, Binding.ATOM))
-        left = binding if binding is not Binding.COMPARISON else tighter  # comparisons are no chains
+        left = binding if binding is not Binding.COMPARISON else tighter  # not a chained comparison
         return PythonText(f"{self.within(left)}{operator}{right.within(tighter)}", binding)
 
     def within(self, least: Binding) -> str:
-        """Return the text for where `least` binds: in parentheses if it binds more loosely."""
+        """Return the text for use in an operation of precedence `least`, in parentheses if necessary."""
         return self.text if self.binding >= least else f"({self.text})"
 
 
 class Each(PythonText):
-    """An expression that is there once for each `a` in `over`."""
+    """An expression that is evaluated for each `a` in `over`."""
 
     def __init__(self, text: str, over: str) -> None:
         super().__init__(text)
@@ -123,7 +123,7 @@ class Each(PythonText):
 
 
 def text_with(parts: Sequence[str | PythonText], between: str = ".") -> str:
-    """Write a text of several parts, of which some are written expressions."""
+    """Return a string literal of several parts; an f-string if some parts are expressions."""
     if not any(isinstance(part, PythonText) for part in parts):
         return python_literal(between.join(map(str, parts)))
     literal = [part for part in parts if isinstance(part, str)]
@@ -135,7 +135,7 @@ def text_with(parts: Sequence[str | PythonText], between: str = ".") -> str:
 
 
 def python_literal(value: object) -> str:
-    """Return a value, or values, as Python. Whatever a text holds, it stays one: no quote in it ends it."""
+    """Return a value, or a list of values, as a Python literal. Quotes in texts are escaped."""
     match value:
         case PythonText():
             return value.text

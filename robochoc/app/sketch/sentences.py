@@ -1,4 +1,4 @@
-"""What is in a sketch, in plain words: rules as sentences that name their robots, values, and what rules cost."""
+"""Rules, values and costs of a sketch in plain words."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from robochoc.app.sketch.sketch import Decision, DecisionKind, Setting, Sketch, 
 from robochoc.app.texts import say
 
 MOST_NAMED = 4
-"""Robots, or values, that a sentence names; of more it tells how many others there are."""
+"""The maximum number of listed robots, or values, in a sentence; others are counted."""
 _OPEN = "…"
-"""Stands in a sentence where something is not filled in yet."""
+"""The text for a missing setting of a rule."""
 
 
 def sentence(sketch: Sketch, rule: SketchRule) -> str:
-    """Return what a rule says, with its robots named: such as "North and South are at least 2 apart in level.".
+    """Return a rule as a sentence with its robots, such as "North and South are at least 2 apart in level.".
 
-    What is not filled in yet, or points to nothing, is left open.
+    Missing and invalid settings are shown as `…`.
     """
     if rule.kind not in PALETTE:
         return say("rule-words.unknown", kind=rule.kind)
@@ -26,12 +26,12 @@ def sentence(sketch: Sketch, rule: SketchRule) -> str:
 
 
 def short(sketch: Sketch, rule: SketchRule) -> str:
-    """Return the few words of a rule that stand at its links in the picture."""
+    """Return the short text of a rule for its links in the picture."""
     return say(f"rule.{rule.kind}.short", **_named(sketch, rule)) if rule.kind in PALETTE else rule.kind
 
 
 def weight_of(rule: SketchRule) -> str:
-    """Return what a rule counts: that it must hold or what breaking it costs, who knows of it, whether it is on."""
+    """Return the importance of a rule in words: hard, or its cost; private or not; inactive."""
     entry = PALETTE.get(rule.kind)
     parts = [] if entry and entry.graded else [_must_or_cost(rule)]
     if rule.private:
@@ -45,12 +45,12 @@ def _must_or_cost(rule: SketchRule) -> str:
 
 
 def robot_words(sketch: Sketch, rule: SketchRule) -> str:
-    """Return whom a rule binds: their names, or that it is everybody."""
+    """Return the robots of a rule in words: their names, or all robots."""
     return _everybody(sketch, rule, [*sketch.bound(rule)])
 
 
 def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
-    """Return a value in words: a cell of the map by its column and row, from 1; all others as they are."""
+    """Return a value in words: a cell of the map as column and row, from 1; other values are unchanged."""
     if decision.kind == DecisionKind.PLACE and isinstance(value, int):
         cell = sketch.area.cell(value)
         return say("value.place", column=cell.x + 1, row=cell.y + 1)
@@ -58,7 +58,7 @@ def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
 
 
 def value_in_short(sketch: Sketch, decision: Decision, value: int | str) -> str:
-    """Return a value as it stands in pictures: a cell of the map as its column and row, from 1."""
+    """Return a value for pictures: a cell of the map as column and row, from 1; other values are unchanged."""
     if decision.kind == DecisionKind.PLACE and isinstance(value, int):
         cell = sketch.area.cell(value)
         return f"({cell.x + 1}, {cell.y + 1})"
@@ -66,7 +66,7 @@ def value_in_short(sketch: Sketch, decision: Decision, value: int | str) -> str:
 
 
 def listed(names: Sequence[str], most: int = MOST_NAMED) -> str:
-    """Return names as in a sentence: "A", "A and B", "A, B and C", "A, B, C and 5 others"."""
+    """Return names as a list in a sentence: "A", "A and B", "A, B and C", "A, B, C and 5 others"."""
     if not names:
         return say("list.none")
     if len(names) > most:
@@ -101,7 +101,7 @@ def _everybody(sketch: Sketch, rule: SketchRule, bound: list[str]) -> str:
 
 
 def _filled(sketch: Sketch, decision: Decision | None, opening: RuleField, given: Setting | None) -> str:
-    """Return what fills an opening, in words."""
+    """Return the value of a field, in words."""
     match opening.form, given:
         case Form.NUMBER, int():
             return str(given)

@@ -1,6 +1,6 @@
-"""What may happen to a team: a robot fails, a cell is blocked, a battery runs low, somebody comes.
+"""Changes of a team during a mission: a robot fails, a cell is blocked, a battery is low, a robot joins.
 
-Each change takes a sketch to another one, and has its words.
+Each change converts a sketch to another one, and has a sentence that describes it.
 """
 
 from __future__ import annotations
@@ -15,45 +15,45 @@ from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, Ske
 from robochoc.app.texts import say
 
 LEAST_BATTERY = 20
-"""A robot with less per cent of its battery leaves."""
+"""A robot with a lower charge, in per cent, leaves the team."""
 FULL = 100
 
 
 class TeamChange(msgspec.Struct, frozen=True, tag=True):
-    """Something that happens to a team."""
+    """A change of a team."""
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team after it. Raises `EditError` if it cannot happen."""
+        """Return the team after the change. Raises `EditError` if the change is not possible."""
         raise NotImplementedError
 
     def words(self, sketch: Sketch) -> str:
-        """Return what happens to this team, in a sentence."""
+        """Return a sentence that describes the change of this team."""
         raise NotImplementedError
 
 
 class RobotFails(TeamChange, frozen=True, tag="Fails"):
-    """A robot fails: it leaves."""
+    """A robot fails and leaves the team."""
 
     robot: str
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team without it."""
+        """Return the team without the robot."""
         _check_there(sketch, self.robot)
         return edits.without_robot(sketch, self.robot)
 
     def words(self, sketch: Sketch) -> str:
-        """Return that it fails."""
+        """Return the sentence."""
         del sketch
         return say("whatif.fails", robot=self.robot)
 
 
 class CellBlocked(TeamChange, frozen=True, tag="Blocked"):
-    """A cell of the map is blocked: nobody can decide to be there."""
+    """A cell of the map is blocked: robots cannot choose it any more."""
 
     cell: Cell
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team with that cell blocked, also where places are listed. Raises `EditError` if none is left."""
+        """Block the cell, and remove it from listed places. Raises `EditError` if it is the last place."""
         number = sketch.area.number(self.cell)
         sketch = edits.with_cell_blocked(sketch, self.cell, blocked=True)
         if any(one.kind == DecisionKind.PLACE and one.values == (number,) for one in sketch.decisions):
@@ -67,20 +67,20 @@ class CellBlocked(TeamChange, frozen=True, tag="Blocked"):
         return msgspec.structs.replace(sketch, decisions=decisions)
 
     def words(self, sketch: Sketch) -> str:
-        """Return which cell it is, and that it changes nothing where nobody decides a place."""
+        """Return the cell; if no robot decides a place, say that the change has no effect."""
         matters = any(one.kind == DecisionKind.PLACE for one in sketch.decisions)
         key = "whatif.blocked" if matters else "whatif.blocked-in-vain"
         return say(key, column=self.cell.x + 1, row=self.cell.y + 1)
 
 
 class LowBattery(TeamChange, frozen=True, tag="Battery"):
-    """A robot's battery is down to so many per cent: it reaches so much of the highest level, or leaves."""
+    """A robot's battery is low: it reaches only this percentage of the highest level, or leaves the team."""
 
     robot: str
     percent: int
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team with the levels that the robot still reaches, or without the robot."""
+        """Return the team with only the levels that the robot still reaches, or without the robot."""
         _check_there(sketch, self.robot)
         if self.percent < LEAST_BATTERY:
             return edits.without_robot(sketch, self.robot)
@@ -94,7 +94,7 @@ class LowBattery(TeamChange, frozen=True, tag="Battery"):
         return sketch
 
     def words(self, sketch: Sketch) -> str:
-        """Return what the battery still allows."""
+        """Return the effect of the low battery."""
         named = {"robot": self.robot, "percent": self.percent}
         levels = _levels(sketch, self.robot)
         reached = [_reached(sketch, decision, self.percent) for decision in levels]
@@ -110,15 +110,15 @@ class LowBattery(TeamChange, frozen=True, tag="Battery"):
 
 
 class RobotJoins(TeamChange, frozen=True, tag="Joins"):
-    """A robot comes: it decides what all decide, and follows the rules of all."""
+    """A robot joins the team, with the decisions and rules of all robots."""
 
     cell: Cell
     name: str | None = None
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team with it. Where nothing is decided by all, it takes part in every decision.
+        """Return the team with the robot. If no decision is for all robots, the robot has every decision.
 
-        Raises `EditError` if the cell is blocked, or taken.
+        Raises `EditError` if the cell is blocked.
         """
         if self.cell in sketch.area.blocked:
             raise EditError("whatif.blocked-cell", "map")
@@ -132,7 +132,7 @@ class RobotJoins(TeamChange, frozen=True, tag="Joins"):
         return msgspec.structs.replace(sketch, decisions=decisions)
 
     def words(self, sketch: Sketch) -> str:
-        """Return who comes, and where."""
+        """Return the robot's name and cell."""
         name = self.name or edits.with_robot(sketch, self.cell).robots[-1].name
         return say("whatif.joins", robot=name, column=self.cell.x + 1, row=self.cell.y + 1)
 
@@ -141,14 +141,14 @@ AnyTeamChange = RobotFails | CellBlocked | LowBattery | RobotJoins
 
 
 def changed(sketch: Sketch, changes: Sequence[TeamChange]) -> Sketch:
-    """Return the team after these changes, one after the other. Raises `EditError` if one cannot happen."""
+    """Return the team after these changes in order. Raises `EditError` if a change is not possible."""
     for change in changes:
         sketch = change.after(sketch)
     return sketch
 
 
 def sentences_of(sketch: Sketch, changes: Sequence[TeamChange]) -> list[str]:
-    """Return the words of each change. Raises `EditError` if one cannot happen."""
+    """Return the sentence of each change. Raises `EditError` if a change is not possible."""
     found = []
     for change in changes:
         found.append(change.words(sketch))
@@ -162,11 +162,11 @@ def _check_there(sketch: Sketch, robot: str) -> None:
 
 
 def _levels(sketch: Sketch, robot: str) -> list[Decision]:
-    """Return the robot's decisions about levels."""
+    """Return the robot's decisions on levels."""
     return [one for one in sketch.decisions if one.kind == DecisionKind.LEVEL and robot in sketch.deciders(one)]
 
 
 def _reached(sketch: Sketch, decision: Decision, percent: int) -> list[int]:
-    """Return the levels up to that share of the highest one."""
+    """Return the levels up to this percentage of the highest level."""
     levels = sorted(value for value in sketch.values(decision) if isinstance(value, int))
     return [level for level in levels if level * FULL <= levels[-1] * percent]

@@ -1,6 +1,6 @@
-"""A sketch as a small picture: its map, its robots, and whom its rules link. An SVG without scripts or styles.
+"""A small picture of a sketch: the map, the robots, and the links of rules. An SVG without scripts or styles.
 
-It takes the colours of the page that it stands in (`--paper` and the like), and has its own where there is no page.
+The picture uses the colours of its page (`--paper` and others), and has default colours for use without a page.
 """
 
 from __future__ import annotations
@@ -18,26 +18,26 @@ from robochoc.app.texts import say
 
 WIDTH, HEIGHT = 320, 200
 MAX_LINES = 150
-"""Links that are drawn. With more, nobody sees them apart."""
+"""The maximum number of drawn links, for readability."""
 MAX_DRAWN = 400
-"""Robots that are drawn; of larger teams, the first ones."""
+"""The maximum number of drawn robots; of a larger team, the first ones are drawn."""
 _NAMED_ELSEWHERE = "trouble.team-name"
-"""Files of others have names that no sketch can be given: they are only told."""
+"""The name of an imported team may not be valid for a sketch; the team is drawn nevertheless."""
 _MARGIN = 14
 _FEW = 8
-"""Up to so many robots have their names beside them."""
+"""The maximum number of robots for which names are drawn."""
 _INK, _ACCENT, _PAPER = "var(--ink, #17202b)", "var(--accent, #1f5fbf)", "var(--paper, #ffffff)"
 
 
 def thumbnail(sketch: Sketch, links: Iterable[tuple[str, str]] = ()) -> str:
-    """Return the picture. All that users have named is escaped in it.
+    """Return the picture. Names given by users are escaped.
 
     Args:
         sketch: The sketch.
-        links: Pairs of robots that are linked by more than its rules.
+        links: Further pairs of linked robots.
     """
     if any(one.key != _NAMED_ELSEWHERE for one in of_bounds(sketch)):
-        sketch = Sketch()  # the picture of nothing
+        sketch = Sketch()  # an empty map
     scale = min((WIDTH - 2 * _MARGIN) / sketch.area.columns, (HEIGHT - 2 * _MARGIN) / sketch.area.rows)
     drawn = _Thumbnail(sketch, scale)
     label = say("picture.label", name=sketch.name, robots=listed([robot.name for robot in sketch.robots]))
@@ -49,12 +49,12 @@ def thumbnail(sketch: Sketch, links: Iterable[tuple[str, str]] = ()) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a text without what no XML file can hold."""
+    """Return a text with spaces in place of characters that are not allowed in XML."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
 class _Thumbnail:
-    """The parts of a picture, with cells of a size."""
+    """The parts of a picture. `scale`: the size of a cell."""
 
     def __init__(self, sketch: Sketch, scale: float) -> None:
         self._sketch, self._scale = sketch, scale
@@ -69,7 +69,7 @@ class _Thumbnail:
         return x + self._scale / 2, y + self._scale / 2
 
     def cells(self) -> Iterator[str]:
-        """Yield the map: its lines, and what is blocked."""
+        """Yield the map: its grid, and the blocked cells."""
         area, size = self._sketch.area, self._scale
         x, y = self._corner(Cell(0, area.rows - 1))
         path = "".join(f"M{x + size * column:.1f} {y:.1f}v{size * area.rows:.1f}" for column in range(area.columns + 1))
@@ -84,7 +84,7 @@ class _Thumbnail:
             yield f'<path d="{blocked}" fill="{_INK}" fill-opacity="0.3"/>'
 
     def links(self, more: Iterable[tuple[str, str]]) -> Iterator[str]:
-        """Yield the lines between robots that rules link, or that are linked besides, each pair once."""
+        """Yield the lines between robots that are linked by rules, or in `more`; each pair once."""
         standing = {robot.name: robot.at for robot in self._sketch.robots if self._sketch.area.has(robot.at)}
         pairs: dict[tuple[str, str], None] = {}
         pairs |= dict.fromkeys(pair for pair in more if standing.keys() >= {*pair})
@@ -105,7 +105,7 @@ class _Thumbnail:
             yield f'<path d="{path}" fill="none" stroke="{_ACCENT}" stroke-opacity="0.35" stroke-width="1.5"/>'
 
     def robots(self) -> Iterator[str]:
-        """Yield the robots, with their names if they are few."""
+        """Yield the robots, with their names if there are few robots."""
         robots = [robot for robot in self._sketch.robots if self._sketch.area.has(robot.at)][:MAX_DRAWN]
         radius = max(1.5, min(9.0, self._scale * 0.3))
         for robot in robots:

@@ -33,13 +33,13 @@ def test_a_server_that_was_killed_and_begun_again_has_all_that_was_saved(browser
         _renamed(old.page, teams, team, "kept")
         assert first.end(signal.SIGKILL) == -signal.SIGKILL
         old.page.wait_for_selector(AWAY, state="attached")
-        assert "start it again and open the address that it says" in old.page.evaluate(SAYS)
+        assert "start it again and open the address that it prints" in old.page.evaluate(SAYS)
         second = AppServer(teams.folder, first.port)
         try:
             connected(new.page, f"{second.url}team/{team}/model")
             assert new.page.input_value(NAME) == "kept"
             new.page.goto(f"{first.url}team/{team}/model")  # the address of before
-            assert "Each start of robochoc app has an address of its own" in new.page.inner_text("body")
+            assert "Each start of robochoc app has a new address" in new.page.inner_text("body")
         finally:
             assert second.end() == 0
 

@@ -65,7 +65,7 @@ def test_a_short_conversation_is_played_slowly_and_in_steps(
         tab.page.focus(".talk .q-slider [tabindex='0']")
         tab.page.keyboard.press("ArrowLeft")
         _at(tab, 36)
-        tab.page.click("[aria-label='One step on']")
+        tab.page.click("[aria-label='One step forward']")
         _at(tab, 37)
         tab.page.click("[aria-label='Play']")
         _at(tab, 38)
@@ -88,7 +88,7 @@ def test_a_long_search_is_watched_and_stopped(browser: Browser, application: App
         tab.page.wait_for_selector(".team-picture .said", state="attached")
         tab.page.wait_for_selector(".said-list li:has-text('the best solution so far costs 105')")
         tab.page.click(f"{GO}:has-text('Stop')")
-        _told(tab, "It was stopped; this is the best so far. It costs 105.")
+        _told(tab, "The search was stopped; this is the best answer so far. It costs 105.")
 
 
 def test_a_double_click_begins_once(browser: Browser, application: AppServer, teams: TeamStore) -> None:
@@ -98,7 +98,7 @@ def test_a_double_click_begins_once(browser: Browser, application: AppServer, te
         tab.page.dblclick(GO)
         tab.page.wait_for_selector(".facts:has-text('The best so far costs 105')")
         tab.page.click(f"{GO}:has-text('Stop')")
-        _told(tab, "It was stopped; this is the best so far. It costs 105.")
+        _told(tab, "The search was stopped; this is the best answer so far. It costs 105.")
         assert len(Runs(_Team(slots(14, 14), teams.path(team))).all()) == 1
 
 
@@ -108,11 +108,11 @@ def test_rules_that_are_in_the_way_are_clicked_away(browser: Browser, applicatio
         _opened(tab, application, team)
         tab.page.click(GO)
         _told(tab, "There is no solution")
-        tab.page.click("text=Which rules are in each other")
+        tab.page.click("text=Which rules are in conflict")
         tab.page.wait_for_selector("text=This rule alone cannot hold")
         tab.page.wait_for_selector(".found .trouble >> text=there are 2 values: somebody has to step aside")
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
-        tab.page.click("button:has-text('Let it cost')")
+        tab.page.click("button:has-text('Give it a cost')")
         _told(tab, "All 3 decide. It costs 14: proven the best.")
         tab.page.click("[aria-label^='Undo']")
         tab.page.wait_for_selector("text=The team has changed since then")

@@ -111,10 +111,10 @@ def test_who_decides_no_place_does_not_fly_and_is_told_why(
     with app_page(
         browser, f"{application.url}team/{team.id}/fly", {"width": 360, "height": 800}, color_scheme="dark"
     ) as tab:
-        tab.page.wait_for_selector("text=Nobody flies: this team decides neither heights nor places.")
+        tab.page.wait_for_selector("text=No robot flies: this team decides neither levels nor places.")
         tab.page.wait_for_selector(READY)
         assert tab.page.locator(".stage-parts span").all_inner_texts() == ["They talk"]
-        assert tab.page.locator("text=Nobody flies, so there is nothing to record.").count() == 1
+        assert tab.page.locator("text=No robot flies, so there is nothing to record.").count() == 1
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         tab.page.click("text=Go to Model")
         tab.page.wait_for_url("**/model")
@@ -127,7 +127,7 @@ def test_where_nobody_says_a_word_no_page_is_waited_for(
     team, _ = decided(teams, msgspec.structs.replace(cube(1, "Alone", DecisionKind.SLOT), rules=(never,)))
     with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         tab.page.wait_for_selector(READY)
-        assert tab.page.locator("text=The pages are being read.").count() == 0
+        assert tab.page.locator("text=Loading the pages.").count() == 0
 
 
 def test_a_flight_that_is_looked_at_stays_where_it_is_as_the_conversation_comes(
@@ -196,7 +196,7 @@ def test_the_state_is_opened_from_the_gallery(
     state = tmp_path / "Moved.robochoc.zip"
     with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         with tab.page.expect_download() as saved:
-            tab.page.click("[aria-label='All of it: Save']")
+            tab.page.click("[aria-label='Team and run: Save']")
         assert saved.value.suggested_filename == state.name
         saved.value.save_as(state)
         connected(tab.page, application.url)

@@ -67,7 +67,7 @@ def test_files_of_another_tool_are_opened_as_what_they_are(
         tab.page.wait_for_selector("text=This team was not drawn here")
         assert f"robochoc solve {teams.import_folder(name)}" in tab.page.inner_text(".command-text")
         assert "graph.yaml" in tab.page.inner_text("main")
-        tab.page.wait_for_selector("text=What it keeps to")
+        tab.page.wait_for_selector("text=Its constraints")
     foreign = teams.import_folder(name)
     assert foreign is not None
     assert [robot.name for robot in teams.load(name).now.robots] == sorted(one.stem for one in foreign.glob("*.xml"))

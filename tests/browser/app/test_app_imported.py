@@ -45,12 +45,12 @@ def test_a_team_with_a_scenario_is_read_decided_and_asked_what_if(
         assert tab.page.locator(".imported-table li").count() == 5
         _shown(tab, application, team, "whatif")
         tab.page.click("button:has-text('Let the others decide again')")
-        tab.page.wait_for_selector("text=Choose who fails first.")
+        tab.page.wait_for_selector("text=First choose the robots that fail.")
         tab.page.fill(".imported-who input", "Medic")
         tab.page.click(".q-item:has-text('Medic')")
         tab.page.keyboard.press("Escape")
         tab.page.click("button:has-text('Let the others decide again')")
-        tab.page.wait_for_selector("text=Who failed: Medic.")
+        tab.page.wait_for_selector("text=Failed: Medic.")
         assert "fly?run=" in (tab.page.get_attribute("a:has-text('Watch the flight')", "href") or "")
 
 
@@ -79,7 +79,7 @@ def test_what_was_changed_by_hand_is_named(
     team = _kept(teams, folder)
     with watched_page(browser, viewport={"width": 360, "height": 700}) as tab:
         _shown(tab, application, team, "model")
-        tab.page.wait_for_selector(f"text=these files were changed by hand since: {file.name}.")
+        tab.page.wait_for_selector(f"text=these files were changed later: {file.name}.")
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
 
 

@@ -76,9 +76,9 @@ def test_what_can_be_no_name_is_told_where_it_was_typed(
     with app_page(browser, f"{application.url}team/{team}/model") as tab:
         for name in (" ", "<script>alert(1)</script>", "a b", "{{7*7}}", "scenario", "ä", "1st"):
             tab.page.fill(NAME, name)
-            tab.page.wait_for_selector("text=cannot be a name")
+            tab.page.wait_for_selector("text=is not a valid name")
             tab.page.fill(NAME, "first")
-            tab.page.wait_for_selector("text=cannot be a name", state="detached")
+            tab.page.wait_for_selector("text=is not a valid name", state="detached")
     assert teams.load(team).now.name == "first"
 
 

@@ -27,7 +27,7 @@ def test_two_protocols_are_compared(browser: Browser, application: AppServer, te
         page.locator(f".protocol:has-text('{chosen[0]}')").first.press("Space")
         page.focus("button:has-text('Compare')")
         page.keyboard.press("Enter")
-        page.wait_for_selector("[role=alert]:has-text('two protocols at least')")
+        page.wait_for_selector("[role=alert]:has-text('at least two protocols')")
         page.locator(f".protocol:has-text('{chosen[0]}')").first.press("Space")
         page.fill("input[aria-label='Runs of each']", "3")
         page.click("button:has-text('Compare')")
@@ -45,11 +45,11 @@ def test_a_study_is_stopped(browser: Browser, application: AppServer, teams: Tea
     team = teams.add(TEAM)
     with watched_page(browser) as tab:
         _asked(tab.page, application, team)
-        tab.page.click("text=A family like it")
+        tab.page.click("text=Similar problems")
         tab.page.fill("input[aria-label='Runs of each']", "100")
         tab.page.click("button:has-text('Compare')")
         tab.page.click("button:has-text('Stop')")
-        tab.page.wait_for_selector("text=It was stopped")
+        tab.page.wait_for_selector("text=The study was stopped")
         tab.page.wait_for_selector("button:has-text('Compare again'):not([disabled])")
 
 
@@ -57,6 +57,6 @@ def test_what_has_to_be_mended_first_is_told(browser: Browser, application: AppS
     nowhere = SketchRule("R1", "prefers", "slot", settings={})
     team = teams.add(Sketch("team", Area(4, 1), ROBOTS, (SLOT,), (nowhere,)))
     with app_page(browser, f"{application.url}team/{team}/compare") as tab:
-        tab.page.wait_for_selector(".error:has-text('Nothing can be compared here yet: Something does not fit in R1')")
+        tab.page.wait_for_selector(".error:has-text('This team cannot be compared yet: A value in R1')")
         tab.page.click("text=Go to Model")
         tab.page.wait_for_url("**/model")

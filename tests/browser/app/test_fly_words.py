@@ -37,7 +37,7 @@ def test_there_is_one_line_of_time_and_the_flight_begins_on_the_map(
     with app_page(browser, f"{application.url}team/{team.id}/fly") as tab:
         page = tab.page
         page.wait_for_selector(READY)
-        page.wait_for_selector("text=All 2 robots fly to where they decided to be.")
+        page.wait_for_selector("text=All 2 robots fly to their targets.")
         scene, talk = page.frames[1], page.frames[2]
         assert [scene.evaluate(SHOWN, one) for one in ("line", "play", "again", "clock", "speed-label")] == [False] * 5
         assert [scene.evaluate(SHOWN, one) for one in ("trail-label", "overview", "drone")] == [True] * 3
@@ -107,10 +107,10 @@ def test_a_flight_that_was_refused_says_why_and_is_tried_again(
     (run.folder / FLOWN).write_bytes(refused("two are in <b>one</b> place."))
     with app_page(browser, f"{application.url}team/{team}/fly") as tab:
         page = tab.page
-        page.wait_for_selector("text=It cannot be flown: two are in <b>one</b> place.")
+        page.wait_for_selector("text=The flight is not possible: two are in <b>one</b> place.")
         page.click("text=Try again")
         page.wait_for_selector(READY)
-        page.locator("text=It cannot be flown").wait_for(state="detached")
+        page.locator("text=The flight is not possible").wait_for(state="detached")
         assert page.locator("text=Try again").count() == 0
         page.wait_for_function("document.querySelector('.stage-views iframe').contentWindow.Playback")
     assert msgspec.json.decode((run.folder / FLOWN).read_bytes())["as_planned"]

@@ -88,7 +88,7 @@ def test_from_the_gallery_to_a_report(
         newcomer.press("It fails")
         newcomer.press("Decide again")
         page.wait_for_selector(".fate-left:has-text('Drone1')", timeout=HANG_S * 1000)
-        newcomer.press("Keep this")
+        newcomer.press("Keep the changes")
         wait_until(
             lambda: SketchRobot("Drone1", Cell(0, 2)) not in teams.load(team).now.robots,
             lambda: str(teams.load(team).now.robots),

@@ -31,12 +31,12 @@ def test_one_fails_and_the_team_decides_again(browser: Browser, application: App
         page.wait_for_selector("[data-robot=East]", state="detached")
         page.click("text=Decide again")
         page.wait_for_selector(".fate-left:has-text('East')")
-        page.wait_for_selector("text=Nobody has to change anything.")
+        page.wait_for_selector("text=No robot has to change its decision.")
         page.wait_for_selector("text=No message was needed")
         assert page.locator(".whatif-bar").count() == 2
         page.reload()
         page.wait_for_selector(".fate-left:has-text('East')")
-        page.click("text=Keep this")
+        page.click("text=Keep the changes")
         wait_until(lambda: _names(teams, team) == ["North", "South", "West"], lambda: str(_names(teams, team)))
         page.wait_for_selector("text=Nothing yet.")
         page.click("[aria-label^='Undo']")
@@ -58,8 +58,8 @@ def test_by_keyboard_alone_with_costs_and_two_changes_of_which_one_is_taken_back
         page.wait_for_selector("li:has-text('North fails.')", state="detached")
         page.focus("button:has-text('Decide again')")
         page.keyboard.press("Enter")
-        page.wait_for_selector("text=After this there is no solution.")
-        page.wait_for_selector("text=begins anew at each change")
+        page.wait_for_selector("text=After the events there is no solution.")
+        page.wait_for_selector("text=starts again after each change")
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
 
 
@@ -99,15 +99,15 @@ def test_without_a_solution_there_are_ways_out(browser: Browser, application: Ap
         page = tab.page
         page.focus("button:has-text('A robot joins here')")
         page.keyboard.press("Enter")
-        page.wait_for_selector("text=Some rules of this team cost something: after a change, it decides anew.")
+        page.wait_for_selector("text=This team has rules with costs, so it decides from scratch after a change.")
         page.focus("button:has-text('Decide again')")
         page.keyboard.press("Enter")
-        page.wait_for_selector("text=After this there is no solution.")
+        page.wait_for_selector("text=After the events there is no solution.")
         page.click("text=Who would have to step aside?")
         page.wait_for_selector(".whatif-aside .headline:has-text('4 of 5 decide')")
-        page.click("text=Which rules are in each other")
+        page.click("text=Which rules are in conflict")
         page.click("button:has-text('Switch off')")
-        page.wait_for_selector("text=Nobody has to change anything.")
+        page.wait_for_selector("text=No robot has to change its decision.")
         wait_until(lambda: not teams.load(team).now.rules[0].on, lambda: str(teams.load(team).now.rules))
 
 
@@ -117,14 +117,14 @@ def test_a_team_without_decisions_is_told_what_it_lacks(
     with watched_page(browser) as tab:
         for sketch in (Sketch("empty"), Sketch("idle", robots=ROBOTS)):
             connected(tab.page, f"{application.url}team/{teams.add(sketch)}/whatif")
-            tab.page.wait_for_selector("text=nothing to decide yet")
+            tab.page.wait_for_selector("text=no decisions yet")
 
 
 def test_what_cannot_happen_is_told_at_once(browser: Browser, application: AppServer, teams: TeamStore) -> None:
     team = teams.add(Sketch("team", Area(5, 4), ROBOTS[:1], (LEVEL,)))
     with app_page(browser, f"{application.url}team/{team}/whatif") as tab:
         tab.page.click("text=It fails")
-        tab.page.wait_for_selector("[role=alert]:has-text('Then nobody is left')")
+        tab.page.wait_for_selector("[role=alert]:has-text('No robot would be left')")
         tab.page.fill("input[aria-label=Column]", "99")
         tab.page.click("text=A robot joins here")
-        tab.page.wait_for_selector("[role=alert]:has-text('not on the map')")
+        tab.page.wait_for_selector("[role=alert]:has-text('outside the map')")

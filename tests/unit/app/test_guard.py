@@ -87,7 +87,7 @@ def test_a_browser_of_this_machine_with_the_path_is_served() -> None:
 def test_another_name_of_this_machine_is_not_found(host: bytes) -> None:
     first, body = _asked("/secret/", {"host": host})
     assert first["status"] == 404
-    assert b"Each start of robochoc app has an address of its own" in body["body"]
+    assert b"Each start of robochoc app has a new address" in body["body"]
 
 
 @looped("path", ["/", "", "/secre/", "/secrets/", "/x/secret/", "//secret/", "/SECRET/", "/sécret/"])

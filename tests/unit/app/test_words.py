@@ -55,7 +55,7 @@ def test_a_leader_and_an_order_are_told() -> None:
     leader = SketchRule("R1", "north-of", "place", ("East", "South", "North"))
     assert sentence(TEAM, leader) == "In place, East is further north than South and North."
     order = SketchRule("R1", "in-order", "level", ("East", "South", "North"))
-    assert sentence(TEAM, order) == "In level, the order is East, South and North: each takes less than the next one."
+    assert sentence(TEAM, order) == "In level, the order is East, South and North: each chooses less than the next one."
 
 
 def test_cells_are_told_by_column_and_row() -> None:
@@ -79,8 +79,8 @@ def test_what_is_missing_is_left_open() -> None:
 def test_what_a_rule_counts_is_told() -> None:
     assert weight_of(SketchRule("R1", "different", "level")) == "It must hold."
     soft = SketchRule("R1", "different", "level", cost=3, private=True, on=False)
-    assert weight_of(soft).startswith("Breaking it costs 3 each time. Private: only the one")
-    assert weight_of(SketchRule("R1", "little", "level", private=True)) == "Private: nobody else learns of it."
+    assert weight_of(soft).startswith("Breaking it costs 3 each time. Private: only the first robot")
+    assert weight_of(SketchRule("R1", "little", "level", private=True)) == "Private: no other robot learns it."
     assert not weight_of(SketchRule("R1", "little", "level"))
 
 

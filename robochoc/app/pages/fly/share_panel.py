@@ -1,4 +1,4 @@
-"""The panel "Tell others": report, recording, the team's files, the saved state, and a link."""
+"""The panel "Share": report, recording, the team's files, the saved state, and a link."""
 
 from __future__ import annotations
 

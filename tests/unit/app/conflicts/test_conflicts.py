@@ -77,7 +77,7 @@ class TestSearch:
         conflict = found(ConflictSearch(slots(3, 2)))
         assert "no_such_module" in conflict.why
         monkeypatch.setattr("robochoc.app.conflicts.search.Command", None)
-        assert found(ConflictSearch(slots(3, 2))).why == "That did not work. The team is as it was before."
+        assert found(ConflictSearch(slots(3, 2))).why == "That did not work. The team is unchanged."
 
 
 def found(search: ConflictSearch) -> Conflict:

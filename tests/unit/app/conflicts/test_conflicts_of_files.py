@@ -108,7 +108,7 @@ def test_that_only_some_constraints_are_left() -> None:
 def test_that_a_cost_without_a_value_is_told_as_such(tmp_path: Path) -> None:
     write_team(TEAMS["division"], tmp_path / "division")
     words = found_in_files(tmp_path / "division", 0, 60, use_cpmpy=False).words
-    assert "RB: costs A / B, which has no value for some decisions: these are forbidden" in words
+    assert "RB: costs A / B, which is undefined for some decisions: these are forbidden" in words
 
 
 class _FailsError(Exception):

@@ -56,17 +56,17 @@ LEVELS = {"Drone1.level": 1, "Drone2.level": 2, "Drone3.level": 3}
             {},
             Checked.KEPT,
             (
-                "The file that was opened says: All 3 decide. It costs 6: proven the best. Checked here: every"
-                " rule that must hold is kept, and the cost is right. Whether there is none better was not checked: let"
-                " the team decide again to find out."
+                "The opened file claims: All 3 decide. It costs 6: proven the best. Checked here: all rules that"
+                " must hold are kept, and the cost is correct. The claim that no answer is better was not checked: let"
+                " the team decide again to check it."
             ),
         ),
         (
             {"assignment": {**LEVELS, "Drone3.level": 1}, "cost": 3},
             Checked.BROKEN,
             (
-                "The file that was opened says: All 3 decide. It costs 3: proven the best. Checked here, that is wrong:"
-                " not every rule that must hold is kept. Let the team decide again."
+                "The opened file claims: All 3 decide. It costs 3: proven the best. Checked here: this is wrong,"
+                " since a rule that must hold is broken. Let the team decide again."
             ),
         ),
         ({"assignment": {**LEVELS, "Drone3.level": 9}}, Checked.BROKEN, None),
@@ -78,18 +78,18 @@ LEVELS = {"Drone1.level": 1, "Drone2.level": 2, "Drone3.level": 3}
             Checked.KEPT,
             None,
         ),
-        ({"cost": 5}, Checked.COST, "is another number"),
+        ({"cost": 5}, Checked.COST, "or the worth is wrong"),
         ({"cost": 6.0000000000000001}, Checked.KEPT, None),
         ({"cost": -1e300}, Checked.COST, None),
         (
             {"verdict": "no-solution", "assignment": {}, "cost": None},
             None,
             (
-                "The file that was opened says: There is no solution: the rules cannot all hold. That was not checked"
-                " here: let the team decide again to find out."
+                "The opened file claims: There is no solution: the rules cannot all hold. This was not checked"
+                " here: let the team decide again to check it."
             ),
         ),
-        ({"verdict": "unknown", "bound": 6}, Checked.KEPT, "Nothing costs less than 6. Checked here"),
+        ({"verdict": "unknown", "bound": 6}, Checked.KEPT, "No answer costs less than 6. Checked here"),
     ],
 )
 def test_what_a_file_says_is_held_against_its_team(
@@ -188,7 +188,7 @@ def test_that_a_worth_is_checked_in_the_users_numbers(tmp_path: Path, cost: floa
     write_team(team, run.team)
     check(run)
     assert (run.record.checked, run.record.maximised) == (found, True)
-    right = "and what it is worth is right" if run.record.checked is Checked.KEPT else "is another number"
+    right = "and the worth is correct" if run.record.checked is Checked.KEPT else "or the worth is wrong"
     assert right in claim_words(run, "")
 
 

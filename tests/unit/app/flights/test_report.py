@@ -47,7 +47,7 @@ def test_it_tells_who_decided_what_by_which_rules_and_how_to_repeat_it(tmp_path:
     run = kept_run(tmp_path, cube())
     read = _Read(report(run.sketch, run, Pages(), "1.2.3"))
     for told in (
-        "All 3 decide together, and no other answer costs less: proven. It costs 6.",
+        "All 3 decide together, and it is proven that no answer costs less. It costs 6.",
         "Drone1 1 Drone2 2 Drone3 3",
         "In level, all robots choose different values. It must hold.",
         "Breaking it costs 3 each time. Broken by Drone2 and Drone3: costs 6.",
@@ -106,16 +106,18 @@ def test_that_pages_stand_in_frames_that_can_do_nothing_else(tmp_path: Path) -> 
 def test_without_an_answer_it_says_so(tmp_path: Path) -> None:
     sketch = cube()
     run = kept_run(tmp_path, sketch, verdict="no-solution", assignment={}, cost=None)
-    assert summary(sketch, run) == "There is no answer that keeps all rules: proven."
+    assert summary(sketch, run) == "It is proven that no answer keeps all rules."
     run.result = None
     assert summary(sketch, run) == "There is no answer."
-    assert b"Who decided what" not in report(sketch, run, Pages(), "1")
+    assert b"Decisions of the robots" not in report(sketch, run, Pages(), "1")
 
 
 def test_that_what_is_as_large_as_can_be_is_a_worth(tmp_path: Path) -> None:
     run = kept_run(tmp_path, cube())
     run.record.maximised = True
-    assert summary(cube(), run) == ("All 3 decide together, and no other answer is worth more: proven. It is worth 6.")
+    assert summary(cube(), run) == (
+        "All 3 decide together, and it is proven that no answer is worth more. It is worth 6."
+    )
 
 
 @looped("robots", [5, None, "all", [{}]])

@@ -70,14 +70,14 @@ def test_a_team_that_was_not_drawn_has_no_map(tmp_path: Path) -> None:
 
 def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
     run = kept_run(tmp_path / "all", cube())
-    assert flying_robots_words(run) == ["All 3 robots fly to where they decided to be."]
+    assert flying_robots_words(run) == ["All 3 robots fly to their targets."]
     one = kept_run(tmp_path / "one", cube(1))
-    assert flying_robots_words(one) == ["Drone1 flies to where it decided to be."]
+    assert flying_robots_words(one) == ["Drone1 flies to its target."]
     given = {"Drone1.level": 1, "Drone2.level": 2}
     aside = kept_run(tmp_path / "aside", cube(), assignment=given, withdrawn=["Drone3"])
     assert flying_robots_words(aside) == [
-        "2 of 3 robots fly to where they decided to be.",
-        "Stepped aside, so that the others can keep all rules: Drone3. Who steps aside lands at the edge.",
+        "2 of 3 robots fly to their targets.",
+        "Stepped aside, so that the others can keep all rules: Drone3. These robots land at the edge.",
     ]
     sketch = edits.with_robot(cube(), Cell(5, 1), "Cook")
     sketch = msgspec.structs.replace(
@@ -89,11 +89,11 @@ def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
     )
     given = {f"Drone{number}.level": number for number in (1, 2, 3)}
     cook = kept_run(tmp_path / "cook", sketch, assignment={**given, "Cook.dish": "soup"})
-    assert flying_robots_words(cook)[1:] == ["Decided neither a level nor a place, and stay where they stand: Cook."]
+    assert flying_robots_words(cook)[1:] == ["Decided neither a level nor a place, and stay at their positions: Cook."]
     changing(run, edits.without_robot(cube(), "Drone2"))
     assert flying_robots_words(run) == [
-        "2 of 3 robots fly to where they decided to be.",
-        "Left while the others were flying: Drone2. Who leaves lands at the edge.",
+        "2 of 3 robots fly to their targets.",
+        "Left during the flight: Drone2. These robots land at the edge.",
     ]
     nobody = kept_run(tmp_path / "nobody", cube(kind=DecisionKind.SLOT))
     assert flying_robots_words(nobody) == []
@@ -110,7 +110,7 @@ def test_how_a_flight_went_is_told(tmp_path: Path) -> None:
     flown = flight_result_of(run)
     assert flown is not None
     assert flight_words(flown) == [
-        "It cannot be flown: two are in one place. The picture shows where all are to be in the end."
+        "The flight is not possible: two are in one place. The picture shows the targets of all robots."
     ]
     drones = [
         {"name": "A", "error_m": None, "at": [1, 2, 3]},
@@ -125,10 +125,10 @@ def test_how_a_flight_went_is_told(tmp_path: Path) -> None:
     file.write_bytes(msgspec.json.encode(told))
     flown = flight_result_of(run)
     assert flown is not None
-    assert flight_words(flown)[:3] == ["Fallen: A.", "Not where they should be: B.", "2.0 s, A: hits the ground."]
+    assert flight_words(flown)[:3] == ["Fallen: A.", "Not at their targets: B.", "2.0 s, A: hits the ground."]
     assert len(flight_words(flown)) == 8
     near = msgspec.structs.replace(flown, drones=flown.drones[2:], happenings=())
-    assert flight_words(near) == ["Two came nearer to each other than they should."]
+    assert flight_words(near) == ["Two drones came closer to each other than allowed."]
     assert flight_words(msgspec.structs.replace(near, as_planned=True)) == []
 
 
@@ -147,14 +147,14 @@ def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) 
     assert run.result is not None
     for purpose, opened, words in (
         ("whatif", False, "What if"),
-        ("whatif-anew", False, "What if, decided anew to compare"),
-        ("decide", True, "Opened from a file, which says"),
+        ("whatif-anew", False, "What if, decided from scratch for comparison"),
+        ("decide", True, "Opened from a file, which claims"),
         ("<b>", False, "Another run"),
     ):
         run.record.purpose, run.record.opened = purpose, opened
         assert run_words(run, same_day).startswith(f"22:13, {words}: ")
     run.record.purpose, run.record.checked = "decide", Checked.COST
-    assert run_words(run, same_day).endswith("costs 6, but a check here has found that wrong")
+    assert run_words(run, same_day).endswith("costs 6, but a check has found this wrong")
     run.record.checked, run.record.maximised = None, True
     assert run_words(run, same_day).endswith(": the best answer, proven, is worth 6")
     run.record.maximised = False
@@ -218,7 +218,7 @@ def test_the_last_answer_is_flown_if_there_is_none_in_the_end(tmp_path: Path, ve
     making = FlightBuilder(run)
     assert making.has_answer is making.has_flight is flown
     page = report(run.sketch, run, Pages(), "1")
-    assert (b"The flight shows the last answer that there was" in page) is flown
+    assert (b"The flight shows the last answer before it" in page) is flown
 
 
 @looped("epoch", [{}, {"assignment": 5}, {"assignment": None}, {"assignment": []}])

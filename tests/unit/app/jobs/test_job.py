@@ -111,7 +111,7 @@ class TestProcess:
         job = Job("looked at", lambda job: job.run(endless(folder), look), over=told.append).start()
         with pytest.raises(KeyError):
             job.future.result(HANG_S)
-        assert told == ["That did not work. The team is as it was before."]
+        assert told == ["That did not work. The team is unchanged."]
         assert "looked at: KeyError" in caplog.text
         assert "Traceback" in caplog.text
 
@@ -120,7 +120,7 @@ class TestProcess:
         job = Job("test", lambda job: job.run(Command((), tmp_path / "gone")), over=told.append).start()
         with pytest.raises(FileNotFoundError):
             job.future.result(HANG_S)
-        assert told == ["That cannot be kept on disk: No such file or directory."]
+        assert told == ["The data cannot be saved: No such file or directory."]
 
 
 class TestEnd:

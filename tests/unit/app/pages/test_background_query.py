@@ -32,7 +32,7 @@ def pool(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         yield
 
 
-FAULT = "That did not work. The team is as it was before."
+FAULT = "That did not work. The team is unchanged."
 
 
 def _fails(*_: object) -> None:

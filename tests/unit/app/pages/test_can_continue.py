@@ -20,8 +20,8 @@ from tests.support.cases import looped
     [
         ("channels", RobotFails("Radio1"), ""),
         ("coverage", RobotFails("Eye1"), ""),
-        ("hangar", RobotJoins(Cell(0, 0)), "This team is quicker when it decides anew"),
-        ("charging", RobotFails("Ada"), "Some rules of this team cost something"),
+        ("hangar", RobotJoins(Cell(0, 0)), "This team decides from scratch after a change"),
+        ("charging", RobotFails("Ada"), "This team has rules with costs"),
         ("secrets", RobotFails("Press"), "This team has private rules"),
     ],
 )
@@ -39,7 +39,7 @@ def test_what_no_event_can_say_is_told_before() -> None:
     before = example("channels")
     moved = msgspec.structs.replace(before.robots[0], weight=7)
     after = msgspec.structs.replace(before, robots=(moved, *before.robots[1:]))
-    assert why_not_continue(before, after) == "The team decides anew: Radio1 counts, or ranks, differently."
+    assert why_not_continue(before, after) == "The team decides from scratch: Radio1 has another weight or rank."
 
 
 @pytest.mark.parametrize("change", [CellBlocked(Cell(0, 0)), LowBattery("Eye1", 50)])

@@ -56,13 +56,16 @@ def _run(
         (_run(run_result(Verdict.SOLUTION, {"a": 1}, cost=2), robots=1), "The robot decides. It costs 2."),
         (
             _run(run_result(Verdict.UNKNOWN, {"a": 1}, cost=9, bound=4), RunState.STOPPED),
-            "All 3 decide. It was stopped; this is the best so far. It costs 9. Nothing costs less than 4.",
+            (
+                "All 3 decide. The search was stopped; this is the best answer so far. It costs 9. "
+                "No answer costs less than 4."
+            ),
         ),
         (
             _run(run_result(Verdict.UNKNOWN, {"a": 1}, cost=1_234_567, bound=1_234_566), RunState.STOPPED),
             (
-                "All 3 decide. It was stopped; this is the best so far. It costs 1,234,567. "
-                "Nothing costs less than 1,234,566."
+                "All 3 decide. The search was stopped; this is the best answer so far. It costs 1,234,567. "
+                "No answer costs less than 1,234,566."
             ),
         ),
         (_run(run_result(Verdict.SOLUTION, {"a": 1}, cost=0), costs=False), "All 3 decide."),
@@ -70,8 +73,8 @@ def _run(
         (
             _run(run_result(Verdict.UNKNOWN, {"a": 1}, withdrawn=("Drone1",), cost=5, bound=1), withdraw=True),
             (
-                "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far. It costs 5. "
-                "At least 1 must step aside."
+                "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best answer so far. "
+                "It costs 5. At least this number of robots must step aside: 1."
             ),
         ),
         (
@@ -80,28 +83,28 @@ def _run(
                 withdraw=True,
                 costs=False,
             ),
-            "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far.",
+            "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best answer so far.",
         ),
         (
             _run(run_result(Verdict.UNKNOWN, {"a": 1}, cost=9)),
-            "All 3 decide. A limit was reached; this is the best so far. It costs 9.",
+            "All 3 decide. A limit was reached; this is the best answer so far. It costs 9.",
         ),
         (_run(run_result(Verdict.NO_SOLUTION)), "There is no solution: the rules cannot all hold."),
         (
             _run(run_result(Verdict.OPTIMAL, {"a": 1}, withdrawn=("Drone1",), cost=1)),
             (
-                "2 of 3 decide. These step aside, and it is proven that it cannot be fewer, by their weights: Drone1. "
+                "2 of 3 decide. These step aside: Drone1. It is proven that their total weight cannot be lower. "
                 "It costs 1."
             ),
         ),
-        (_run(None, RunState.FAILED, "no such thing"), "It could not be decided: no such thing"),
+        (_run(None, RunState.FAILED, "no such thing"), "The search failed: no such thing"),
         (
             _run(None, RunState.FAILED, "lost"),
-            "The application ended during this run, and the run with it. Decide again.",
+            "The application ended during this run. Decide again.",
         ),
         (
             _run(None, RunState.STOPPED),
-            "It ended before anything was found. Give it more time, or choose another protocol.",
+            "The search ended without an answer. Allow more time, or choose another protocol.",
         ),
     ],
 )
@@ -113,7 +116,7 @@ def test_that_robots_that_step_aside_are_weighed() -> None:
     result = run_result(Verdict.UNKNOWN, {"a": 1}, withdrawn=("Drone1",), cost=5, bound=3)
     run = Run(Path("00001"), Record(RunOptions(withdraw=True)), with_importance(slots(3, 3), "Drone1", weight=3))
     run.result = result
-    assert headline(run).endswith("The weights of those who step aside are at least 3 together.")
+    assert headline(run).endswith("The robots that step aside have a total weight of at least 3.")
 
 
 def test_that_hostile_names_are_text() -> None:

@@ -176,7 +176,7 @@ class TestRun:
         monkeypatch.setattr("robochoc.app.runs.live.LiveReader.advance", fails)
         run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
         assert run.state is RunState.FAILED
-        assert run.message == "That did not work. The team is as it was before."
+        assert run.message == "That did not work. The team is unchanged."
         assert "ZeroDivisionError" in caplog.text
 
     def test_that_a_journal_without_end_does_not_keep_it_running(

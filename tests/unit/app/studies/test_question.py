@@ -47,7 +47,7 @@ def test_only_protocols_that_fit_are_offered() -> None:
 
 @pytest.mark.parametrize("look", [possible, fitting])
 def test_a_team_that_is_not_ready_is_told_what_to_mend(look: Callable[[Sketch], object]) -> None:
-    with pytest.raises(NotReadyError, match=r"R1: .*value of slot\. Choose one"):
+    with pytest.raises(NotReadyError, match=r"R1 .*value of slot\. Choose one"):
         look(team(SketchRule("R1", "prefers", "slot", settings={})))
 
 
