@@ -1,9 +1,9 @@
 """Graph colouring: hard, soft (as few neighbours as possible have the same colour), or weighted.
 
 * `soft` is the usual first benchmark of protocols that minimise (Modi et al., "Adopt", AIJ 161, 2005; Zhang et al.,
-  "Distributed stochastic search and distributed breakout", AIJ 161, 2005): each constraint that is broken costs 1.
-* `weighted`: the weight of an edge, an integer or decimal drawn from 1 unit to a maximum, is what it costs to give its
-  ends the same colour (Koljonen, Alava, Peltomaki and Tirkkonen, "Distributed generalized graph coloring", SASO 2010).
+  "Distributed stochastic search and distributed breakout", AIJ 161, 2005): each violated constraint costs 1.
+* `weighted`: the weight of an edge, an integer or decimal drawn from 1 unit to a maximum, is the cost of equal colours
+  at its ends (Koljonen, Alava, Peltomaki and Tirkkonen, "Distributed generalized graph coloring", SASO 2010).
 * `hard` is a DisCSP: neighbours must have different colours.
 
 The graph has a given mean degree, and every such graph is as likely as any other; or it is any of
@@ -16,17 +16,24 @@ from dataclasses import replace
 from enum import StrEnum
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded
-from robochoc.generators.draws import uniform as any_of
+from robochoc.generators.draws import (
+    MAX_COST,
+    MAX_NODES,
+    MAX_VALUES,
+    check_bounds,
+    check_places,
+    random_integer,
+    seeded,
+)
 from robochoc.generators.graphs import Graph, uniform
-from robochoc.generators.random_csp import places_told, team_of_edges
+from robochoc.generators.random_csp import places_label, team_of_edges
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Team
 from robochoc.system.suggestions import member
 
 
 class Conflicts(StrEnum):
-    """What neighbours of the same colour cost."""
+    """The cost of neighbours of the same colour."""
 
     SOFT = "soft"
     WEIGHTED = "weighted"
@@ -46,7 +53,7 @@ def coloring(
 ) -> Team:
     """Return the random graph colouring problem of `seed`, with `agents` robots and `degree` neighbours on average.
 
-    `Robot3` owns `V3`. Two neighbours of the same colour cost 1, or as `conflicts` says.
+    `Robot3` owns `V3`. Two neighbours of the same colour have the cost that `conflicts` selects.
 
     Args:
         agents: The number of robots.
@@ -54,7 +61,7 @@ def coloring(
         degree: The average number of neighbours.
         seed: The same seed makes the same problem on every machine.
         connected: Whether graphs are drawn until one is connected.
-        conflicts: What neighbours of the same colour cost: 1, a random weight, or they are forbidden.
+        conflicts: The cost of neighbours of the same colour: 1, a random weight, or infinite.
         max_cost: The maximum weight.
         places: The decimal places of weights.
 
@@ -77,10 +84,10 @@ def coloring_of(
     max_cost: int = 10,
     places: int = 0,
 ) -> Team:
-    """Return the problem of colouring `graph`; all else is as in `coloring`.
+    """Return the problem of colouring `graph`, with the parameters of `coloring`.
 
     Raises:
-        ValueError: if a number is out of its bounds. The text says which.
+        ValueError: if a number is out of its bounds.
     """
     conflicts = member(Conflicts, "conflicts", conflicts)
     check_bounds({"colors": (colors, 1, MAX_VALUES), "max-cost": (max_cost, 1, MAX_COST)})
@@ -92,18 +99,18 @@ def coloring_of(
         for higher, lower in edges
         for scope in ((f"V{higher}", f"V{lower}"),)
     }
-    told, units = "", PLAIN_COSTS
+    label, units = "", PLAIN_COSTS
     match conflicts:
         case Conflicts.SOFT:
             constraints = soft
         case Conflicts.HARD:
-            told = "-hard"
+            label = "-hard"
             constraints = {edge: replace(one, cost=INFINITE) for edge, one in soft.items()}
         case Conflicts.WEIGHTED:
             units = CostUnits(places=places)
-            told = f"-weighted{max_cost}{places_told(units)}"
+            label = f"-weighted{max_cost}{places_label(units)}"
             most = max_cost * 10**places
-            constraints = {edge: replace(one, cost=any_of(chance, 1, most)) for edge, one in soft.items()}
+            constraints = {edge: replace(one, cost=random_integer(chance, 1, most)) for edge, one in soft.items()}
     kind = ProblemKind.DISCSP if conflicts == Conflicts.HARD else ProblemKind.DISWCSP
-    name = f"coloring-{graph.agents}-{colors}-{graph.label}{told}-{seed}{graph.suffix}"
+    name = f"coloring-{graph.agents}-{colors}-{graph.label}{label}-{seed}{graph.suffix}"
     return team_of_edges(name, graph.agents, colors, constraints, kind, units)

@@ -1,8 +1,8 @@
-"""What all families draw with, and the bounds of what they draw.
+"""Random numbers for all families of problems, and the limits of their sizes.
 
-A seed makes the same problem on every machine and with every version of Python: of `random.Random` only the seeding by
-an integer and `random()` are used, which Python's documentation promises to keep. Costs are integers of a stated unit
-from the start, so nothing is rounded later.
+A seed gives the same problem on every machine and with every version of Python: of `random.Random`, only the seeding by
+an integer and `random()` are used, which Python's documentation promises to keep. Costs are integers from the start, so
+nothing is rounded later.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robochoc.model.cost_units import MAX_PLACES
 from robochoc.model.problem import Constraint
 
 MAX_AGENTS = 1000
-"""The maximum of families that look at all pairs of robots, targets or meetings."""
+"""The maximum number of robots, targets or meetings in families that enumerate all pairs of them."""
 MAX_NODES = 1_000_000
 """The maximum number of robots on a graph."""
 MAX_EDGES = 5_000_000
@@ -23,7 +23,7 @@ MAX_EDGES = 5_000_000
 MAX_VALUES = 1000
 MAX_COST = 1_000_000
 MAX_CONSTRAINTS = 200_000
-"""The maximum of a whole team."""
+"""The maximum number of constraints of a team."""
 
 
 def seeded(seed: int) -> Random:
@@ -31,18 +31,18 @@ def seeded(seed: int) -> Random:
     return Random(seed)  # noqa: S311 - a problem, not a secret
 
 
-def uniform(chance: Random, least: int, most: int) -> int:
+def random_integer(chance: Random, least: int, most: int) -> int:
     """Return an integer from `least` to `most`, each as likely as any other."""
     return least + int(chance.random() * (most - least + 1))
 
 
-def some(chance: Random, size: int, count: int) -> list[int]:
+def sample(chance: Random, size: int, count: int) -> list[int]:
     """Return `count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
     return sorted(_drawn(chance, size, count))
 
 
 def _drawn(chance: Random, size: int, count: int) -> Iterator[int]:
-    """Yield the first steps of the Fisher-Yates shuffle of all numbers below `size`. Only moved numbers are stored."""
+    """Yield the first `count` numbers of a Fisher-Yates shuffle of all below `size`. Only moved numbers are stored."""
     moved: dict[int, int] = {}
     for left in range(size, size - count, -1):
         place = int(chance.random() * left)
@@ -51,23 +51,23 @@ def _drawn(chance: Random, size: int, count: int) -> Iterator[int]:
 
 
 def check_bounds(numbers: Mapping[str, tuple[float, float, float]]) -> None:
-    """Raise `ValueError` for the first of `numbers` (value, least, most), by name, that is out of its bounds."""
+    """Raise `ValueError` for the first of `numbers` (value, minimum, maximum), by name, that is out of its bounds."""
     for what, (number, least, most) in numbers.items():
         if not least <= number <= most:
             raise ValueError(f"{what} is {number}; it must be from {least} to {most}")
 
 
 def in_units(number: float, places: int) -> int:
-    """Return `number`, as it is written in decimals, in units of 10**-places: rounded, halves to the even one."""
+    """Return the decimal `number` in units of 10**-places: rounded, halves to the even one."""
     return round(Decimal(str(number)).scaleb(places))
 
 
 def check_places(places: int) -> None:
-    """Raise `ValueError` unless costs can have so many decimal places."""
+    """Raise `ValueError` unless `places` is a valid number of decimal places of costs."""
     check_bounds({"places": (places, 0, MAX_PLACES)})
 
 
-def bounded(constraints: Iterable[Constraint]) -> list[Constraint]:
+def limited(constraints: Iterable[Constraint]) -> list[Constraint]:
     """Return all of `constraints`.
 
     Raises:
@@ -76,6 +76,6 @@ def bounded(constraints: Iterable[Constraint]) -> list[Constraint]:
     kept: list[Constraint] = []
     for constraint in constraints:
         if len(kept) == MAX_CONSTRAINTS:
-            raise ValueError(f"the team would have more than {MAX_CONSTRAINTS:,} constraints; ask for a smaller one")
+            raise ValueError(f"the team would have more than {MAX_CONSTRAINTS:,} constraints; use smaller numbers")
         kept.append(constraint)
     return kept

@@ -1,6 +1,6 @@
-"""The families of problems by name: what `robochoc generate`, studies and `robochoc compare` make.
+"""The families of problems by name, for `robochoc generate`, studies and `robochoc compare`.
 
-Parameters are called as the options of `robochoc generate`, with underscores.
+Parameters have the names of the options of `robochoc generate`, with underscores.
 """
 
 from __future__ import annotations
@@ -149,9 +149,11 @@ def tasks(  # noqa: PLR0913 - parameters of a family, by their names
     seed: int = 0,
 ) -> Team:
     """Return tasks to be allocated: see `generators/tasks.py`."""
-    ways = allocations.Ways(side, Distance(distance), places)
-    has = allocations.Skills(skills, skilled)
-    return allocations.tasks(agents, tasks, seed, worth=worth, ways=ways, skills=has, model=model, capacity=capacity)
+    travel = allocations.Travel(side, Distance(distance), places)
+    robot_skills = allocations.Skills(skills, skilled)
+    return allocations.tasks(
+        agents, tasks, seed, worth=worth, travel=travel, skills=robot_skills, model=model, capacity=capacity
+    )
 
 
 def coverage(
@@ -215,11 +217,14 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "tracking": trackings.tracking,
     }
 )
-"""What makes each family's problems, of parameters by name."""
+"""The function that generates a problem of each family, with keyword parameters."""
 _CHOICES: Mapping[str, tuple[type, frozenset[str]]] = MappingProxyType(
     {"of_graph": (GraphChoice, frozenset({"kind", "agents"})), "of_map": (MapChoice, frozenset())}
 )
-"""The parameters that families share, by their place among a family's own, and those that families name themselves."""
+"""Groups of parameters that families share: the class of a group, and its fields that families declare themselves.
+
+The keys are the names of the `**` parameters.
+"""
 
 
 @cache
@@ -248,7 +253,7 @@ def required_of(family: str) -> tuple[str, ...]:
 
 
 def _types(hint: Any) -> tuple[type, ...]:  # noqa: ANN401 - whatever a parameter is declared as
-    """Return the plain types that a parameter may have; an integer will do for a float."""
+    """Return the plain types that a parameter may have; an integer is valid for a float."""
     alternatives = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     plain = [one for one in alternatives if one in {int, float, bool, str}]
     return tuple(dict.fromkeys([*plain, *([int] if float in plain else [])]))

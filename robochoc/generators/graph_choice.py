@@ -1,14 +1,97 @@
-"""A constraint graph by the name of its kind, or from a file, with the parameters that this kind has."""
+"""Choose a constraint graph: one of a random family, with its parameters, or a graph in a file that networkx reads.
+
+Files are GraphML, GEXF, GML, Pajek, lists of edges or of neighbours. networkx is an extra, `robochoc[graphs]`. It only
+reads files: its random graphs may differ between versions, so `generators/graphs.py` draws them.
+"""
 
 from __future__ import annotations
 
 import difflib
+import re
+from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
+from robochoc.formats import Diagnostic, InvalidInputError
 from robochoc.generators import graphs
-from robochoc.generators.graph_files import read_graph
-from robochoc.generators.graphs import Graph, GraphKind
+from robochoc.generators.draws import MAX_NODES
+from robochoc.generators.graphs import Edge, Graph, GraphKind
+
+MAX_BYTES = 16 * 1024 * 1024
+MAX_LABEL = 50
+READERS = {
+    ".graphml": "read_graphml",
+    ".gexf": "read_gexf",
+    ".gml": "read_gml",
+    ".net": "read_pajek",
+    ".edgelist": "read_edgelist",
+    ".edges": "read_edgelist",
+    ".adjlist": "read_adjlist",
+}
+"""The reader of networkx for each ending of a file's name."""
+
+
+def read_graph(path: Path) -> Graph:
+    """Return the graph in the file `path`. Directions, parallel edges and attributes of edges are ignored.
+
+    Nodes are numbered from 1: in the order of their numbers if all are integers, otherwise in that of the file.
+
+    Raises:
+        InvalidInputError: if the file is not a valid graph, or networkx is not installed.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise _invalid(path, f"'{path.suffix}' is not a type of graph files", f"supported: {' '.join(READERS)}")
+    content = _content(path)
+    try:
+        import networkx as nx  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise _invalid(path, "graph files require networkx", "run: pip install 'robochoc[graphs]'") from None
+    from io import BytesIO  # noqa: PLC0415 - start-up: only to read a graph
+
+    options = {"data": False} if reader == "read_edgelist" else {}
+    try:
+        graph = getattr(nx, reader)(BytesIO(content), **options)
+        nodes, edges = list(graph.nodes), [(one, other) for one, other, *_ in graph.edges]
+    except Exception as error:  # noqa: BLE001 - networkx raises what its parsers raise
+        raise _invalid(path, "networkx cannot read it", f"it says: {error}") from None
+    numbered = _numbered(nodes)
+    if not 1 <= len(nodes) <= MAX_NODES:
+        raise _invalid(path, f"the graph has {len(nodes)} nodes", f"it must have from 1 to {MAX_NODES}")
+    for one, other in edges:
+        if one == other:
+            raise _invalid(path, f"the node {one!s:.100} is linked to itself", "delete this edge")
+    known: list[Edge] = sorted({(min(pair), max(pair)) for pair in ((numbered[a], numbered[b]) for a, b in edges)})
+    label = re.sub(r"[^A-Za-z0-9_.]+", "-", path.stem)[:MAX_LABEL].strip("-.") or "graph"
+    return Graph(len(nodes), label, lambda _: list(known))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise _invalid(path, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+    if len(content) > MAX_BYTES:
+        raise _invalid(path, "is too large", f"use a file of at most {MAX_BYTES:,} bytes")
+    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
+        raise _invalid(path, "defines entities", "delete the document type: GraphML and GEXF need none")
+    return content
+
+
+def _numbered(nodes: Iterable[Hashable]) -> dict[Hashable, int]:
+    """Return the number of each node."""
+    named = {node: str(node) for node in nodes}
+    if all(name.removeprefix("-").isdecimal() and len(name) < 20 for name in named.values()):  # noqa: PLR2004 - 64 bits
+        named = dict(sorted(named.items(), key=lambda node: int(node[1])))
+    return {node: number for number, node in enumerate(named, 1)}
+
+
+def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
+    hint = " ".join(chain.from_iterable(part.split() for part in hint.split("\n")))
+    return InvalidInputError([Diagnostic(str(path), 0, message, hint[:300])])
+
 
 KINDS = tuple(map(str, GraphKind))
 _KINDS_OF = {
@@ -19,18 +102,18 @@ _KINDS_OF = {
     "torus": (GraphKind.GRID,),
     "connected": (GraphKind.RANDOM, GraphKind.SMALL_WORLD),
 }
-"""Parameters of some kinds of graphs alone."""
+"""The parameters that only some kinds of graphs have."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class GraphChoice:
-    """The wanted graph.
+    """The kind and the parameters of a graph.
 
     Attributes:
         kind: One of `KINDS`, or the path of a file.
-        agents: The number of robots. None: there are as many as the file has nodes.
+        agents: The number of robots. None: the number of nodes in the file.
         links: scale-free: links of a new node.
-        neighbours: small-world: the nearest nodes that each is linked with.
+        neighbours: small-world: the number of nearest nodes to which each node is linked.
         rewiring: small-world: the share of edges that are moved.
         rows: grid: the number of rows. None: nearest to a square.
         torus: grid: whether the borders meet.
@@ -47,16 +130,16 @@ class GraphChoice:
     connected: bool = False
 
     def graph(self, density_name: str, density: float | None, dashes: str = "") -> Graph | None:
-        """Return the graph. None: it is a random one, which the family draws.
+        """Return the graph. None: it is a uniform random graph, which the family draws.
 
         Args:
-            density_name: What the family calls the density of its random graphs.
+            density_name: The family's name for the density of its random graphs.
             density: The given density.
-            dashes: What users write before the name of a parameter.
+            dashes: The prefix of parameters in messages: `--` on the command line.
 
         Raises:
-            ValueError: if a parameter is missing, or has nothing to say about this graph.
-            InvalidInputError: if the file holds no graph.
+            ValueError: if a parameter is missing, or does not apply to this graph.
+            InvalidInputError: if the file is not a valid graph.
         """
         for name, kinds in _KINDS_OF.items():
             if getattr(self, name) not in {None, False} and self.kind not in kinds:
@@ -95,6 +178,6 @@ class GraphChoice:
         if not Path(self.kind).exists():
             near = difflib.get_close_matches(self.kind, KINDS, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
-            raise ValueError(f"{dashes}graph {self.kind!r} is none of {', '.join(KINDS)}, and no file{hint}")
+            raise ValueError(f"{dashes}graph {self.kind!r} is not one of {', '.join(KINDS)}, nor a file{hint}")
         if self.agents is not None:
             raise ValueError(f"{dashes}agents follows from the graph in the file; leave it out")

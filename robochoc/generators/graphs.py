@@ -1,8 +1,8 @@
-"""Constraint graphs: uniform, scale-free, small worlds, grids, trees, and those of a file.
+"""Random constraint graphs: uniform, scale-free, small worlds, grids and trees.
 
-Each is drawn here and not by networkx, whose generators may draw otherwise from one version to the next.
+networkx is not used, since its random graphs may differ between versions.
 
-* `uniform`: exactly so many edges, every such graph as likely as any other (Model B; `random_csp`).
+* `uniform`: a given number of edges, every such graph as likely as any other (Model B; `random_csp`).
 * `scale_free`: Barabasi and Albert, "Emergence of scaling in random networks", Science 286 (1999).
 * `small_world`: Watts and Strogatz, "Collective dynamics of 'small-world' networks", Nature 393 (1998).
 * `grid`: four neighbours each; as a torus, the borders meet. Ising models live on it (`generators/ising.py`).
@@ -18,7 +18,7 @@ from enum import StrEnum
 from math import isqrt
 from random import Random
 
-from robochoc.generators.draws import MAX_EDGES, MAX_NODES, check_bounds, some
+from robochoc.generators.draws import MAX_EDGES, MAX_NODES, check_bounds, sample
 
 MAX_GRAPH_DRAWS = 1000
 """The maximum number of graphs that are drawn to find a connected one."""
@@ -28,7 +28,7 @@ Edge = tuple[int, int]
 
 
 class GraphKind(StrEnum):
-    """The graphs that are drawn."""
+    """The kinds of random graphs."""
 
     RANDOM = "random"
     SCALE_FREE = "scale-free"
@@ -43,9 +43,9 @@ class Graph:
 
     Attributes:
         agents: The number of nodes.
-        label: What it is called in a team's name.
+        label: Its name, as a part of a team's name.
         draw: Returns its edges, in ascending order.
-        suffix: What ends the name of a team on it.
+        suffix: The end of a team's name.
     """
 
     agents: int
@@ -55,7 +55,7 @@ class Graph:
 
 
 def uniform(agents: int, edges: int, label: str, *, connected: bool = False) -> Graph:
-    """Return a graph of exactly so many `edges`, each choice as likely as any other; `connected`: drawn until it is.
+    """Return a graph with the number of `edges`, each choice as likely as any other; `connected`: drawn until it is.
 
     Raises:
         ValueError: if there are more than `MAX_EDGES`.
@@ -83,7 +83,7 @@ def scale_free(agents: int, links: int = 2) -> Graph:
     def draw(chance: Random) -> list[Edge]:
         edges = []
         ends: list[int] = []
-        """Every node as often as it has links."""
+        """Each node once for each of its links."""
         chosen: Collection[int] = range(1, links + 1)
         for new in range(links + 1, agents + 1):
             edges += [(old, new) for old in chosen]
@@ -114,7 +114,7 @@ def small_world(agents: int, neighbours: int = 4, rewiring: float = 0.1, *, conn
     check_bounds({"agents": (agents, 3, MAX_NODES), "neighbours": (neighbours, 2, agents - 1)})
     check_bounds({"rewiring": (rewiring, 0, 1), "constraints": (agents * neighbours // 2, 1, MAX_EDGES)})
     if neighbours % 2:
-        raise ValueError(f"neighbours is {neighbours}; it must be even: as many on either side of the ring")
+        raise ValueError(f"neighbours is {neighbours}; it must be even: half of them on either side of the ring")
 
     def draw(chance: Random) -> list[Edge]:
         return _until_connected(lambda: _rewired_ring(chance, agents, neighbours, rewiring), agents, connected)
@@ -149,7 +149,7 @@ def _other_than(taken: Iterable[int], place: int) -> int:
 
 
 def grid(rows: int, columns: int, *, torus: bool = False) -> Graph:
-    """Return a grid, numbered row by row. In a `torus` the last row is next to the first one, and so are columns."""
+    """Return a grid, numbered row by row. In a `torus`, the last row is next to the first, and columns likewise."""
     check_bounds({"rows": (rows, 1, MAX_NODES), "columns": (columns, 1, MAX_NODES)})
     check_bounds({"agents": (rows * columns, 1, MAX_NODES)})
     edges = grid_edges(rows, columns, torus=torus)
@@ -169,7 +169,7 @@ def grid_edges(rows: int, columns: int, *, torus: bool) -> list[Edge]:
 
 
 def nearest_to_a_square(agents: int) -> int:
-    """Return the number of rows, at most that of columns, of the grid of so many nodes that is nearest to a square."""
+    """Return the number of rows, at most that of columns, of the most nearly square grid with `agents` nodes."""
     return next(rows for rows in range(isqrt(agents), 0, -1) if agents % rows == 0)
 
 
@@ -187,7 +187,7 @@ def tree(agents: int) -> Graph:
 def _tree_of(sequence: list[int], agents: int) -> list[Edge]:
     """Return the tree of a Pruefer sequence."""
     missing = [0] * (agents + 1)
-    """The number of times that each node is still to come in the sequence."""
+    """The number of times that each node occurs in the rest of the sequence."""
     for node in sequence:
         missing[node] += 1
     edges = []
@@ -215,7 +215,7 @@ def random_graph(chance: Random, agents: int, count: int, *, connected: bool = F
 
 def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
     """Return `count` pairs of robots, in ascending order."""
-    return list(_pairs_at(some(chance, agents * (agents - 1) // 2, count), agents))
+    return list(_pairs_at(sample(chance, agents * (agents - 1) // 2, count), agents))
 
 
 def _pairs_at(places: Iterable[int], agents: int) -> Iterator[Edge]:
@@ -229,9 +229,9 @@ def _pairs_at(places: Iterable[int], agents: int) -> Iterator[Edge]:
 
 
 def _until_connected(draw: Callable[[], list[Edge]], agents: int, wanted: bool) -> list[Edge]:  # noqa: FBT001 - a fact
-    """Return the first graph that links all robots, or, if that is not `wanted`, the first one.
+    """Return the first connected graph, or, if that is not `wanted`, the first graph.
 
-    Raises `ValueError` when that is in vain.
+    Raises `ValueError` after `MAX_GRAPH_DRAWS` graphs.
     """
     for _ in range(MAX_GRAPH_DRAWS):
         edges = draw()
@@ -239,7 +239,7 @@ def _until_connected(draw: Callable[[], list[Edge]], agents: int, wanted: bool) 
             return edges
     raise ValueError(
         f"none of {MAX_GRAPH_DRAWS:,} graphs of {agents} robots and {len(edges)} constraints was connected;"
-        " raise the density"
+        " increase the density"
     )
 
 

@@ -1,4 +1,4 @@
-"""Ising models: spins on a torus, each with a field of its own and coupled to its four neighbours.
+"""Ising models: spins on a torus, each with its own field and coupled to its four neighbours.
 
 The benchmark of belief propagation on graphs with many cycles (Cerquides, Emonet, Picard and Rodriguez-Aguilar,
 "Improving Max-Sum through decimation to solve cyclic distributed constraint optimization problems", 2018, arXiv
@@ -11,7 +11,7 @@ Couplings and fields are decimals: with p places, each multiple of 10**-p in its
 
 from __future__ import annotations
 
-from robochoc.generators.draws import MAX_COST, MAX_NODES, check_bounds, check_places, in_units, seeded, uniform
+from robochoc.generators.draws import MAX_COST, MAX_NODES, check_bounds, check_places, in_units, random_integer, seeded
 from robochoc.generators.graphs import grid_edges
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
@@ -47,19 +47,19 @@ def ising(
     cells = [f"{row}.{column}" for row in range(1, rows + 1) for column in range(1, columns + 1)]
     constraints = []
     for cell in cells:
-        strength = uniform(chance, -rho, rho)
-        said = Relation(f"U{cell}", 1, Semantics.SOFT, ((0,), (1,)), (strength, -strength))
-        constraints.append(Constraint(f"U{cell}", said, (f"V{cell}",), (f"V{cell}",)))
+        strength = random_integer(chance, -rho, rho)
+        relation = Relation(f"U{cell}", 1, Semantics.SOFT, ((0,), (1,)), (strength, -strength))
+        constraints.append(Constraint(f"U{cell}", relation, (f"V{cell}",), (f"V{cell}",)))
     for one, other in grid_edges(rows, columns, torus=True):
-        strength = uniform(chance, -beta, beta)
+        strength = random_integer(chance, -beta, beta)
         name = f"C{cells[one - 1]}.{cells[other - 1]}"
         pairs = ((0, 0), (0, 1), (1, 0), (1, 1))
-        said = Relation(name, 2, Semantics.SOFT, pairs, (strength, -strength, -strength, strength))
+        relation = Relation(name, 2, Semantics.SOFT, pairs, (strength, -strength, -strength, strength))
         scope = (f"V{cells[one - 1]}", f"V{cells[other - 1]}")
-        constraints.append(Constraint(name, said, scope, scope))
-    told = f"{float(coupling)}-{float(field)}" + (f"-{places}" if places != 3 else "")  # noqa: PLR2004 - the default
+        constraints.append(Constraint(name, relation, scope, scope))
+    label = f"{float(coupling)}-{float(field)}" + (f"-{places}" if places != 3 else "")  # noqa: PLR2004 - the default
     return assemble(
-        f"ising-{rows}x{columns}-{told}-{seed}",
+        f"ising-{rows}x{columns}-{label}-{seed}",
         {f"Robot{cell}": [Variable(f"V{cell}", SPINS)] for cell in cells},
         constraints,
         kind=ProblemKind.DISWCSP,

@@ -1,22 +1,22 @@
 """Meetings: a distributed multi-event scheduling problem (DiMES), with time slots or events as variables.
 
 Maheswaran, Tambe, Bowring, Pearce and Varakantham, "Taking DCOP to the real world: efficient complete solutions for
-distributed multi-event scheduling", AAMAS 2004. Persons value their time: each slot that stays free is worth something
-to them, and so is each of their meetings, for each slot that it takes. A meeting needs all its participants at the same
-time, in as many slots in a row as it is long; nobody is in two at once. It need not take place. To be maximised is the
-sum over all meetings that do: for each participant and slot, the meeting's value less that of the slot.
+distributed multi-event scheduling", AAMAS 2004. For each person, a free slot has a value, and each of its meetings has
+a value per slot. A meeting needs all its participants at the same time, in consecutive slots; no person is in two
+meetings at once. A meeting need not take place. The sum over all meetings that take place is maximised: for each
+participant and slot, the value of the meeting minus that of the free slot.
 
 The three models of the paper, with the same maximum:
 
 * `peav` (private events as variables): a robot is a person, with a variable for each of its meetings: the slot in which
-  it starts, or 0 where it does not take place. What meetings and slots are worth stays private. Participants of a
-  meeting have equal values.
-* `eav` (events as variables): a robot is a meeting with one variable. What it is worth is the sum over its
-  participants. Meetings that share one do not overlap.
-* `tsav` (time slots as variables): a robot is a person, with a variable for each slot: 0 where it is free, or a part of
-  one of its meetings. Parts are as long as a slot and follow each other.
+  the meeting starts, or 0 if it does not take place. The values of meetings and slots stay private. The variables of
+  the participants of a meeting are equal.
+* `eav` (events as variables): a robot is a meeting with one variable. Its utility is the sum over its participants.
+  Meetings with a common participant do not overlap.
+* `tsav` (time slots as variables): a robot is a person, with a variable for each slot: 0 if it is free, or a part of
+  one of its meetings. A part is as long as a slot, and parts follow each other.
 
-Where preferences do not count, all meetings must take place, and the problem is a DisCSP.
+Without preferences, all meetings must take place, and the problem is a DisCSP.
 """
 
 from __future__ import annotations
@@ -29,7 +29,16 @@ from random import Random
 from typing import assert_never
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import MAX_AGENTS, MAX_COST, MAX_VALUES, bounded, check_bounds, seeded, some, uniform
+from robochoc.generators.draws import (
+    MAX_AGENTS,
+    MAX_COST,
+    MAX_VALUES,
+    check_bounds,
+    limited,
+    random_integer,
+    sample,
+    seeded,
+)
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Type, parse
@@ -40,25 +49,25 @@ _TERMS = ("X", "Y", "i", "j")
 ONE_AFTER_THE_OTHER = Predicate(
     "apart", _TERMS, parse("or(eq(X, 0), eq(Y, 0), ge(Y, add(X, i)), ge(X, add(Y, j)))", _TERMS, Type.BOOLEAN)
 )
-"""Meetings that start in the slots X and Y, i and j slots long, do not overlap; 0: it does not take place."""
+"""Meetings that start in the slots X and Y, i and j slots long, do not overlap. The slot 0 means no meeting."""
 AT_ONE_TIME = Predicate(
     "together",
     _TERMS,
     parse("or(eq(X, Y), and(or(lt(X, i), gt(X, j)), or(lt(Y, i), gt(Y, j))))", _TERMS, Type.BOOLEAN),
 )
-"""If a slot of one person, X, or of another, Y, is one of the parts i to j, both are the same."""
+"""If X or Y, the same slot of two persons, is one of the parts i to j of a meeting, both are equal."""
 IN_A_ROW = Predicate(
     "next",
     _TERMS,
     parse("or(eq(Y, add(X, 1)), and(or(lt(X, i), ge(X, j)), or(le(Y, i), gt(Y, j))))", _TERMS, Type.BOOLEAN),
 )
-"""In two slots, X and Y, of which one follows the other, so do the parts i to j of a meeting."""
+"""In two consecutive slots, X and Y, the parts i to j of a meeting follow each other."""
 ONCE = Predicate("once", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
 """No part of a meeting is in two slots."""
 
 
 class MeetingsModel(StrEnum):
-    """What a variable is: a meeting of a person, a meeting, or a slot of a person."""
+    """The meaning of a variable: a meeting of a person, a meeting, or a slot of a person."""
 
     PEAV = "peav"
     EAV = "eav"
@@ -67,7 +76,7 @@ class MeetingsModel(StrEnum):
 
 @dataclass(frozen=True)
 class Meeting:
-    """A meeting: its number, its participants with what it is worth to each in each slot, and its length."""
+    """A meeting: its number, its value per slot for each participant, and its length in slots."""
 
     number: int
     worth: Mapping[int, int]
@@ -76,11 +85,11 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Meetings:
-    """A problem of meetings, as its persons know it.
+    """A problem of meetings.
 
     Attributes:
         slots: The number of slots, which are numbered from 1.
-        free: By person: what each slot is worth if it stays free.
+        free: By person: the value of each slot if it stays free.
         meetings: The meetings.
     """
 
@@ -111,23 +120,23 @@ def meetings(
 ) -> Team:
     """Return the random problem of `seed` of scheduling `meetings` with `participants` each.
 
-    In `peav`, `Robot3` is a person, and `V3.2` is its part in meeting 2; who takes part in none is no robot. In `eav`,
-    `Meeting2` owns `V2`. In `tsav`, `V3.2` is what `Robot3` does in slot 2: the parts of all meetings have numbers from
-    1 on, in their order.
+    In `peav`, `Robot3` is a person, and `V3.2` is the start of meeting 2 for this person; there are no robots for
+    persons without meetings. In `eav`, `Meeting2` owns `V2`. In `tsav`, `V3.2` is the part of a meeting in slot 2 of
+    `Robot3`: the parts of all meetings are numbered from 1, in their order.
 
     Args:
         agents: The number of persons.
         meetings: The number of meetings.
         participants: The number of persons in each meeting, any choice as likely as any other.
         slots: The number of time slots.
-        seed: The same seed makes the same problem on every machine, and the same one in all models.
-        max_length: Meetings take from 1 to so many slots.
-        max_value: A meeting's slot is worth from 1 to so much to a participant; a free one from 0. None: preferences
-            do not count, and all meetings must take place.
-        model: What a variable is.
+        seed: The same seed gives the same problem on every machine, in all models.
+        max_length: The maximum length of a meeting, in slots.
+        max_value: The maximum value of a meeting's slot, and of a free slot, for a participant. None: no preferences,
+            and all meetings must take place.
+        model: The meaning of a variable.
 
     Raises:
-        ValueError: if a number is out of its bounds. The text says which.
+        ValueError: if a number is out of its bounds.
     """
     model = member(MeetingsModel, "model", model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "meetings": (meetings, 1, MAX_AGENTS)})
@@ -145,11 +154,11 @@ def meetings(
             variables, constraints = _tsav(problem, preferences=preferences)
         case never:
             assert_never(never)
-    told = f"-{max_length}-{max_value}" if preferences else f"-{max_length}-required"
+    label = f"-{max_length}-{max_value}" if preferences else f"-{max_length}-required"
     return assemble(
-        f"meetings-{model}-{agents}-{meetings}-{participants}-{slots}{told}-{seed}",
+        f"meetings-{model}-{agents}-{meetings}-{participants}-{slots}{label}-{seed}",
         variables,
-        bounded(constraints),
+        limited(constraints),
         kind=ProblemKind.DISWCSP if preferences else ProblemKind.DISCSP,
         costs=CostUnits(maximize=True) if preferences else PLAIN_COSTS,
     )
@@ -158,12 +167,12 @@ def meetings(
 def drawn_meetings(chance: Random, sizes: tuple[int, int, int, int], max_length: int, max_value: int) -> Meetings:
     """Return random meetings; `sizes` are the numbers of persons, meetings, participants and slots."""
     agents, count, participants, slots = sizes
-    free = {person: [uniform(chance, 0, max_value) for _ in range(slots)] for person in range(1, agents + 1)}
+    free = {person: [random_integer(chance, 0, max_value) for _ in range(slots)] for person in range(1, agents + 1)}
     held = []
     for number in range(1, count + 1):
-        length = uniform(chance, 1, max_length)
-        persons = [place + 1 for place in some(chance, agents, participants)]
-        held.append(Meeting(number, {person: uniform(chance, 1, max_value) for person in persons}, length))
+        length = random_integer(chance, 1, max_length)
+        persons = [place + 1 for place in sample(chance, agents, participants)]
+        held.append(Meeting(number, {person: random_integer(chance, 1, max_value) for person in persons}, length))
     return Meetings(slots, free, held)
 
 
@@ -275,7 +284,7 @@ def _worth_of_slots(
 
 
 def _takes_place(person: int, meeting: Meeting, first: int, slots: int) -> Constraint:
-    """The first part of `meeting` is in one of the person's slots."""
+    """Return the constraint that the first part of `meeting` is in one of the person's slots."""
     names = tuple(f"S{slot}" for slot in range(1, slots + 1))
     parts = [f"eq({name}, i)" for name in names]
     body = f"or({', '.join(parts)})" if slots > 1 else parts[0]
@@ -285,13 +294,13 @@ def _takes_place(person: int, meeting: Meeting, first: int, slots: int) -> Const
 
 
 def _starts(problem: Meetings, meeting: Meeting, *, preferences: bool) -> Domain:
-    """Return the slots in which `meeting` can start, and 0 where it need not take place."""
+    """Return the slots in which `meeting` can start, and 0 if it need not take place."""
     starts = problem.starts(meeting)
     return Domain(f"Length{meeting.length}", (range(0 if preferences else 1, starts.stop),))
 
 
 def _rivals(problem: Meetings) -> Iterator[tuple[Meeting, Meeting, list[int]]]:
-    """Yield all pairs of meetings that share participants, with these."""
+    """Yield all pairs of meetings with common participants, and these participants."""
     for one, other in itertools.combinations(problem.meetings, 2):
         shared = [person for person in one.worth if person in other.worth]
         if shared:

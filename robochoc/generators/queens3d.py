@@ -1,15 +1,15 @@
-"""3D N^2 queens: n x n robots, one a cell, each choosing its level so that no two attack each other.
+"""3D N^2 queens: n x n robots, one per cell, each choosing its level so that no two attack each other.
 
 Paper, Section 5.1, and Allison, Yee and McGaughey, TR 89/130 (1989). Two models:
 
-* `planar`, what the XML of Figure 2 says: robots of a row or a column take different levels and stand on no
-  diagonal; robots on a diagonal of the board (|di| = |dj|) take different levels.
+* `planar`, as in the XML of Figure 2: robots of a row or a column have different levels that are not on a diagonal;
+  robots on a diagonal of the board (|di| = |dj|) have different levels.
 * `full` adds the space diagonals (|di| = |dj| = |dk| attacks too): Allison's queen, which moves in 26 directions.
 
-The constraint C3 printed in the paper contradicts its own Figure 2 and is neither.
+The constraint C3 printed in the paper contradicts Figure 2, and is in neither model.
 
-The team may have a robot for every cell, as in the paper, or one for every row: a complex agent that flies n drones,
-whose private constraints are those within the row.
+The team has a robot for every cell, as in the paper, or one for every row: a complex agent that flies n drones, whose
+private constraints are those within the row.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ Cell = tuple[int, int]
 
 
 class QueensModel(StrEnum):
-    """How queens attack: as in Figure 2, or as Allison's."""
+    """The attacks of a queen: as in Figure 2, or as Allison's."""
 
     PLANAR = "planar"
     FULL = "full"
 
 
 class QueensRobots(StrEnum):
-    """The drones of a robot: that of one cell, or those of a row."""
+    """The drones of a robot: that of a cell, or those of a row."""
 
     CELLS = "cells"
     ROWS = "rows"
@@ -51,7 +51,7 @@ NOT_ATTACKING = Predicate(
     ("X", "Y", "i", "j"),
     parse("and(neq(X, Y), neq(abs(minus(X, Y)), abs(minus(i, j))))", ("X", "Y", "i", "j"), Type.BOOLEAN),
 )
-"""Figure 2's p1: levels X and Y differ, and are no diagonal at the distance |i - j|."""
+"""Figure 2's p1: levels X and Y differ, and are not on a diagonal at the distance |i - j|."""
 
 
 def queens3d(
@@ -61,11 +61,11 @@ def queens3d(
 
     Args:
         n: The size of the cube, at most `MAX_N`.
-        model: How queens attack: as in Figure 2 (`planar`), or in space as well (`full`).
-        robots: Whether a robot flies the drone of one cell (`cells`), or those of a row (`rows`).
+        model: The attacks of a queen: as in Figure 2 (`planar`), or in space as well (`full`).
+        robots: The drones of a robot: that of a cell (`cells`), or those of a row (`rows`).
 
     Raises:
-        ValueError: if `n` is not from 1 to `MAX_N`, or the model or the robots are not known.
+        ValueError: if `n` is not from 1 to `MAX_N`, or the model or the robots are unknown.
 
     Example:
         >>> from robochoc.generators.queens3d import queens3d

@@ -1,4 +1,4 @@
-"""Uniform binary random problems: Model B, a robot a variable; with or without costs; on this or that graph.
+"""Uniform binary random problems of Model B, one variable per robot, with or without costs, on various graphs.
 
 Gent, MacIntyre, Prosser, Smith and Walsh, "Random constraint satisfaction: flaws and structure", Constraints 6
 (2001), Section 2; Prosser, "An empirical study of phase transitions in binary constraint satisfaction problems", AIJ
@@ -10,16 +10,16 @@ As the 2001 paper shows, problems with p2 >= 1/d are flawed when they are large 
 variable of which each value alone is ruled out by a neighbour. At the sizes that protocols are compared on (up to
 some tens of variables) that is rare.
 
-With `max_cost`, pairs of values that are not forbidden cost something: each a number from 0 to `max_cost`, all as
-likely, whatever the others cost. With a tightness of 0 nothing is forbidden. That is the usual random DCOP. Costs may
-have decimal places, and may be utilities whose sum is maximised.
+With `max_cost`, each pair of values that is not forbidden has a cost, drawn independently and uniformly from 0 to
+`max_cost`. With a tightness of 0 no pair is forbidden: the usual random DCOP. Costs may have decimal places, and
+may be utilities whose sum is maximised.
 
-With `asymmetric`, each robot of a pair has costs of its own, drawn apart, and their sum is minimised: the usual random
-ADCOP (Grinshpoun, Grubshtein, Zivan, Netzer, Meisels, JAIR 47, 2013). What is forbidden, both forbid.
+With `asymmetric`, each robot of a pair has its own costs, drawn independently, and their sum is minimised: the usual
+random ADCOP (Grinshpoun, Grubshtein, Zivan, Netzer, Meisels, JAIR 47, 2013). Forbidden pairs are forbidden by both.
 
-Instead of p1, `random_on` takes a graph: scale-free, small world, grid, tree, or a given one (`generators/graphs.py`).
+Instead of p1, `random_on` has a graph: scale-free, small world, grid, tree, or from a file (`generators/graphs.py`).
 
-A seed makes the same problem on every machine and with every version of Python (`generators/draws.py`).
+A seed gives the same problem on every machine and with every version of Python (`generators/draws.py`).
 """
 
 from __future__ import annotations
@@ -29,15 +29,23 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from types import MappingProxyType
 
-from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded, some
-from robochoc.generators.draws import uniform as any_of
+from robochoc.generators.draws import (
+    MAX_COST,
+    MAX_NODES,
+    MAX_VALUES,
+    check_bounds,
+    check_places,
+    random_integer,
+    sample,
+    seeded,
+)
 from robochoc.generators.graphs import Edge, Graph, uniform
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 
 MAX_FORBIDDEN_PAIRS = 1_000_000
-"""The maximum for all constraints together: robots' files stay readable. With costs: the maximum of pairs of values."""
+"""The maximum of all constraints together, for files of a readable size. With costs: the maximum of all pairs."""
 
 
 def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
@@ -54,7 +62,7 @@ def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
 ) -> Team:
     """Return the random problem <agents, domain, density, tightness> of `seed`.
 
-    `Robot3` owns `V3` and holds its constraints with robots of smaller numbers.
+    `Robot3` owns `V3`, and lists its constraints with robots of smaller numbers.
 
     Args:
         agents: The number of robots, each with one variable.
@@ -65,7 +73,7 @@ def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
         connected: Whether graphs are drawn until one is connected. Each connected graph is then as likely as any other.
         max_cost: The maximum cost of pairs of values that are not forbidden: the team is a DisWCSP. None: no costs.
         costs: The decimal places of costs, and whether they are utilities to be maximised.
-        asymmetric: Whether each robot of a pair has costs of its own (partially known constraints).
+        asymmetric: Whether each robot of a pair has its own costs (partially known constraints).
 
     Raises:
         ValueError: if there is no such problem, or it is too large. The message names the number to change.
@@ -93,7 +101,7 @@ def random_on(
     costs: CostUnits = PLAIN_COSTS,
     asymmetric: bool = False,
 ) -> Team:
-    """Return a random problem on `graph`; all else is as in `random_csp`.
+    """Return a random problem on `graph`, with the parameters of `random_csp`.
 
     Raises:
         ValueError: if there is no such problem, or it is too large. The message names the number to change.
@@ -101,9 +109,9 @@ def random_on(
     check_bounds({"domain": (domain, 1, MAX_VALUES), "tightness": (tightness, 0, 1)})
     check_places(costs.places)
     if max_cost is None and costs != PLAIN_COSTS:
-        raise ValueError("there are no costs, which could have decimal places or be maximised; give a maximum cost")
+        raise ValueError("decimal places, and maximising, require costs; give a maximum cost")
     if max_cost is None and asymmetric:
-        raise ValueError("there are no costs, which could be asymmetric; give a maximum cost")
+        raise ValueError("an asymmetric problem requires costs; give a maximum cost")
     chance = seeded(seed)
     edges = graph.draw(chance)
     _check_sizes(len(edges) * (1 + asymmetric), domain, tightness, max_cost)
@@ -118,10 +126,10 @@ def random_on(
                 parts[f"Robot{number}"].append(part)
         else:
             (constraints[edge],) = drawn
-    told = "" if max_cost is None else f"-{'utility' if costs.maximize else 'cost'}{max_cost}{places_told(costs)}"
-    told += "-asymmetric" * asymmetric
+    label = "" if max_cost is None else f"-{'utility' if costs.maximize else 'cost'}{max_cost}{places_label(costs)}"
+    label += "-asymmetric" * asymmetric
     return team_of_edges(
-        f"random-{graph.agents}-{domain}-{graph.label}-{float(tightness)}{told}-{seed}{graph.suffix}",
+        f"random-{graph.agents}-{domain}-{graph.label}-{float(tightness)}{label}-{seed}{graph.suffix}",
         graph.agents,
         domain,
         constraints,
@@ -131,7 +139,7 @@ def random_on(
     )
 
 
-def places_told(costs: CostUnits) -> str:
+def places_label(costs: CostUnits) -> str:
     """Return the decimal places in a team's name: empty, or `.000`."""
     return f".{'0' * costs.places}" if costs.places else ""
 
@@ -147,7 +155,7 @@ def team_of_edges(
 ) -> Team:
     """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint.
 
-    `parts` are what robots alone know of partially known constraints, by the robot's name.
+    `parts` are the parts of partially known constraints, by the name of the robot that knows them.
     """
     values = Domain("D", (range(1, domain + 1),))
     variables = {f"Robot{number}": [Variable(f"V{number}", values)] for number in range(1, agents + 1)}
@@ -155,11 +163,11 @@ def team_of_edges(
 
 
 def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None) -> None:
-    """Raise `ValueError` unless files can hold so many constraints' pairs of values."""
+    """Raise `ValueError` if the constraints have too many pairs of values for files."""
     forbidden = round(tightness * domain**2)
     if edges * forbidden > MAX_FORBIDDEN_PAIRS:
         raise ValueError(
-            f"{edges:,} constraints of {forbidden:,} forbidden pairs are more than {MAX_FORBIDDEN_PAIRS:,}"
+            f"{edges:,} constraints with {forbidden:,} forbidden pairs each: more than {MAX_FORBIDDEN_PAIRS:,} together"
         )
     if max_cost is None:
         return
@@ -170,8 +178,8 @@ def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None
 
 
 def _drawn(chance: Random, edge: Edge, domain: int, forbidden: int, sides: Sequence[int | None]) -> list[Constraint]:
-    """Return a constraint on `edge` for each of its `sides`: their highest costs, or None for what only forbids."""
-    relation = _forbidding(edge, some(chance, domain**2, forbidden), domain)
+    """Return a constraint on `edge` for each of its `sides`: the maximum cost, or None to forbid only."""
+    relation = _forbidding(edge, sample(chance, domain**2, forbidden), domain)
     scope = tuple(f"V{number}" for number in edge)
     relations = [relation if most is None else _charging(chance, relation, domain, most) for most in sides]
     return [Constraint(f"C{edge[0]}.{edge[1]}", one, scope, scope) for one in relations]
@@ -184,10 +192,10 @@ def _forbidding(edge: Edge, forbidden: list[int], domain: int) -> Relation:
 
 
 def _charging(chance: Random, relation: Relation, domain: int, most: int) -> Relation:
-    """Return `relation`, which forbids pairs of values, with a cost of at `most` so many units for all others."""
+    """Return `relation`, which forbids pairs of values, with random costs of at most `most` for all others."""
     priced: dict[tuple[int, ...], float] = dict.fromkeys(relation.tuples, INFINITE)
     for pair in itertools.product(range(1, domain + 1), repeat=2):
         if pair not in priced:
-            priced[pair] = any_of(chance, 0, most)
+            priced[pair] = random_integer(chance, 0, most)
     listed = sorted(pair for pair, cost in priced.items() if cost)
     return Relation(relation.name, 2, Semantics.SOFT, tuple(listed), tuple(priced[pair] for pair in listed))

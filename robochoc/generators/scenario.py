@@ -5,10 +5,10 @@ reuse in dynamic constraint satisfaction problems", AAAI 1994; of distributed op
 Koenig, "Incremental DCOP search algorithms for solving dynamic DCOPs", AAMAS 2011). The rate is the number of changes
 in an event, as a share of the team's shared constraints.
 
-What has gone may come back: values, constraints, and robots under their old names. Where nothing has gone, a variable
-gets a value of another one's domain, two robots get a constraint like one that others share, and a robot comes that is
-like one that is there: with such variables, and such constraints with the same robots. A domain keeps a value at least,
-and a team two robots.
+Removed values, constraints and robots are added again under their old names. If nothing was removed, a variable gets a
+value of the domain of another variable, two robots get a copy of a constraint that others share, and a copy of a robot
+joins, with copies of its variables and of its constraints with the same robots. A domain keeps at least one value, and
+a team two robots.
 """
 
 from __future__ import annotations
@@ -49,8 +49,8 @@ MIN_ROBOTS = 2
 _One = TypeVar("_One")
 
 
-class Kind(StrEnum):
-    """The kinds of changes."""
+class ChangeKind(StrEnum):
+    """The kinds of random changes."""
 
     REMOVE_VALUE = "remove-value"
     ADD_VALUE = "add-value"
@@ -66,17 +66,17 @@ def random_scenario(
     rate: float,
     seed: int = 0,
     *,
-    kinds: Iterable[Kind | str] = tuple(Kind),
+    kinds: Iterable[ChangeKind | str] = tuple(ChangeKind),
     after: int | None = None,
 ) -> Team:
-    """Return `team` with a random scenario that it can take.
+    """Return `team` with a random scenario of possible changes.
 
     Args:
         team: A team without a scenario.
         events: The number of events.
         rate: The changes in each event, as a share of the team's shared constraints, more than 0 and at most 1; it is
             at least one change.
-        seed: The same seed makes the same scenario of the same team on every machine.
+        seed: The same seed gives the same scenario for the same team on every machine.
         kinds: The kinds of changes, each as likely as any other.
         after: The number of messages after which an event happens. None: when the problem before it is solved.
 
@@ -85,23 +85,23 @@ def random_scenario(
     """
     check_bounds({"events": (events, 1, MAX_EVENTS), "rate": (rate, 0, 1)})
     if team.scenario:
-        raise ValueError(f"{team.name} has a scenario already; take a team without one")
-    named = {member(Kind, "kinds", one) for one in kinds}
-    wanted = [kind for kind in Kind if kind in named] or list(Kind)
+        raise ValueError(f"{team.name} has a scenario already; use a team without one")
+    named = {member(ChangeKind, "kinds", one) for one in kinds}
+    wanted = [kind for kind in ChangeKind if kind in named] or list(ChangeKind)
     shared = sum(len(robot.shared) for robot in team.robots)
     changes = max(1, round(rate * shared))
     check_bounds({"changes of all events": (events * changes, 1, MAX_CONSTRAINTS)})
-    author = _Author(seeded(seed), team, wanted)
-    written = tuple(ScenarioEvent(tuple(author.change() for _ in range(changes)), after) for _ in range(events))
-    told = "" if set(wanted) == set(Kind) else "-" + "-".join(wanted)
-    name = f"{team.name}-events{events}-{float(rate)}{told}-{seed}"
+    builder = _ScenarioBuilder(seeded(seed), team, wanted)
+    written = tuple(ScenarioEvent(tuple(builder.change() for _ in range(changes)), after) for _ in range(events))
+    label = "" if set(wanted) == set(ChangeKind) else "-" + "-".join(wanted)
+    name = f"{team.name}-events{events}-{float(rate)}{label}-{seed}"
     return replace(team, name=name, scenario=written)
 
 
-class _Author:
-    """Writes one change after the other, and keeps what has gone."""
+class _ScenarioBuilder:
+    """Draws one change after the other, and stores removed parts, so that they can be added again."""
 
-    def __init__(self, chance: Random, team: Team, kinds: Sequence[Kind]) -> None:
+    def __init__(self, chance: Random, team: Team, kinds: Sequence[ChangeKind]) -> None:
         self._chance = chance
         self._team = team
         self._kinds = kinds
@@ -109,17 +109,17 @@ class _Author:
         self._constraints: list[Constraint] = []
         self._robots: list[tuple[Robot, list[Constraint]]] = []
         self._numbers = count(1)
-        self._make: Mapping[Kind, Callable[[], Change | None]] = {
-            Kind.REMOVE_VALUE: self._remove_value,
-            Kind.ADD_VALUE: self._add_value,
-            Kind.REMOVE_CONSTRAINT: self._remove_constraint,
-            Kind.ADD_CONSTRAINT: self._add_constraint,
-            Kind.REMOVE_AGENT: self._remove_agent,
-            Kind.ADD_AGENT: self._add_agent,
+        self._make: Mapping[ChangeKind, Callable[[], Change | None]] = {
+            ChangeKind.REMOVE_VALUE: self._remove_value,
+            ChangeKind.ADD_VALUE: self._add_value,
+            ChangeKind.REMOVE_CONSTRAINT: self._remove_constraint,
+            ChangeKind.ADD_CONSTRAINT: self._add_constraint,
+            ChangeKind.REMOVE_AGENT: self._remove_agent,
+            ChangeKind.ADD_AGENT: self._add_agent,
         }
 
     def change(self) -> Change:
-        """Return a change that the team as it is then can take."""
+        """Return a possible change of the team, and apply it."""
         for _ in range(MAX_TRIES):
             change = self._make[self._one(self._kinds)]()
             if change is None:
@@ -131,13 +131,13 @@ class _Author:
             self._note(change)
             self._team = after
             return change
-        raise ValueError(f"the team can take no more changes of the kinds {', '.join(self._kinds)}; name more kinds")
+        raise ValueError(f"no further change of the kinds {', '.join(self._kinds)} is possible; allow more kinds")
 
     def _one(self, things: Sequence[_One]) -> _One:
         return things[int(self._chance.random() * len(things))]
 
     def _note(self, change: Change) -> None:
-        """Keep what `change` takes away, and forget what it brings back."""
+        """Store the part that `change` removes, and delete a stored part that it adds again."""
         match change:
             case RemoveValue(variable, value):
                 self._values.append((variable, value))
@@ -197,7 +197,7 @@ class _Author:
         return self._added(replace(_renamed(old, terms), name=f"Added{next(self._numbers)}", line=0))
 
     def _added(self, constraint: Constraint) -> AddConstraint:
-        """Return the change that gives `constraint` to the lowest robot of its scope, under the next."""
+        """Return the change that adds `constraint` to the lowest robot of its scope, under the second lowest."""
         rank = {name: place for place, name in enumerate(self._team.order)}
         owners = sorted({self._team.owner[name] for name in constraint.variables}, key=rank.__getitem__)
         return AddConstraint(owners[-1], owners[-2], constraint)
@@ -219,7 +219,7 @@ class _Author:
         )
 
     def _joining(self, robot: Robot, constraints: Iterable[Constraint]) -> Robot:
-        """Return `robot` as the lowest one, which holds those of `constraints` whose other robots are there."""
+        """Return `robot` with the lowest priority, and those of `constraints` whose other robots are in the team."""
         own = {variable.name for variable in robot.variables}
         rank = {name: place for place, name in enumerate(self._team.order)}
         private, under = list[Constraint](), dict[str, list[Constraint]]()
@@ -244,7 +244,7 @@ class _Author:
 
 
 def _known(constraint: Constraint) -> bool:
-    """Return whether a scenario can bring it: no partially known one."""
+    """Return whether it is totally known: a scenario cannot add other constraints."""
     return constraint.model != ConstraintModel.PKC
 
 
@@ -255,7 +255,7 @@ def _under(team: Team, agent: str, parent: str) -> Iterator[Constraint]:
 
 
 def _constraints_of(team: Team, name: str) -> list[Constraint]:
-    """Return the private constraints of a robot, and all that it shares."""
+    """Return the private constraints of a robot, and all constraints over its variables."""
     own = {variable.name for variable in team[name].variables}
     shared = (one for robot in team.robots for one in robot.shared)
     return [*team[name].private, *(one for one in shared if not own.isdisjoint(one.variables))]

@@ -1,19 +1,19 @@
-"""SensorDCSP: each target is tracked by so many sensors that see it and hear each other; a sensor tracks one at most.
+"""SensorDCSP: several sensors that see it and hear each other track each target; a sensor tracks at most one.
 
 Bejar, Domshlak, Fernandez, Gomes, Krishnamachari, Selman and Valls, "Sensor networks and distributed CSP:
 communication, computation and complexity", AIJ 161 (2005); CSPLib, problem 72. Three sensors a target triangulate it.
 
 * `sensors`, SensorDCSP: each target is visible to each sensor, and each pair of sensors compatible, with a given
   probability.
-* `grid_sensors`, GSensorDCSP: sensors stand on the nodes of a grid and targets in its cells, one a cell at most.
-  Sensors see and hear as far as is said; some of these links may fail, with a probability.
+* `grid_sensors`, GSensorDCSP: sensors are on the nodes of a grid and targets in its cells, at most one per cell.
+  Sensors see and hear up to given distances; each of these links may fail with a probability.
 
 Two models, satisfiable together:
 
-* `targets` (the paper's; CSPLib's TaV): a robot is a target, with a variable for each sensor that it needs: which one.
-  Its variables are different and compatible (private); those of two targets are different.
-* `sensors` (as CSPLib's SaV): a robot is a sensor with one variable: the target that it tracks, or 0. Of those that see
-  a target at least so many track it (a constraint over all of them), and two that are not compatible do not both.
+* `targets` (the paper's; CSPLib's TaV): a robot is a target, with a variable for each sensor that it needs; the values
+  are sensors. Its variables are different and compatible (private); those of two targets are different.
+* `sensors` (as CSPLib's SaV): a robot is a sensor with one variable: the target that it tracks, or 0. At least the
+  needed number of the sensors that see a target track it (a constraint over all of them), and no two incompatible ones.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from enum import StrEnum
 from typing import assert_never
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some
+from robochoc.generators.draws import MAX_AGENTS, check_bounds, limited, sample, seeded
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Name, Type, parse, total
 from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Semantics, Team, Term, Variable
@@ -40,7 +40,7 @@ NOT_BOTH = Predicate("notBoth", ("X", "Y", "t"), parse("or(ne(X, t), ne(Y, t))",
 
 
 class SensorsModel(StrEnum):
-    """What a robot is: a target, or a sensor."""
+    """The meaning of a robot: a target, or a sensor."""
 
     TARGETS = "targets"
     SENSORS = "sensors"
@@ -48,11 +48,11 @@ class SensorsModel(StrEnum):
 
 @dataclass(frozen=True)
 class Reach:
-    """How far sensors on a grid see and hear.
+    """The distances at which sensors on a grid see and hear.
 
     Attributes:
-        sight: Sensors see so far: 1, the four cells around them; 2, the sixteen; and so on.
-        hearing: Sensors hear others at most so many steps away, along the grid or diagonally.
+        sight: The range of sight: with 1 the four cells around a sensor, with 2 the sixteen cells, and so on.
+        hearing: The maximum number of steps to a sensor that is heard, along the grid or diagonally.
         visibility: The probability that a sensor that is near enough sees a target.
         compatibility: The probability that two sensors that are near enough are compatible.
     """
@@ -65,7 +65,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class SensorNetwork:
-    """Who sees what, and who hears whom.
+    """The targets that sensors see, and the sensors that they hear.
 
     Attributes:
         sensors: The number of sensors, which are numbered from 1.
@@ -95,14 +95,14 @@ def sensors(
     Args:
         sensors: The number of sensors.
         targets: The number of targets.
-        seed: The same seed makes the same problem on every machine, and the same one in both models.
+        seed: The same seed gives the same problem on every machine, in both models.
         visibility: The probability that a sensor sees a target.
         compatibility: The probability that two sensors are compatible.
         needed: The number of sensors that a target needs.
-        model: What a robot is.
+        model: The meaning of a robot.
 
     Raises:
-        ValueError: if a number is out of its bounds, or no sensor sees a target. The text says which.
+        ValueError: if a number is out of its bounds, or no sensor sees a target.
     """
     check_bounds({"sensors": (sensors, 1, MAX_AGENTS), "targets": (targets, 1, MAX_AGENTS)})
     _check_shares(visibility, compatibility, needed)
@@ -135,13 +135,13 @@ def grid_sensors(
         rows: The number of rows of sensors.
         columns: The number of columns of sensors.
         targets: The number of targets, each in the middle of a cell of its own.
-        seed: The same seed makes the same problem on every machine, and the same one in both models.
-        reach: How far sensors see and hear.
+        seed: The same seed gives the same problem on every machine, in both models.
+        reach: The distances at which sensors see and hear.
         needed: The number of sensors that a target needs.
-        model: What a robot is.
+        model: The meaning of a robot.
 
     Raises:
-        ValueError: if a number is out of its bounds, or no sensor sees a target. The text says which.
+        ValueError: if a number is out of its bounds, or no sensor sees a target.
     """
     check_bounds({"rows": (rows, 2, MAX_AGENTS), "columns": (columns, 2, MAX_AGENTS)})
     cells = (rows - 1) * (columns - 1)
@@ -152,7 +152,7 @@ def grid_sensors(
     chance = seeded(seed)
     nodes = list(itertools.product(range(rows), range(columns)))
     seen_by = []
-    for cell in some(chance, cells, targets):
+    for cell in sample(chance, cells, targets):
         row, column = divmod(cell, columns - 1)  # its upper left node
         near = (
             number
@@ -180,10 +180,10 @@ def _check_shares(visibility: float, compatibility: float, needed: int) -> None:
 def _team(name: str, network: SensorNetwork, model: SensorsModel) -> Team:
     for target, seen in enumerate(network.seen_by, 1):
         if not seen:
-            raise ValueError(f"no sensor sees target {target}: nothing to choose from; take another seed or more sight")
+            raise ValueError(f"no sensor sees target {target}; use another seed, or increase the sight or visibility")
     pairs = sum(len(seen) ** 2 for seen in network.seen_by)
     if pairs > MAX_PAIRS:
-        raise ValueError(f"{pairs:,} pairs of sensors see the same target, more than {MAX_PAIRS:,}; ask for fewer")
+        raise ValueError(f"{pairs:,} pairs of sensors see the same target, more than {MAX_PAIRS:,}; use fewer sensors")
     match model:
         case SensorsModel.TARGETS:
             variables, constraints = _of_targets(network)
@@ -191,7 +191,7 @@ def _team(name: str, network: SensorNetwork, model: SensorsModel) -> Team:
             variables, constraints = _of_sensors(network)
         case never:
             assert_never(never)
-    return assemble(name, variables, bounded(constraints))
+    return assemble(name, variables, limited(constraints))
 
 
 _Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]

@@ -1,11 +1,11 @@
-"""Task allocation to robots: tasks lie about, ask for a skill, and are worth something; to get there costs its way.
+"""Task allocation to robots: each task has a place, a required skill and a worth; travelling to it has a cost.
 
-* `assignment`: a robot does one task at most, and a task is done by one robot at most. This is ST-SR-IA, the assignment
+* `assignment`: a robot does at most one task, and a task is done by at most one robot. This is ST-SR-IA, the assignment
   problem, in Gerkey and Mataric, "A formal analysis and taxonomy of task allocation in multi-robot systems", IJRR 23
   (2004). A robot's variable is its task, or 0.
-* `several`: a robot does as many tasks as it has room for, and a task is done by one robot at most. This is the
+* `several`: a robot does several tasks, within its capacity, and a task is done by at most one robot. This is the
   generalised assignment problem of Scerri, Farinelli, Okamoto and Tambe, "Allocating tasks in extreme teams", AAMAS
-  2005. A robot has a variable for each task that it could do: 1, it does it.
+  2005. A robot has a variable for each task that it can do: 1 if it does it, else 0.
 
 The sum of the worth of all tasks that are done, less the ways of those who do them, is maximised. Ways are straight
 lines from the robot to the task, or along streets (Manhattan's); robots and tasks lie on points of whole numbers.
@@ -22,12 +22,12 @@ from typing import assert_never
 from robochoc.generators.draws import (
     MAX_AGENTS,
     MAX_COST,
-    bounded,
     check_bounds,
     check_places,
+    limited,
+    random_integer,
+    sample,
     seeded,
-    some,
-    uniform,
 )
 from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
 from robochoc.model.assembly import assemble
@@ -40,13 +40,13 @@ MAX_SKILLS = 100
 
 
 @dataclass(frozen=True)
-class Ways:
+class Travel:
     """Where robots and tasks are, and how long ways are.
 
     Attributes:
         side: Robots and tasks lie in a square, at whole coordinates from 0 to `side`.
         distance: How long a way is.
-        places: The decimal places of straight ways.
+        places: The decimal places of straight travel.
     """
 
     side: int = 100
@@ -56,11 +56,11 @@ class Ways:
 
 @dataclass(frozen=True)
 class Skills:
-    """What robots can do.
+    """The skills of robots.
 
     Attributes:
-        number: The number of skills that there are. A task asks for one, each as likely as any other.
-        each: The number of skills that a robot has, any choice as likely as any other.
+        number: The number of skills. A task requires one, each as likely as any other.
+        each: The number of skills of a robot, any choice as likely as any other.
     """
 
     number: int = 1
@@ -68,13 +68,13 @@ class Skills:
 
 
 @dataclass(frozen=True)
-class Tasks:
-    """A problem of tasks.
+class DrawnTasks:
+    """A random problem of tasks.
 
     Attributes:
-        profit: By robot and task that it has the skill for: what the task is worth, less the way there.
-        load: The room that each task takes.
-        capacity: The room that a robot has.
+        profit: By robot and task that it has the skill for: the worth of the task minus the distance to it.
+        load: The load of each task.
+        capacity: The maximum load of a robot.
     """
 
     profit: dict[int, dict[int, int]]
@@ -88,35 +88,36 @@ def tasks(
     seed: int = 0,
     *,
     worth: int = 200,
-    ways: Ways = Ways(),
+    travel: Travel = Travel(),
     skills: Skills = Skills(),
     model: TasksModel | str = TasksModel.ASSIGNMENT,
     capacity: int = 3,
 ) -> Team:
     """Return the random problem of `seed` of allocating `tasks` to robots.
 
-    In `assignment`, `Robot3` owns `V3`. Of `several`, `V3.2` says whether it does task 2; who can do none is no robot.
+    In `assignment`, `Robot3` owns `V3`. In `several`, `V3.2` is 1 if it does task 2; robots that can do no task are
+    left out.
 
     Args:
         agents: The number of robots.
         tasks: The number of tasks.
-        seed: The same seed makes the same problem on every machine.
-        worth: A task is worth from 1 to so much.
-        ways: Where all are, and how long ways are.
-        skills: What robots can do.
-        model: How many tasks a robot can do.
-        capacity: The room of a robot for several tasks, of which each takes from 1 to 3.
+        seed: The same seed gives the same problem on every machine.
+        worth: The maximum worth of a task; the minimum is 1.
+        travel: Where robots and tasks are, and how distances are measured.
+        skills: The skills of robots.
+        model: Whether a robot does at most one task, or several.
+        capacity: The maximum load of a robot in `several`; the load of a task is from 1 to 3.
 
     Raises:
-        ValueError: if a number is out of its bounds. The text says which.
+        ValueError: if a number is out of its bounds, or no robot has a required skill.
     """
     model = member(TasksModel, "model", model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "tasks": (tasks, 1, MAX_AGENTS)})
-    check_bounds({"side": (ways.side, 1, MAX_SIDE), "worth": (worth, 1, MAX_COST)})
+    check_bounds({"side": (travel.side, 1, MAX_SIDE), "worth": (worth, 1, MAX_COST)})
     check_bounds({"skills": (skills.number, 1, MAX_SKILLS), "skilled": (skills.each, 1, skills.number)})
     check_bounds({"capacity": (capacity, 1, MAX_AGENTS)})
-    check_places(ways.places)
-    problem = drawn_tasks(seeded(seed), (agents, tasks, worth), ways, skills, capacity)
+    check_places(travel.places)
+    problem = drawn_tasks(seeded(seed), (agents, tasks, worth), travel, skills, capacity)
     match model:
         case TasksModel.ASSIGNMENT:
             variables, constraints = assignment(_workers(problem))
@@ -126,38 +127,40 @@ def tasks(
         case never:
             assert_never(never)
     if not variables:
-        raise ValueError("no robot has a skill that a task asks for; another seed, or more of skilled")
-    told = f"{ways.side}-{worth}-{skills.each}of{skills.number}-{ways.distance}{ways.places or ''}"
+        raise ValueError("no robot has a skill that a task requires; use another seed, or increase skilled")
+    label = f"{travel.side}-{worth}-{skills.each}of{skills.number}-{travel.distance}{travel.places or ''}"
     room = f"-{capacity}" if model == TasksModel.SEVERAL else ""
     return assemble(
-        f"tasks-{model}-{agents}-{tasks}-{told}{room}-{seed}",
+        f"tasks-{model}-{agents}-{tasks}-{label}{room}-{seed}",
         variables,
-        bounded(constraints),
+        limited(constraints),
         kind=ProblemKind.DISWCSP,
-        costs=CostUnits(maximize=True, places=ways.places),
+        costs=CostUnits(maximize=True, places=travel.places),
     )
 
 
-def drawn_tasks(chance: Random, numbers: tuple[int, int, int], ways: Ways, skills: Skills, capacity: int) -> Tasks:
-    """Return random tasks; `numbers` are those of robots and tasks, and what a task is worth at most."""
+def drawn_tasks(
+    chance: Random, numbers: tuple[int, int, int], travel: Travel, skills: Skills, capacity: int
+) -> DrawnTasks:
+    """Return random tasks; `numbers` are those of robots and of tasks, and the maximum worth of a task."""
     agents, count, most = numbers
 
     def point() -> tuple[int, int]:
-        return uniform(chance, 0, ways.side), uniform(chance, 0, ways.side)
+        return random_integer(chance, 0, travel.side), random_integer(chance, 0, travel.side)
 
-    robots = {robot: (point(), set(some(chance, skills.number, skills.each))) for robot in range(1, agents + 1)}
+    robots = {robot: (point(), set(sample(chance, skills.number, skills.each))) for robot in range(1, agents + 1)}
     profit: dict[int, dict[int, int]] = {robot: {} for robot in robots}
     load = {}
     for task in range(1, count + 1):
-        place, skill = point(), uniform(chance, 0, skills.number - 1)
-        worth, load[task] = uniform(chance, 1, most) * 10**ways.places, uniform(chance, 1, 3)
+        place, skill = point(), random_integer(chance, 0, skills.number - 1)
+        worth, load[task] = random_integer(chance, 1, most) * 10**travel.places, random_integer(chance, 1, 3)
         for robot, (start, has) in robots.items():
             if skill in has:
-                profit[robot][task] = worth - way(start, place, ways.distance, ways.places)
-    return Tasks(profit, load, capacity)
+                profit[robot][task] = worth - way(start, place, travel.distance, travel.places)
+    return DrawnTasks(profit, load, capacity)
 
 
-def _workers(problem: Tasks) -> list[Worker]:
+def _workers(problem: DrawnTasks) -> list[Worker]:
     return [
         Worker(f"Robot{robot}", str(robot), f"V{robot}", profit, problem.capacity)
         for robot, profit in problem.profit.items()

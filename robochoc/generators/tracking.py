@@ -1,11 +1,10 @@
-"""Target tracking by mobile sensors: robots choose where to stand, targets ask to be covered.
+"""Target tracking by mobile sensors: robots choose their cells, so that targets are covered.
 
 One step of DCOP_MST: Zivan, Yedidsion, Okamoto, Glinton and Sycara, "Distributed constraint optimization for teams of
 mobile sensing agents", JAAMAS 29 (2015); first in Zivan, Glinton and Sycara, "Distributed constraint optimization for
-large teams of mobile sensing agents", IAT 2009. A robot's variable is its cell in the field; it can get as far as its
-mobility. A target has a requirement; robots that stand within the sensing range cover it, each as far as it is
-credible. What is left uncovered is the cost, whose sum is minimised: for each target one function over all robots that
-can get near enough.
+large teams of mobile sensing agents", IAT 2009. A robot's variable is its cell in the field, within its mobility. A
+target has a requirement; each robot within the sensing range covers as much of it as its credibility. The uncovered
+rest is the cost, whose sum is minimised: for each target one function over all robots that can get near enough.
 
 Cells are numbered row by row from 0; distances are Euclid's between cells.
 """
@@ -17,7 +16,7 @@ from dataclasses import dataclass
 from math import prod
 from random import Random
 
-from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, uniform
+from robochoc.generators.draws import MAX_AGENTS, check_bounds, limited, random_integer, sample, seeded
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Apply, Constant, Expression, Name, total
@@ -28,20 +27,20 @@ MAX_REQUIREMENT = 1000
 MAX_CELLS = 1_000_000
 """The maximum number of cells that all robots together can go to."""
 MAX_COMBINATIONS = 1_000_000
-"""The maximum number of ways in which the robots near a target can stand."""
+"""The maximum number of combinations of cells of the robots near a target."""
 
 
 @dataclass(frozen=True)
 class Field:
-    """Where all are, and what robots can do.
+    """The robots and the targets in the field.
 
     Attributes:
         side: The number of rows, and of columns.
-        starts: The cell of each robot, at first.
-        credibility: How much of a requirement each robot covers.
+        starts: The first cell of each robot.
+        credibility: The part of a requirement that each robot covers.
         targets: The cell of each target.
-        mobility: How far robots get.
-        sensing: How far they see.
+        mobility: The distance that robots can go, in cells.
+        sensing: The distance at which robots see targets, in cells.
     """
 
     side: int
@@ -52,7 +51,7 @@ class Field:
     sensing: int
 
     def near(self, one: int, other: int, distance: int) -> bool:
-        """Return whether two cells are at most so far apart."""
+        """Return whether two cells are at most `distance` apart."""
         (i, j), (k, m) = divmod(one, self.side), divmod(other, self.side)
         return (i - k) ** 2 + (j - m) ** 2 <= distance**2
 
@@ -78,20 +77,20 @@ def tracking(
 ) -> Team:
     """Return the problem of tracking `targets` in a field of side x side cells that `seed` stands for.
 
-    `Robot3` owns `V3`. All start in different cells, and targets are in different ones.
+    `Robot3` owns `V3`. All robots start in different cells, and all targets are in different cells.
 
     Args:
         agents: The number of robots.
         targets: The number of targets.
         side: The number of rows and columns of the field.
-        seed: The same seed makes the same problem on every machine.
-        mobility: How many cells away a robot can go.
-        sensing: How many cells away a robot sees a target.
-        requirement: How much of each target is to be covered.
-        credibility: Robots cover from 1 to so much of a target, each number as likely as any other.
+        seed: The same seed gives the same problem on every machine.
+        mobility: The distance that a robot can go, in cells.
+        sensing: The distance at which a robot sees a target, in cells.
+        requirement: The coverage that each target needs.
+        credibility: The maximum coverage by a robot; each number from 1 on is as likely as any other.
 
     Raises:
-        ValueError: if a number is out of its bounds, or too many robots can get near one target. The text says which.
+        ValueError: if a number is out of its bounds, or too many robots can get near one target.
     """
     check_bounds({"side": (side, 1, MAX_SIDE), "agents": (agents, 1, min(MAX_AGENTS, side**2))})
     check_bounds({"targets": (targets, 1, side**2), "mobility": (mobility, 0, side), "sensing": (sensing, 0, side)})
@@ -112,7 +111,7 @@ def tracking(
         if prod(len(cells[robot]) for robot in near) > MAX_COMBINATIONS:
             raise ValueError(
                 f"{len(near)} robots can get near target {number}, in more than {MAX_COMBINATIONS:,} ways;"
-                " take fewer robots, a larger side, or less mobility or sensing"
+                " use fewer robots, a larger side, or less mobility or sensing"
             )
         if near:
             constraints.append(_uncovered(number, field, near, requirement))
@@ -125,7 +124,7 @@ def tracking(
             f"Robot{robot + 1}": [Variable(f"V{robot + 1}", Domain(f"Cells{robot + 1}", tuple(_ranges(one))))]
             for robot, one in enumerate(cells)
         },
-        bounded(constraints),
+        limited(constraints),
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(constant=lost),
     )
@@ -134,13 +133,13 @@ def tracking(
 def drawn_field(chance: Random, numbers: tuple[int, int, int], credibility: int, mobility: int, sensing: int) -> Field:
     """Return a random field; `numbers` are those of robots and targets, and of the rows."""
     agents, targets, side = numbers
-    starts = some(chance, side**2, agents)
-    credible = [uniform(chance, 1, credibility) for _ in range(agents)]
-    return Field(side, starts, credible, some(chance, side**2, targets), mobility, sensing)
+    starts = sample(chance, side**2, agents)
+    credible = [random_integer(chance, 1, credibility) for _ in range(agents)]
+    return Field(side, starts, credible, sample(chance, side**2, targets), mobility, sensing)
 
 
 def _uncovered(number: int, field: Field, near: list[int], requirement: int) -> Constraint:
-    """Return the function of the cells of the robots `near`: what is left of a target's requirement."""
+    """Return the uncovered rest of a target's requirement as a function of the cells of the robots `near`."""
     row, column = divmod(field.targets[number - 1], field.side)
     covered = (
         Apply("if", (_sees(Name(f"X{robot + 1}"), row, column, field), Constant(field.credibility[robot]), Constant(0)))
@@ -153,7 +152,7 @@ def _uncovered(number: int, field: Field, near: list[int], requirement: int) -> 
 
 
 def _sees(cell: Expression, row: int, column: int, field: Field) -> Expression:
-    """Return that `cell` is within the sensing range of the cell in that row and column."""
+    """Return the condition that `cell` is within the sensing range of the cell in that row and column."""
     side = Constant(field.side)
     away = [Apply("sub", (Apply(name, (cell, side)), Constant(at))) for name, at in (("div", row), ("mod", column))]
     squares = Apply("add", tuple(Apply("mul", (one, one)) for one in away))

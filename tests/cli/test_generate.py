@@ -22,7 +22,7 @@ from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
-from robochoc.generators.tasks import Skills, Ways, tasks
+from robochoc.generators.tasks import Skills, Travel, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.maps.occupancy.grid import read_occupancy_grid
 from robochoc.maps.octomap.voxels import read_voxels
@@ -71,7 +71,7 @@ FAMILIES: dict[str, Callable[[], Team]] = {
         MapChoice(map=BUILDING, agents=3, within=60), 2, shape="wedge", anchor="7,2"
     )[0],
     "tasks --agents 3 --tasks 3 --distance straight --places 2 --skills 2 --worth 100": lambda: tasks(
-        3, 3, worth=100, ways=Ways(100, Distance.STRAIGHT, 2), skills=Skills(2, 1)
+        3, 3, worth=100, travel=Travel(100, Distance.STRAIGHT, 2), skills=Skills(2, 1)
     ),
 }
 

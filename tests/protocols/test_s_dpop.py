@@ -9,7 +9,7 @@ from random import Random
 import pytest
 
 from robochoc.generators.random_csp import random_csp
-from robochoc.generators.scenario import Kind, random_scenario
+from robochoc.generators.scenario import ChangeKind, random_scenario
 from robochoc.model.orders import Order
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import (
@@ -223,7 +223,9 @@ def test_every_protocol_that_proves_an_optimum_goes_through_costs_that_change(pr
 def larger() -> Iterator[Team]:
     for seed in range(3):
         team = random_csp(20, 3, 0.15, 0, seed, max_cost=9)
-        yield random_scenario(team, 6, 0.02, seed, kinds=(Kind.REMOVE_VALUE, Kind.ADD_VALUE, Kind.REMOVE_CONSTRAINT))
+        yield random_scenario(
+            team, 6, 0.02, seed, kinds=(ChangeKind.REMOVE_VALUE, ChangeKind.ADD_VALUE, ChangeKind.REMOVE_CONSTRAINT)
+        )
 
 
 def test_without_new_links_it_takes_less_than_half_of_what_dpop_takes_anew() -> None:

@@ -1,14 +1,14 @@
-"""Coverage of a map: robots choose where to stand, so that they see much of it together and do not travel far.
+"""Coverage of a map: robots choose their cells, so that they see much of it together and do not travel far.
 
 The aim is that of Cortes, Martinez, Karatas and Bullo, "Coverage control for mobile sensing networks", IEEE
 Transactions on Robotics and Automation 20 (2004), and of mobile sensing teams (Zivan and others, JAAMAS 29, 2015): one
 step, in which each robot chooses among the cells that it can get to.
 
 A robot sees the free cells within its sensing range to which a straight line is free. Seen area is worth travel time.
-What a team sees is the union of what its robots see, a function over all of them. Here it is charged in pairs: all that
-each robot sees, less what each pair of robots sees twice. The union is never smaller than that (the second Bonferroni
-inequality, 1936), and as large where no cell is seen by three robots. So constraints are binary, and the cost is never
-less than the travel time and the worth of what is not seen.
+The area that the team sees, a union, is a function over all robots. Here it is approximated by pairs: the sum of the
+areas that the robots see, minus the areas that pairs of robots see twice. The union is never smaller (the second
+Bonferroni inequality, 1936), and equal if no cell is seen by three robots. So constraints are binary, and the cost is
+never less than the travel time and the worth of the unseen area.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fractions import Fraction
 from itertools import combinations
 from math import floor
 
-from robochoc.generators.draws import bounded, seeded
+from robochoc.generators.draws import limited, seeded
 from robochoc.generators.maps.map_team import (
     MapChoice,
     all_different,
@@ -52,12 +52,12 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
     Args:
         choice: The map and the robots.
         seed: The same seed draws the same places of robots on every machine.
-        sensing: How far robots see, in metres.
-        worth: The travel time that a square metre is worth, or on a three-dimensional map a cubic metre, in seconds.
+        sensing: The sensing range of robots, in metres.
+        worth: The worth of a square metre, or on a three-dimensional map of a cubic metre, in seconds of travel time.
 
     Raises:
-        InvalidInputError: The files hold no map.
-        ValueError: A number is out of its bounds, or a robot can get to no cell. The text says which.
+        InvalidInputError: A file is not a valid map.
+        ValueError: A number is out of its bounds, or a robot can get to no cell.
     """
     range_m, seconds = exact("sensing", sensing, 0, 1000), exact("worth", worth, 0, 10_000)
     reachability = reachability_of(choice, seeded(seed))
@@ -76,7 +76,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
     team = assemble(
         f"coverage-{label_of(choice.map)}-{len(reachability.starts)}-{seed}",
         variables_of(reachability, reachability.seconds),
-        bounded([*gains, *all_different(reachability.seconds), *_overlaps(reachability.seconds, seen, a_cell)]),
+        limited([*gains, *all_different(reachability.seconds), *_overlaps(reachability.seconds, seen, a_cell)]),
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(places=PLACES, constant=a_cell * (len(reachability.cells.free) - sum(most))),
         extras=waypoints_of(reachability),
@@ -91,7 +91,7 @@ def worth_of_a_cell(reachability: Reachability, seconds: Fraction) -> int:
 
 
 def _overlaps(values: Sequence[Mapping[int, int]], seen: Seen, a_cell: int) -> Iterator[Constraint]:
-    """Yield what pairs of robots lose where both see the same."""
+    """Yield the costs of cells that both robots of a pair see."""
     bits = {cell: sum(1 << other for other in others) for cell, others in seen.items()}
     left = MAX_TUPLES
     for (one, own), (other, others) in combinations(enumerate(values, 1), 2):

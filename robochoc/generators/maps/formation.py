@@ -1,13 +1,13 @@
 """Formations on a map: robots take the slots of a shape, and the sum of their ways is as small as it can be.
 
 The shapes are those of Balch and Arkin, "Behavior-based formation control for multirobot teams", IEEE Transactions on
-Robotics and Automation 14 (1998): line, column and wedge; besides a circle and a square grid, or a file of offsets. Who
-takes which slot is the assignment problem (ST-SR-IA in Gerkey and Mataric, IJRR 23, 2004): no two robots take the same
-slot, and the sum of their travel times is minimised. Slots are as good as each other, and a robot chooses among those
-that it can get to.
+Robotics and Automation 14 (1998): line, column and wedge; also a circle and a square grid, or a file of offsets. The
+slots are assigned to robots (ST-SR-IA in Gerkey and Mataric, IJRR 23, 2004): no two robots have the same slot, and the
+sum of their travel times is minimised. All slots have the same worth, and a robot chooses among those that it can get
+to.
 
-A slot of the shape may lie in a wall, or where nobody gets: it moves to the nearest cell that a robot can get to and no
-slot before it has.
+A slot of the shape may be in a wall, or unreachable: it is moved to the nearest cell that a robot can get to and that
+no slot before it has.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from math import ceil, cos, pi, radians, sin, sqrt
 from pathlib import Path
 
 from robochoc.formats.diagnostics import invalid_input, shortened
-from robochoc.generators.draws import bounded, check_bounds, seeded
+from robochoc.generators.draws import check_bounds, limited, seeded
 from robochoc.generators.maps.map_team import (
     MAX_ROBOTS,
     MapChoice,
@@ -44,14 +44,14 @@ MAX_SPACING = 1000.0
 MAX_BYTES = 64 * 1024
 MAX_SLOTS = MAX_ROBOTS
 _MM = 1000
-"""Offsets are rounded to millimetres, so that sines that differ in their last digits mean the same."""
+"""Offsets are rounded to millimetres, so that last digits of sines, which differ between machines, do not matter."""
 _OFFSET = re.compile(r"([+-]?\d{1,6}(?:\.\d{1,6})?)[,\s]\s*([+-]?\d{1,6}(?:\.\d{1,6})?)")
 
 Offset = tuple[float, float]
 """Metres ahead of the anchor, and to its left."""
 
 
-class Shape(StrEnum):
+class FormationShape(StrEnum):
     """The shapes of formations."""
 
     LINE = "line"
@@ -61,19 +61,19 @@ class Shape(StrEnum):
     GRID = "grid"
 
 
-SHAPES = tuple(map(str, Shape))
+SHAPES = tuple(map(str, FormationShape))
 
 
 def formation(
     choice: MapChoice,
     seed: int = 0,
     *,
-    shape: str = Shape.LINE,
+    shape: str = FormationShape.LINE,
     spacing: float = 1.0,
     heading: float = 0.0,
     anchor: str = "",
 ) -> tuple[Team, GroundMap]:
-    """Return the problem of taking the slots of a formation, and the map as the flight reads it.
+    """Return the problem of assigning the slots of a formation, and the map as the flight reads it.
 
     `Robot3` owns `V3`, a number of a cell. Costs are seconds.
 
@@ -82,12 +82,12 @@ def formation(
         seed: The same seed draws the same places of robots on every machine.
         shape: One of `SHAPES`, or the path of a file with offsets in metres: `ahead,left` in each line.
         spacing: Metres between neighbours in the shape.
-        heading: Where the formation looks, in degrees counterclockwise from the x axis.
+        heading: The direction of the formation, in degrees counterclockwise from the x axis.
         anchor: The middle of the shape, `X,Y` or `X,Y,Z`; it is level there. Empty: the mean of all robots.
 
     Raises:
-        InvalidInputError: A file cannot be read as what it should be.
-        ValueError: A number is out of its bounds, or a robot can get to no slot. The text says which.
+        InvalidInputError: A file is not a valid map, or not a valid list of offsets.
+        ValueError: A number is out of its bounds, or a robot can get to no slot.
     """
     check_bounds({"spacing": (spacing, 0.001, MAX_SPACING), "heading": (heading, -360, 360)})
     middle = places_in(anchor, "anchor")
@@ -112,7 +112,7 @@ def formation(
     team = assemble(
         f"formation-{label_of(choice.map)}-{label}-{agents}-{seed}",
         variables_of(reachability, values),
-        bounded([*travel, *all_different(values)]),
+        limited([*travel, *all_different(values)]),
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(places=PLACES),
         extras=waypoints_of(reachability),
@@ -147,22 +147,22 @@ def _turned(offsets: Sequence[Offset], heading: float) -> Iterator[tuple[Fractio
 
 
 def _offsets(shape: str, agents: int, spacing: float) -> list[Offset]:
-    """Return the slots of a shape around its anchor, a slot a robot; those of a file may be more."""
+    """Return the slots of a shape around its anchor, one per robot; a file may have more."""
     numbers = range(agents)
     middle = (agents - 1) / 2
     match shape:
-        case Shape.LINE:
+        case FormationShape.LINE:
             return [(0.0, (number - middle) * spacing) for number in numbers]
-        case Shape.COLUMN:
+        case FormationShape.COLUMN:
             return [((middle - number) * spacing, 0.0) for number in numbers]
-        case Shape.WEDGE:  # the first at the tip, the others behind it, left and right in turn
+        case FormationShape.WEDGE:  # the first at the tip, the others behind it, left and right in turn
             ranks = [(number + 1) // 2 for number in numbers]
             return [(-rank * spacing, rank * spacing * (1 - 2 * (number % 2))) for number, rank in enumerate(ranks)]
-        case Shape.CIRCLE:
+        case FormationShape.CIRCLE:
             radius = spacing / (2 * sin(pi / agents)) if agents > 1 else 0.0
             angles = [2 * pi * number / agents for number in numbers]
             return [(radius * cos(angle), radius * sin(angle)) for angle in angles]
-        case Shape.GRID:
+        case FormationShape.GRID:
             side = ceil(sqrt(agents))
             corner = (side - 1) / 2
             return [((corner - number // side) * spacing, (number % side - corner) * spacing) for number in numbers]
@@ -173,24 +173,27 @@ def _offsets(shape: str, agents: int, spacing: float) -> list[Offset]:
 def _read_offsets(name: str, agents: int) -> list[Offset]:
     path = Path(name)
     if not path.is_file():
-        raise ValueError(f"shape {name[:50]!r} is none of {', '.join(SHAPES)}, and no file")
+        raise ValueError(f"shape {name[:50]!r} is not one of {', '.join(SHAPES)}, nor a file")
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
-        raise invalid_input(path, error.strerror or str(error), "name a file that can be read") from None
+        reason = error.strerror or error
+        raise invalid_input(path, f"cannot be read: {reason}", "check the path and its permissions") from None
     if len(content) > MAX_BYTES:
-        raise invalid_input(path, "is too large", f"it may have {MAX_BYTES:,} bytes")
+        raise invalid_input(path, "is too large", f"use at most {MAX_BYTES:,} bytes")
     found = []
     for number, line in enumerate(content.decode("utf-8", "replace").splitlines(), 1):
-        told = line.partition("#")[0].strip()
-        matched = _OFFSET.fullmatch(told)
+        words = line.partition("#")[0].strip()
+        matched = _OFFSET.fullmatch(words)
         if matched:
             found.append((float(matched[1]), float(matched[2])))
-        elif told:
-            raise invalid_input(path, f"has {shortened(told)}", "expected metres ahead and to the left: 1.5,-2", number)
+        elif words:
+            message = f"invalid offset '{shortened(words)}'"
+            raise invalid_input(path, message, "write metres ahead and to the left: 1.5,-2", number)
     if not agents <= len(found) <= MAX_SLOTS:
-        raise invalid_input(path, f"has {len(found)} slots", f"expected from {agents}, one a robot, to {MAX_SLOTS}")
+        hint = f"expected from {agents}, one per robot, to {MAX_SLOTS}"
+        raise invalid_input(path, f"has {len(found)} slots", hint)
     return found
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from random import Random
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import check_bounds, some
+from robochoc.generators.draws import check_bounds, sample
 from robochoc.maps.map_file import read_map
 from robochoc.maps.reachability.cell_size import AnyCells, cells_of
 from robochoc.maps.reachability.cells import Cubes, Place
@@ -113,7 +113,7 @@ def reachability_of(choice: MapChoice, chance: Random) -> Reachability:
     if not places:
         if agents > len(cells.free):
             raise ValueError(f"{agents} robots do not fit on {len(cells.free)} free cells; use smaller cells")
-        places = [cells.centre(cells.free[place]) for place in some(chance, len(cells.free), agents)]
+        places = [cells.centre(cells.free[place]) for place in sample(chance, len(cells.free), agents)]
     # A step of STRAIGHT is one pixel.
     unit = cells.grid.resolution / (STRAIGHT * speed)
     longest = None if within is None else floor(within / unit)

@@ -1,14 +1,13 @@
-"""Patrols on a map: which robot visits which point of interest next, and where it goes from there.
+"""Patrols on a map: the next visits of robots to points of interest.
 
-A point that nobody has visited for long should be visited soon. How long that is, its idleness, is what patrols are
-measured by: Machado, Ramalho, Zucker and Drogoul, "Multi-agent patrolling: an empirical analysis of alternative
-architectures", MABS 2002; Portugal and Rocha, "Multi-robot patrolling algorithms: examining performance and
-scalability", Advanced Robotics 27 (2013). Here robots plan a few visits ahead, `rounds`:
+The time since the last visit of a point is its idleness, by which patrols are measured: Machado, Ramalho, Zucker and
+Drogoul, "Multi-agent patrolling: an empirical analysis of alternative architectures", MABS 2002; Portugal and Rocha,
+"Multi-robot patrolling algorithms: examining performance and scalability", Advanced Robotics 27 (2013). Here robots
+plan their next visits, one in each of `rounds`:
 
 - each robot visits a point in each round, and no point is visited twice;
-- the cost is the travel time of all robots, and the idleness of the points that nobody visits;
-- robots that are nearer to each other than `apart` after a round pay for it, in the time that it takes to drive the
-  missing metres.
+- the cost is the travel time of all robots, and the idleness of the points that are not visited;
+- two robots nearer to each other than `apart` after a round have a cost: the time to drive the missing metres.
 
 Points of interest are given, or drawn: the first by chance, and each of the others as far from those before it as can
 be (Gonzalez, "Clustering to minimize the maximum intercluster distance", TCS 38, 1985).
@@ -23,7 +22,7 @@ from math import floor, isqrt
 from random import Random
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import bounded, check_bounds, seeded, uniform
+from robochoc.generators.draws import check_bounds, limited, random_integer, seeded
 from robochoc.generators.maps.map_team import (
     MapChoice,
     check_dimensions,
@@ -52,7 +51,7 @@ _MM = 1000
 _HALF = Fraction(1, 2)
 
 Legs = Mapping[int, Mapping[int, int]]
-"""The time from each point to each other one, where a way leads."""
+"""The time from each point to each other point that can be reached from it."""
 
 
 def patrol(
@@ -71,18 +70,18 @@ def patrol(
     is the first. Costs are seconds.
 
     Args:
-        choice: The map and the robots. Each leg takes a robot at most the time of `within`.
-        seed: The same seed makes the same problem on every machine.
+        choice: The map and the robots. Each leg takes at most the time `within`.
+        seed: The same seed gives the same problem on every machine.
         points: The number of points that are drawn.
         visit: The points, `X,Y X,Y` or `X,Y,Z X,Y,Z`, in metres; each is the nearest cell that a robot can get
             to. Empty: drawn.
-        idle: Points are idle for 0 to so many seconds, each number as likely as any other.
+        idle: The maximum idleness of a point, in seconds; each number from 0 on is as likely as any other.
         rounds: The number of visits that each robot plans.
-        apart: How far apart robots should be, in metres.
+        apart: The desired minimum distance between robots, in metres.
 
     Raises:
-        InvalidInputError: The files hold no map.
-        ValueError: A number is out of its bounds, or a robot can get to no point. The text says which.
+        InvalidInputError: A file is not a valid map.
+        ValueError: A number is out of its bounds, or a robot can get to no point.
     """
     chance = seeded(seed)
     given = places_in(visit, "visit")
@@ -93,29 +92,27 @@ def patrol(
     check_dimensions(given, reachability.cells, "visit")
     agents = len(reachability.starts)
     if agents * rounds > count:
-        raise ValueError(
-            f"{agents} robots make {agents * rounds} visits, more than {count} points; ask for more points"
-        )
+        raise ValueError(f"{agents} robots make {agents * rounds} visits, more than {count} points; use more points")
     if count**rounds > MAX_PLANS:
-        raise ValueError(f"{count} points in {rounds} rounds are more than {MAX_PLANS:,} plans; ask for fewer")
+        raise ValueError(f"{count} points in {rounds} rounds have more than {MAX_PLANS:,} plans; use fewer of them")
     if count > len(reachability.reached):
         raise ValueError(
             f"robots can get to {len(reachability.reached)} cells, fewer than {count} points; take smaller cells"
         )
     chosen = _nearest(reachability, given) if given else drawn_points(reachability, count, chance)
-    idleness = {point: uniform(chance, 0, idle) * 10**PLACES for point in chosen}
+    idleness = {point: random_integer(chance, 0, idle) * 10**PLACES for point in chosen}
     legs = _legs(reachability, chosen) if rounds > 1 else {}
     plans = [_Plan(reachability, number, chosen, rounds) for number in range(1, agents + 1)]
     constraints = [
         *(one for plan in plans for one in plan.private(reachability, idleness, legs)),
         *_between(plans, _crowding(reachability, chosen, metres, choice.speed)),
     ]
-    # What is charged for a visit is the idleness that another point would have had.
+    # The constraint on a visit charges the largest idleness minus that of the visited point.
     unvisited = sum(idleness.values()) - agents * rounds * max(idleness.values())
     team = assemble(
         f"patrol-{label_of(choice.map)}-{agents}-{count}-{rounds}-{seed}",
         {name: plan.variables for name, plan in zip(reachability.names, plans, strict=True)},
-        bounded(constraints),
+        limited(constraints),
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(places=PLACES, constant=unvisited),
         extras=waypoints_of(reachability, ".1" if rounds > 1 else ""),
@@ -126,7 +123,7 @@ def patrol(
 def drawn_points(reachability: Reachability, count: int, chance: Random) -> list[int]:
     """Return points of interest that are spread over the cells that robots can get to."""
     cells = reachability.reached
-    found = [cells[uniform(chance, 0, len(cells) - 1)]]
+    found = [cells[random_integer(chance, 0, len(cells) - 1)]]
     away = dict.fromkeys(cells, MAX_IDLE**2)
     while len(found) < count:
         last = reachability.cells.coordinates(found[-1])
@@ -162,7 +159,7 @@ class _Plan:
         return [self.first, *[self._points] * (len(self.names) - 1)]
 
     def private(self, reachability: Reachability, idleness: Mapping[int, int], legs: Legs) -> Iterator[Constraint]:
-        """Yield what the robot's visits cost: ways, and what is gained less than at the point that is idle longest."""
+        """Yield the costs of the robot's visits: travel times, and the largest idleness minus that of the point."""
         longest = max(idleness.values())
         seconds = reachability.seconds[self.number - 1]
         for name, values in zip(self.names, self.values, strict=True):
@@ -184,7 +181,7 @@ class _Plan:
 
 
 def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) -> Iterator[Constraint]:
-    """Yield that no two robots visit the same point, and what it costs to be near each other after a round."""
+    """Yield the constraints that no two robots visit the same point, and the costs of being near after a round."""
     for one, other in combinations(plans, 2):
         for scope, (values, others) in zip(
             product(one.names, other.names), product(one.values, other.values), strict=True
@@ -201,7 +198,7 @@ def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) ->
 
 
 def _nearest(reachability: Reachability, places: Sequence[Place]) -> list[int]:
-    """Return the cells of given points; no two have the same."""
+    """Return distinct cells of the given points."""
     left, found = set(reachability.reached), []
     for place in places:
         found.append(reachability.nearest(place, left))
@@ -221,7 +218,7 @@ def _legs(reachability: Reachability, points: Sequence[int]) -> dict[int, dict[i
 def _crowding(
     reachability: Reachability, points: Sequence[int], apart: Fraction, speed: float
 ) -> dict[tuple[int, int], int]:
-    """Return the time that it takes to drive the metres that two points are too near to each other."""
+    """Return, for two points nearer than `apart`, the time to drive the missing metres."""
     found = {}
     for one, other in combinations(points, 2):
         square = squared(reachability.cells.centre(one), reachability.cells.centre(other))

@@ -9,8 +9,8 @@ from random import Random
 import pytest
 
 from robochoc.formats import InvalidInputError
-from robochoc.generators import graph_files
-from robochoc.generators.graph_files import MAX_BYTES, read_graph
+from robochoc.generators import graph_choice
+from robochoc.generators.graph_choice import MAX_BYTES, read_graph
 from robochoc.generators.random_csp import random_on
 from tests.support.binary_problems import edges_of
 from tests.support.cases import looped
@@ -62,9 +62,9 @@ def test_a_label_is_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
         ("town.graphml", "<graphml>", "networkx cannot read it"),
         ("town.gml", "graph [", "networkx cannot read it"),
         ("town.gml", "\0\0", "networkx cannot read it"),
-        ("town.edgelist", "a\n", "a graph of 0 nodes"),
+        ("town.edgelist", "a\n", "the graph has 0 nodes"),
         ("town.edgelist", "a a\n", "the node a is linked to itself"),
-        ("town.graphml", "<!DOCTYPE a [<!ENTITY b 'c'>]>" + GRAPHML, "it defines entities"),
+        ("town.graphml", "<!DOCTYPE a [<!ENTITY b 'c'>]>" + GRAPHML, "defines entities"),
     ],
 )
 def test_what_is_no_graph_has_one_message(name: str, content: str, said: str, tmp_path: Path) -> None:
@@ -79,17 +79,17 @@ def test_what_is_no_graph_has_one_message(name: str, content: str, said: str, tm
 def test_a_graph_of_too_many_bytes_is_refused(tmp_path: Path) -> None:
     pytest.importorskip("networkx")
     (tmp_path / "town.edges").write_text(" " * (MAX_BYTES + 1))
-    with pytest.raises(InvalidInputError, match="it is too large"):
+    with pytest.raises(InvalidInputError, match="is too large"):
         read_graph(tmp_path / "town.edges")
 
 
 def test_a_graph_of_too_many_nodes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("networkx")
-    monkeypatch.setattr(graph_files, "MAX_NODES", 3)
+    monkeypatch.setattr(graph_choice, "MAX_NODES", 3)
     (tmp_path / "town.edgelist").write_text("1 2\n2 3\n")
     assert read_graph(tmp_path / "town.edgelist").agents == 3
     (tmp_path / "town.edgelist").write_text("1 2\n2 3\n3 4\n")
-    with pytest.raises(InvalidInputError, match="a graph of 4 nodes"):
+    with pytest.raises(InvalidInputError, match="the graph has 4 nodes"):
         read_graph(tmp_path / "town.edgelist")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 from robochoc.formats import check_team, read_team, write_team
-from robochoc.generators.draws import uniform
+from robochoc.generators.draws import random_integer
 from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.generators.maps.patrol import drawn_points, patrol
 from robochoc.maps.reachability.reachability import Reachability
@@ -101,7 +101,7 @@ def test_patrols_cost_as_little_as_can_be(
     check_team(team)
     chance = Random(seed)
     reach = reachability_of(choice, chance)
-    idleness = {point: uniform(chance, 0, 40) for point in drawn_points(reach, points, chance)}
+    idleness = {point: random_integer(chance, 0, 40) for point in drawn_points(reach, points, chance)}
     wanted = least(reach, idleness, rounds, 6, None if within is None else Fraction(within))
     assert best(team) == wanted
     for protocol in ("central", "dpop", "syncbb", "afb", "bnb-adopt"):

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team
-from robochoc.generators.tasks import Skills, Tasks, Ways, drawn_tasks, tasks
+from robochoc.generators.tasks import DrawnTasks, Skills, Travel, drawn_tasks, tasks
 from robochoc.generators.tracking import Field, drawn_field, tracking
 from robochoc.model.allocation import Distance, way
 from robochoc.model.problem import Team
@@ -33,7 +33,7 @@ def test_a_seed_is_one_problem_everywhere() -> None:
     teams = [
         tracking(4, 5, 6, 3),
         tasks(4, 3, 5),
-        tasks(4, 4, 5, ways=Ways(20, Distance.STRAIGHT, 2), skills=Skills(3, 2)),
+        tasks(4, 4, 5, travel=Travel(20, Distance.STRAIGHT, 2), skills=Skills(3, 2)),
         tasks(3, 4, 5, model="several", capacity=4),
     ]
     assert {team.name: digest(team) for team in teams} == {
@@ -94,7 +94,7 @@ def test_targets_that_nobody_can_see_are_a_constant() -> None:
 # Tasks
 
 
-def profits(problem: Tasks, *, several: bool) -> int:
+def profits(problem: DrawnTasks, *, several: bool) -> int:
     """Return the best profit, by giving each task to nobody or to a robot that can do it."""
     found = []
     for doers in itertools.product((0, *problem.profit), repeat=len(problem.load)):
@@ -111,14 +111,14 @@ def profits(problem: Tasks, *, several: bool) -> int:
 @given(st.integers(1, 3), st.integers(1, 3), st.integers(1, 2), st.booleans(), st.integers(0, 2**32))
 @examples(20)
 def test_tasks_bring_as_much_as_can_be(agents: int, count: int, each: int, several: bool, seed: int) -> None:  # noqa: FBT001
-    ways, skills = Ways(60, Distance.STRAIGHT, 3), Skills(2, each)
+    ways, skills = Travel(60, Distance.STRAIGHT, 3), Skills(2, each)
     problem = drawn_tasks(Random(seed), (agents, count, 100), ways, skills, 3)
     model = "several" if several else "assignment"
     if several and not any(problem.profit.values()):
         with pytest.raises(ValueError, match="no robot has a skill"):
-            tasks(agents, count, seed, worth=100, ways=ways, skills=skills, model=model)
+            tasks(agents, count, seed, worth=100, travel=ways, skills=skills, model=model)
         return
-    team = tasks(agents, count, seed, worth=100, ways=ways, skills=skills, model=model)
+    team = tasks(agents, count, seed, worth=100, travel=ways, skills=skills, model=model)
     check_team(team)
     assert team.robots[0].costs.maximize
     assert best(team) == Fraction(profits(problem, several=several), 1000)
@@ -127,7 +127,7 @@ def test_tasks_bring_as_much_as_can_be(agents: int, count: int, each: int, sever
 @pytest.mark.parametrize("model", ["assignment", "several"])
 def test_protocols_allocate(model: str) -> None:
     for seed in range(2):
-        wanted = profits(drawn_tasks(Random(seed), (4, 4, 200), Ways(), Skills(2, 1), 3), several=model == "several")
+        wanted = profits(drawn_tasks(Random(seed), (4, 4, 200), Travel(), Skills(2, 1), 3), several=model == "several")
         team = tasks(4, 4, seed, skills=Skills(2, 1), model=model)
         assert cost(team, "dpop") == cost(team, "central") == wanted
 

@@ -22,7 +22,7 @@ from robochoc.generators.queens3d import MAX_N, QueensModel, queens3d
 from robochoc.generators.random_csp import random_csp, random_on
 from robochoc.generators.scenario import random_scenario
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
-from robochoc.generators.tasks import Skills, Ways, tasks
+from robochoc.generators.tasks import Skills, Travel, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.model.cost_units import CostUnits
 from tests.support.cases import cases, looped
@@ -72,14 +72,17 @@ def on_graphs() -> Rows:
             lambda: random_csp(20, 2, 0.05, 0.5, connected=True),
             "needs 19 constraints, and the density makes 10",
         ),
-        (lambda: random_csp(60, 2, 59 / 1770, 0.5, connected=True), "raise the density"),
+        (lambda: random_csp(60, 2, 59 / 1770, 0.5, connected=True), "increase the density"),
         (lambda: random_csp(3, 3, 0.5, 0, max_cost=-1), "max-cost is -1; it must be from 0 to 1000000"),
         (lambda: random_csp(3, 3, 0.5, 0, max_cost=1_000_001), "max-cost is 1000001; it must be from 0 to 1000000"),
         (
             lambda: random_csp(100, 100, 0.1, 0, max_cost=5),
             "together have 4,950,000 pairs of values, more than 1,000,000",
         ),
-        (lambda: random_csp(6, 4, 0.6, 0.25, asymmetric=True), "could be asymmetric; give a maximum cost"),
+        (
+            lambda: random_csp(6, 4, 0.6, 0.25, asymmetric=True),
+            "asymmetric problem requires costs; give a maximum cost",
+        ),
     ]
 
 
@@ -120,7 +123,7 @@ def of_families() -> Rows:
         (lambda: tracking(1000, 9, 100, mobility=50), "1,000 robots can go to 10,000 cells each"),
         (lambda: tasks(0, 1), "agents is 0"),
         (lambda: tasks(1, 1, skills=Skills(2, 3)), "skilled is 3; it must be from 1 to 2"),
-        (lambda: tasks(1, 1, ways=Ways(places=10)), "places is 10"),
+        (lambda: tasks(1, 1, travel=Travel(places=10)), "places is 10"),
     ]
 
 
@@ -130,7 +133,7 @@ def of_scenarios() -> Rows:
     return [
         (
             lambda: random_scenario(team, 1, 1, kinds=kinds),
-            "can take no more changes of the kinds remove-value, remove-constraint",
+            "no further change of the kinds remove-value, remove-constraint",
         ),
         (lambda: random_scenario(team, 0, 1), "events is 0"),
         (lambda: random_scenario(team, 1, NAN), "rate is nan"),
@@ -192,7 +195,7 @@ def test_formations_on_a_map(tmp_path: Path) -> None:
             ({"cell": 0.001}, {}, "4501 columns and 3501 rows; 1000 are allowed"),
             ({"cell": 0.5, "cells": 3}, {}, "free, more than 3"),
             ({"agents": 40, "cell": 0.5}, {}, "40 robots do not fit on"),
-            ({}, {"shape": "ring"}, "shape 'ring' is none of line, column"),
+            ({}, {"shape": "ring"}, "shape 'ring' is not one of line, column"),
             ({}, {"anchor": "1,1 2,2"}, "anchor is one place"),
             ({}, {"spacing": 0}, "spacing is 0"),
             (
@@ -208,7 +211,11 @@ def test_formations_on_a_map(tmp_path: Path) -> None:
 
 @looped(
     ("text", "said"),
-    [("1,2,3", "offsets.txt:1: has 1,2,3"), ("0,0", "has 1 slots .*expected from 2"), ("0,0\n" * 101, "has 101 slots")],
+    [
+        ("1,2,3", "offsets.txt:1: invalid offset '1,2,3'"),
+        ("0,0", "has 1 slots .*expected from 2"),
+        ("0,0\n" * 101, "has 101 slots"),
+    ],
 )
 def test_offsets(tmp_path: Path, text: str, said: str) -> None:
     choice = MapChoice(map=str(write_map(tmp_path, ROOMS)), agents=2)

@@ -13,7 +13,7 @@ from robochoc.generators.coloring import coloring
 from robochoc.generators.graphs import tree
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_csp, random_on
-from robochoc.generators.scenario import Kind, random_scenario
+from robochoc.generators.scenario import ChangeKind, random_scenario
 from robochoc.generators.sensors import grid_sensors
 from robochoc.model.change import apply_changes, describe_change
 from robochoc.model.problem import Team
@@ -50,11 +50,11 @@ def test_a_team_can_take_its_scenario(team: Team, events: int, rate: float, seed
             assert all(len(variable.domain) for variable in now.variables.values())
 
 
-@looped("kind", [*Kind])
-def test_kinds_of_changes(kind: Kind) -> None:
+@looped("kind", [*ChangeKind])
+def test_kinds_of_changes(kind: ChangeKind) -> None:
     opposite = {"remove-": "add-", "add-": "remove-"}
     start = next(word for word in opposite if kind.startswith(word))
-    both = {kind, Kind(kind.replace(start, opposite[start]))}
+    both = {kind, ChangeKind(kind.replace(start, opposite[start]))}
     changing = random_scenario(random_csp(6, 3, 0.6, 0.3, 2), 8, 0.2, 5, kinds=both)
     said = {type(change).__name__ for event in changing.scenario for change in event.changes}
     assert said == {"".join(word.capitalize() for word in one.split("-")) for one in both}
