@@ -1,4 +1,4 @@
-"""Measures the privacy loss of robots in a run, from a journal of the messages that each has received."""
+"""Measures the privacy loss of the robots in a run, from the received messages in its journal."""
 
 from robochoc.privacy.losses import Kind, Loss, Measure, PrivacyReport
 from robochoc.privacy.measure import PrivacyError, privacy_of

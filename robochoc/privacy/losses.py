@@ -1,10 +1,10 @@
-"""Measures of privacy loss: how much an observer has excluded of what a subject's problem may be.
+"""Measures of privacy loss: the share of a subject's possible problems that an observer can exclude.
 
 They are valuations of possible states (Maheswaran, Pearce, Bowring, Varakantham, Tambe: "Privacy loss in distributed
 constraint reasoning: a quantitative framework for analysis and its applications", JAAMAS 13, 2006). A subject's states
-are all combinations of what its secrets may be. With S of them at first, and P that the observer still takes to be
-possible, privacy is (P - 1) / (S - 1) by LinearTS, and log P / log S by EntropyTS. The third measure is the share of
-the secrets that are not known exactly. Loss is 1 - privacy: 0 where nothing is excluded, 1 where all is known.
+are all combinations of its secrets' possible values. With S initial states and P states that are still possible for the
+observer, privacy is (P - 1) / (S - 1) by LinearTS, and log P / log S by EntropyTS. The third measure is the share of
+the secrets that are not known exactly. Loss is 1 - privacy: 0 if nothing is excluded, 1 if everything is known.
 """
 
 from __future__ import annotations
@@ -39,8 +39,8 @@ class Loss:
         observer: The robot that received the messages.
         subject: The robot whose secrets the messages concern.
         kind: The kind of secrets.
-        secrets: How many secrets of that kind there are.
-        linear: The loss by LinearTS. None: not known, as is the loss by the others.
+        secrets: The number of secrets of this kind.
+        linear: The loss by LinearTS; None if the losses are unknown.
         entropy: The loss by EntropyTS.
         known: The share of the secrets that are known exactly.
     """
@@ -54,7 +54,7 @@ class Loss:
     known: float | None
 
     def by(self, measure: Measure) -> float | None:
-        """Return the loss by `measure`. None: it is not known."""
+        """Return the loss by `measure`; None if it is unknown."""
         match measure:
             case Measure.LINEAR:
                 return self.linear
@@ -70,13 +70,13 @@ class PrivacyReport:
 
     Attributes:
         team: The name of the team.
-        protocol: The protocol of the run: its name, or that of its class where it has none.
-        run: Which run of the journal it is, counted from 1.
-        runs: How many there are.
+        protocol: The name of the run's protocol, or of its class if it has none.
+        run: The number of the run in the journal, from 1.
+        runs: The number of runs in the journal.
         robots: All robots, the highest priority first.
-        losses: For each observer and each subject that has secrets for it. Pairs without any are left out.
+        losses: The losses of all pairs of an observer and a subject with secrets.
         without_rule: The types of received messages without a rule.
-        undecided: Why decisions are not among the losses. Empty: they are.
+        undecided: The reason why decisions are not among the losses; empty if they are.
     """
 
     team: str
@@ -89,7 +89,7 @@ class PrivacyReport:
     undecided: str = ""
 
     def system_loss(self, kind: Kind, measure: Measure) -> float | None:
-        """Return the mean loss over all pairs of robots. None: there is none, or of one it is not known."""
+        """Return the mean loss over all pairs of robots; None if there are no losses, or one is unknown."""
         return mean([loss.by(measure) for loss in self.losses if loss.kind is kind])
 
     def loss_of(self, subject: str, kind: Kind, measure: Measure) -> float | None:
@@ -97,12 +97,12 @@ class PrivacyReport:
         return mean([loss.by(measure) for loss in self.losses if loss.kind is kind and loss.subject == subject])
 
     def kinds(self) -> list[Kind]:
-        """Return the kinds of secrets that there are."""
+        """Return the kinds of secrets in the run."""
         return [kind for kind in Kind if any(loss.kind is kind for loss in self.losses)]
 
 
 def mean(losses: Sequence[float | None]) -> float | None:
-    """Return the mean; None if there is none, or one is not known."""
+    """Return the mean of losses; None if there are none, or one is unknown."""
     known = [loss for loss in losses if loss is not None]
     return math.fsum(known) / len(known) if known and len(known) == len(losses) else None
 
@@ -110,13 +110,13 @@ def mean(losses: Sequence[float | None]) -> float | None:
 def loss_between(
     observer: str, subject: str, kind: Kind, numbers: Sequence[tuple[int, int]], *, known: bool
 ) -> Loss | None:
-    """Return the loss; None if there is nothing to hide.
+    """Return the loss; None if the subject has no secrets.
 
     Args:
         observer: The robot that received the messages.
         subject: The robot whose secrets the messages concern.
         kind: The kind of secrets.
-        numbers: For each secret, how many states it has, and how many are still possible.
+        numbers: For each secret, the number of its states, and of those that are still possible.
         known: Whether the loss is known.
     """
     hidden = [(states, possible) for states, possible in numbers if states > 1]

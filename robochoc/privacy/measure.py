@@ -1,4 +1,4 @@
-"""Measures the privacy loss of a recorded run, in which only its receiver reads a message."""
+"""Measures the privacy loss of a recorded run, assuming that only its receiver can read a message."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.journal.team_events import run_parameters_of
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel
 from robochoc.privacy.losses import Kind, Loss, PrivacyReport, loss_between
-from robochoc.privacy.observer import Observer, Scene
+from robochoc.privacy.observer import Observer, RunFacts
 from robochoc.privacy.possible import Secret
 from robochoc.privacy.secrets import TeamSecrets, TooManySecretsError
 from robochoc.protocols.message import Message, Value
@@ -39,31 +39,31 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
     """Return the privacy loss of a run.
 
     Args:
-        journal: The journal, with the problem that robots were given.
-        options: What is needed besides the journal (`replay/rebuild.py`).
-        number: Which run, counted from 1. None: the last one.
+        journal: The journal, including the robots' problems.
+        options: Inputs besides the journal (`replay/rebuild.py`).
+        number: The number of the run, from 1; None for the last one.
 
     Raises:
         PrivacyError: if the run does not exist, or required data are missing.
     """
     runs = list(runs_of(journal.events))
     if not runs:
-        raise PrivacyError("it ends before a run begins")
+        raise PrivacyError("the journal ends before the beginning of a run")
     number = len(runs) if number is None else number
     if not 1 <= number <= len(runs):
-        raise PrivacyError(f"there is no run {number}: the journal holds {len(runs)}")
+        raise PrivacyError(f"the journal has no run {number}, only {len(runs)}")
     try:
         rebuilder = Rebuilder(journal.header, options or ReplayOptions())
         robots = [rebuilder.robots_of(run) for run in runs[:number]][-1]
-        return _Measured(journal, runs, number, robots).report()
+        return _RunMeasurement(journal, runs, number, robots).report()
     except CannotReplayError as why:
         raise PrivacyError(str(why), broken=why.broken) from why
     except TooManySecretsError as why:
         raise PrivacyError(str(why)) from why
 
 
-class _Measured:
-    """The measurement of one run: its observers hear all messages, and `report` adds up what they can conclude."""
+class _RunMeasurement:
+    """The measurement of one run: its observers process all messages, and `report` computes the losses."""
 
     def __init__(self, journal: Journal, runs: Sequence[RecordedRun], number: int, robots: RebuiltRobots) -> None:
         self._journal = journal
@@ -78,7 +78,7 @@ class _Measured:
         given = self._run.given
         self._parameters = RunParameters() if given is None else run_parameters_of(given)
         self._secrets = TeamSecrets(robots.compiled, self._parameters)
-        scene = Scene(
+        facts = RunFacts(
             secrets=self._secrets,
             order=self._team.order,
             branches=self._branches(),
@@ -88,12 +88,12 @@ class _Measured:
             minimises=any(host.protocol.problem.has_costs for host in robots.hosts.values()),
         )
         self._observers = {
-            name: Observer(scene, name, host.protocol.problem.values) for name, host in robots.hosts.items()
+            name: Observer(facts, name, host.protocol.problem.values) for name, host in robots.hosts.items()
         }
 
     def report(self) -> PrivacyReport:
         """Process every message, and return the losses."""
-        self._hear_all()
+        self._process_messages()
         for observer in self._observers.values():
             observer.knowledge.settle()
         decided, undecided = self._decisions()
@@ -110,7 +110,7 @@ class _Measured:
         )
 
     def _branches(self) -> Mapping[str, Sequence[str]]:
-        """Return for each robot the robots whose values its partial assignments hold."""
+        """Return for each robot the robots whose values are in its partial assignments."""
         order = self._team.order
         if not self._robots.protocol.traits.tree:
             return dict.fromkeys(order, order)
@@ -118,29 +118,29 @@ class _Measured:
         tree = PseudoTree.induced(order, links)
         return {name: (*reversed(tree.ancestors(name)), name) for name in order}
 
-    def _hear_all(self) -> None:
-        """Deliver each message when it was received; those that were not say what an observer does not know."""
-        under_way: dict[Edge, deque[Sent]] = {}
+    def _process_messages(self) -> None:
+        """Deliver all received messages in order; then invalidate the values in messages that were not received."""
+        in_transit: dict[Edge, deque[Sent]] = {}
         for event in self._run.events:
             match event:
                 case Sent():
-                    under_way.setdefault((event.sender, event.receiver), deque()).append(event)
+                    in_transit.setdefault((event.sender, event.receiver), deque()).append(event)
                     if event.sender in self._observers:
                         message = self._message(event)
-                        with _refusing(event):
-                            self._observers[event.sender].says(event.receiver, message)
+                        with _rule_errors(event):
+                            self._observers[event.sender].sends(event.receiver, message)
                 case Received():
-                    waiting = under_way.get((event.sender, event.receiver))
+                    waiting = in_transit.get((event.sender, event.receiver))
                     if waiting and event.receiver in self._observers:
                         sent = waiting.popleft()
                         message = self._message(sent)
-                        with _refusing(sent):
-                            self._observers[event.receiver].hears(sent.sender, message)
+                        with _rule_errors(sent):
+                            self._observers[event.receiver].receives(sent.sender, message)
                 case _:
                     pass
-        for sent in [one for waiting in under_way.values() for one in waiting]:
+        for sent in [one for waiting in in_transit.values() for one in waiting]:
             if sent.receiver in self._observers:
-                self._observers[sent.receiver].misses(sent.sender, self._message(sent))
+                self._observers[sent.receiver].loses(sent.sender, self._message(sent))
 
     def _message(self, sent: Sent) -> Message:
         kind = self._types.get(sent.type)
@@ -149,10 +149,10 @@ class _Measured:
             raise PrivacyError(f"{sent.type} from {sent.sender} is not a message of this protocol", broken=True)
         return message
 
-    # What it comes to
+    # Results
 
     def _losses(self, observer: Observer, decided: Mapping[str, Value]) -> Iterator[Loss]:
-        """Yield what an observer has learnt of each subject."""
+        """Yield the losses of all subjects to an observer."""
         known = not observer.without_rule
         for subject in self._team.order:
             if subject == observer.name:
@@ -179,16 +179,16 @@ class _Measured:
     @staticmethod
     def _wrong(observer: Observer, subject: str, what: str) -> PrivacyError:
         return PrivacyError(
-            f"what {observer.name} has heard excludes the true {what} of {subject}:"
-            " the journal was altered, or a message's rule is wrong",
+            f"the messages to {observer.name} exclude the true {what} of {subject}:"
+            " the journal was altered, or the rule of a message is wrong",
             broken=True,
         )
 
     def _decisions(self) -> tuple[dict[str, Value], str]:
-        """Return the values of the robots in the answer, and why there are none."""
+        """Return the values of the robots in the answer, or none and the reason."""
         outcome = self._journal.outcome
         if self._number < self._runs:
-            return {}, "only the last run of a journal comes to the team's decision"
+            return {}, "only the last run of a journal has the team's decision"
         if not self._robots.protocol.traits.complete:
             return {}, "the protocol is incomplete, and its robots need not send their last values"
         if outcome is None or outcome.verdict not in {Verdict.SOLUTION, Verdict.OPTIMAL}:
@@ -197,8 +197,8 @@ class _Measured:
         for event in self._run.events:
             if isinstance(event, Decided):
                 last[event.robot] = event.assignment
-        stands = {name: value for assignment in last.values() for name, value in assignment.items()}
-        if stands != outcome.assignment:
+        final = {name: value for assignment in last.values() for name, value in assignment.items()}
+        if final != outcome.assignment:
             return {}, "the answer is not the robots' last values, so messages do not reveal it"
         decided: dict[str, Value] = {}
         for robot in self._team.robots:
@@ -214,11 +214,11 @@ def _there(loss: Loss | None) -> Iterator[Loss]:
 
 
 @contextmanager
-def _refusing(sent: Sent) -> Iterator[None]:
-    """Refuse the journal if a message says what cannot be."""
+def _rule_errors(sent: Sent) -> Iterator[None]:
+    """Reject the journal if a message has invalid content."""
     try:
         yield
     except (LookupError, ValueError) as error:
         raise PrivacyError(
-            f"{sent.type} from {sent.sender} to {sent.receiver} says what no robot can say: {error}", broken=True
+            f"{sent.type} from {sent.sender} to {sent.receiver} has invalid content: {error}", broken=True
         ) from error

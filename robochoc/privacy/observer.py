@@ -1,4 +1,4 @@
-"""A robot as an observer of the others: what it hears in a run, and what follows from it."""
+"""A robot as an observer of other robots: the conclusions from the messages that it receives."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, assert_never
 
 from robochoc.model.problem import INFINITE
-from robochoc.privacy.possible import AtLeast, AtMost, Case, Knowledge, OneAtMost, OneCase, Terms
+from robochoc.privacy.possible import AtLeast, AtMost, CostCase, Knowledge, OneAtMost, OneCase, Terms
 from robochoc.privacy.secrets import TeamSecrets
 from robochoc.protocols.acts import Performative
 from robochoc.protocols.disclosure import (
@@ -14,15 +14,15 @@ from robochoc.protocols.disclosure import (
     FINITE,
     Clash,
     EveryValuePays,
+    HasCompatibleValue,
     HasOnly,
-    Hearing,
+    HasValue,
     M,
     PartPays,
     Pays,
     Proof,
+    Reception,
     SomeValuePays,
-    StandsAt,
-    StandsWhere,
     Total,
     View,
 )
@@ -31,20 +31,20 @@ from robochoc.protocols.wording import is_withdrawn
 
 Channel = tuple[type, str, str]
 _DECIDING = (Performative.CANCEL, Performative.REQUEST)
-"""By these acts a robot may decide on others' values: for good, or (to a receiver) for now."""
+"""The acts by which a robot may set values of others: permanently, or (for the receiver) temporarily."""
 
 
-class Scene(NamedTuple):
-    """The facts of a run that all its observers share.
+class RunFacts(NamedTuple):
+    """The facts of a run that all its observers know.
 
     Attributes:
         secrets: The secrets of the team.
         order: All robots, the highest priority first.
-        branches: By robot, the robots whose values its partial assignments hold.
-        fixed_holders: As in `Hearing`.
-        minimises: As in `Hearing`.
-        one_sided: Costs in messages may be those of one robot's part of a partially known constraint. Then only what is
-            proved of single robots counts: own costs and totals are those of both sides (`protocols/disclosure.py`).
+        branches: By robot, the robots whose values are in its partial assignments.
+        fixed_holders: As in `Reception`.
+        minimises: As in `Reception`.
+        one_sided: Costs in messages may be those of one robot's part of a partially known constraint. Then only proofs
+            about single robots count, since own costs and totals include both sides (`protocols/disclosure.py`).
     """
 
     secrets: TeamSecrets
@@ -55,11 +55,8 @@ class Scene(NamedTuple):
     one_sided: bool
 
 
-class _Stand(NamedTuple):
-    """The last that an observer has heard of a robot's value: the values, and the statement that leaves some of them.
-
-    Without a statement it is one of `values`.
-    """
+class _LastValue(NamedTuple):
+    """An observer's latest information on a robot's value: one of `values`, restricted by the statement `cases`."""
 
     stamp: tuple[int, ...]
     values: tuple[Value, ...]
@@ -67,85 +64,85 @@ class _Stand(NamedTuple):
 
 
 class Observer:
-    """One robot, `name`, which can take `values`; `without_rule` are the types of messages that have no rule."""
+    """The observer `name`, with its possible `values`. `without_rule`: the received types of messages without rules."""
 
-    def __init__(self, scene: Scene, name: str, values: Sequence[Value]) -> None:
+    def __init__(self, facts: RunFacts, name: str, values: Sequence[Value]) -> None:
         self.name = name
-        self.knowledge = Knowledge(scene.secrets.most, scene.secrets.withdrawing)
-        self.knowledge.known.update(scene.secrets.known_from_the_start(name))
+        self.knowledge = Knowledge(facts.secrets.most, facts.secrets.withdrawing)
+        self.knowledge.known.update(facts.secrets.known_from_the_start(name))
         self.without_rule: set[str] = set()
-        self._scene = scene
+        self._facts = facts
         self._values: dict[str, Sequence[Value]] = {name: values}
         self._last: dict[Channel, Message] = {}
-        self._stands: dict[str, _Stand] = {}
+        self._last_values: dict[str, _LastValue] = {}
 
-    def says(self, receiver: str, message: Message) -> None:
-        """Note a message that the observer sends; the values of others that it decides on it knows itself."""
-        self._note(message, self.name, receiver)
+    def sends(self, receiver: str, message: Message) -> None:
+        """Process a message that the observer sends. It knows the values of others that it sets by the message."""
+        self._store(message, self.name, receiver)
         if message.act.performative not in _DECIDING:
             return
         for proof in self._proofs(message, self.name, receiver) or ():
-            if isinstance(proof, StandsAt) and (proof.stamp == AT_THE_END or proof.robot == receiver):
+            if isinstance(proof, HasValue) and (proof.stamp == AT_THE_END or proof.robot == receiver):
                 self._learn(proof)
 
-    def hears(self, sender: str, message: Message) -> None:
-        """Take in a message, and all that it proves."""
+    def receives(self, sender: str, message: Message) -> None:
+        """Process a received message and its proofs."""
         proofs = self._proofs(message, sender, self.name)
-        self._note(message, sender, self.name)
+        self._store(message, sender, self.name)
         if proofs is None:
             self.without_rule.add(type(message).__name__)
             return
         for proof in proofs:
             self._learn(proof)
 
-    def misses(self, sender: str, message: Message) -> None:
-        """Forget where a robot stands if a message that does not arrive any more says otherwise."""
+    def loses(self, sender: str, message: Message) -> None:
+        """Forget the value of a robot if a lost message has a newer one."""
         for proof in self._proofs(message, sender, self.name) or ():
-            if isinstance(proof, StandsAt | StandsWhere):
-                self._stands.pop(proof.robot, None)
+            if isinstance(proof, HasValue | HasCompatibleValue):
+                self._last_values.pop(proof.robot, None)
 
-    def _note(self, message: Message, sender: str, receiver: str) -> None:
-        """Note the last message on a channel, of its type and of those that this extends."""
+    def _store(self, message: Message, sender: str, receiver: str) -> None:
+        """Store the last message on a channel, by its type and the type's bases."""
         for kind in type(message).__mro__:
             if issubclass(kind, Message):
                 self._last[kind, sender, receiver] = message
 
     def possible_values(self, robot: str) -> list[Value]:
-        """Return the possible current values of `robot`, by its messages, after `knowledge.settle()`."""
-        stand = self._stands.get(robot)
-        if stand is None:
-            return list(self._scene.secrets.declared[robot])
-        if stand.cases is None:
-            return list(stand.values)
-        return [stand.values[place] for place in self.knowledge.open_cases(stand.cases)]
+        """Return the possible current values of `robot` after its messages. Requires `knowledge.settle()`."""
+        known_value = self._last_values.get(robot)
+        if known_value is None:
+            return list(self._facts.secrets.declared[robot])
+        if known_value.cases is None:
+            return list(known_value.values)
+        return [known_value.values[place] for place in self.knowledge.open_cases(known_value.cases)]
 
     def _proofs(self, message: Message, sender: str, receiver: str) -> Sequence[Proof] | None:
-        """Return the statements that a message proves. None: there is no rule."""
-        proofs = message.proves(_Heard(self._scene, sender, receiver, self._values, self._last))
-        if proofs is None or not self._scene.one_sided:
+        """Return the statements that a message proves; None if it has no rule."""
+        proofs = message.proves(_ObservedMessage(self._facts, sender, receiver, self._values, self._last))
+        if proofs is None or not self._facts.one_sided:
             return proofs
         return [proof for proof in proofs if _is_of_one_robot(proof)]
 
     def _learn(self, proof: Proof) -> None:
-        """Put what a message proves in terms of secrets."""
+        """Translate a proof into statements about secrets."""
         match proof:
-            case StandsAt(robot, value, stamp):
+            case HasValue(robot, value, stamp):
                 if None not in value or is_withdrawn(value):
-                    self._bound(self._scene.secrets.own_cost(robot, value, {}), 0, FINITE)
-                    self._stand(robot, _Stand(stamp, (value,)))
-            case StandsWhere():
-                self._stands_where(proof)
+                    self._bound(self._facts.secrets.own_cost(robot, value, {}), 0, FINITE)
+                    self._set_last_value(robot, _LastValue(stamp, (value,)))
+            case HasCompatibleValue():
+                self._restrict_value(proof)
             case HasOnly(robot, values):
                 self._values[robot] = values
-                for value in self._scene.secrets.declared[robot]:
+                for value in self._facts.secrets.declared[robot]:
                     least, most = (0, FINITE) if value in values else (INFINITE, INFINITE)
-                    self._bound(self._scene.secrets.own_cost(robot, value, {}), least, most)
+                    self._bound(self._facts.secrets.own_cost(robot, value, {}), least, most)
             case _:
                 self._learn_cost(proof)
 
     def _learn_cost(self, proof: Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash) -> None:
-        """Put what a message proves of costs in terms of secrets."""
-        secrets = self._scene.secrets
+        """Translate a proof about costs into statements about secrets."""
+        secrets = self._facts.secrets
         match proof:
             case Pays(robot, value, view, least, most):
                 for complete in secrets.completions(view):
@@ -157,7 +154,7 @@ class Observer:
             case SomeValuePays(robot, view, most):
                 sums = tuple(secrets.own_cost(robot, value, view) for value in secrets.declared[robot])
                 if most < INFINITE:
-                    self.knowledge.tell(OneAtMost(sums, most))
+                    self.knowledge.add_statement(OneAtMost(sums, most))
             case Total(view, cost):
                 self._bound(secrets.total(view), cost, cost)
             case Clash(view):
@@ -167,23 +164,23 @@ class Observer:
                 assert_never(never)
 
     def _every_value(self, robot: str, view: View, least: float) -> None:
-        secrets = self._scene.secrets
+        secrets = self._facts.secrets
         for complete in secrets.completions(view):
             for value in secrets.declared[robot]:
                 if not is_withdrawn(value):
                     self._bound(secrets.own_cost(robot, value, complete), least, INFINITE)
 
-    def _stands_where(self, proof: StandsWhere) -> None:
-        """Leave those values of a robot that go with exactly the values that its message says."""
-        secrets = self._scene.secrets
+    def _restrict_value(self, proof: HasCompatibleValue) -> None:
+        """Keep the values of a robot that are compatible with exactly the values in its message."""
+        secrets = self._facts.secrets
         others = [value for value in secrets.declared[proof.other] if not is_withdrawn(value)]
         values = secrets.declared[proof.robot]
         cases = OneCase(tuple(self._case(proof, value, others) for value in values))
-        self.knowledge.tell(cases)
-        self._stand(proof.robot, _Stand((), values, cases))
+        self.knowledge.add_statement(cases)
+        self._set_last_value(proof.robot, _LastValue((), values, cases))
 
-    def _case(self, proof: StandsWhere, value: Value, others: Sequence[Value]) -> Case:
-        secrets = self._scene.secrets
+    def _case(self, proof: HasCompatibleValue, value: Value, others: Sequence[Value]) -> CostCase:
+        secrets = self._facts.secrets
         finite: list[int] = list(secrets.own_cost(proof.robot, value, {}))
         broken: list[Terms] = []
         for place, theirs in enumerate(others):
@@ -192,46 +189,46 @@ class Observer:
                 finite += terms
             else:
                 broken.append(terms)
-        return Case(tuple(dict.fromkeys(finite)), tuple(broken))
+        return CostCase(tuple(dict.fromkeys(finite)), tuple(broken))
 
-    def _stand(self, robot: str, stand: _Stand) -> None:
-        known = self._stands.get(robot)
-        if known is None or stand.stamp >= known.stamp:
-            self._stands[robot] = stand
+    def _set_last_value(self, robot: str, known_value: _LastValue) -> None:
+        known = self._last_values.get(robot)
+        if known is None or known_value.stamp >= known.stamp:
+            self._last_values[robot] = known_value
 
     def _bound(self, terms: Terms, least: float, most: float) -> None:
         if least > 0:
-            self.knowledge.tell(AtLeast(terms, least))
+            self.knowledge.add_statement(AtLeast(terms, least))
         if most < INFINITE:
-            self.knowledge.tell(AtMost(terms, most))
+            self.knowledge.add_statement(AtMost(terms, most))
 
 
 def _is_of_one_robot(proof: Proof) -> bool:
     """Return whether a proof is about one robot's values, private costs or parts, and not about sums of two sides."""
-    return isinstance(proof, StandsAt | StandsWhere | HasOnly | PartPays) or (
+    return isinstance(proof, HasValue | HasCompatibleValue | HasOnly | PartPays) or (
         isinstance(proof, Pays) and not proof.view
     )
 
 
-class _Heard(Hearing):
-    """A message as an observer hears it."""
+class _ObservedMessage(Reception):
+    """A message as received by an observer."""
 
     def __init__(
         self,
-        scene: Scene,
+        facts: RunFacts,
         sender: str,
         receiver: str,
         values: Mapping[str, Sequence[Value]],
         last: Mapping[Channel, Message],
     ) -> None:
         self.sender, self.receiver = sender, receiver
-        self.order = scene.order
-        self.branch = scene.branches[sender]
-        self.fixed_holders = scene.fixed_holders
-        self.minimises = scene.minimises
-        self.max_cost = scene.secrets.most
-        self._declared = scene.secrets.declared
-        self._neighbours = scene.secrets.neighbours
+        self.order = facts.order
+        self.branch = facts.branches[sender]
+        self.fixed_holders = facts.fixed_holders
+        self.minimises = facts.minimises
+        self.max_cost = facts.secrets.most
+        self._declared = facts.secrets.declared
+        self._neighbours = facts.secrets.neighbours
         self._values, self._last = values, last
 
     def neighbours(self, robot: str) -> Collection[str]:

@@ -1,4 +1,4 @@
-"""The privacy loss of a run as a page that needs nothing else: for each kind of secrets, who knows how much of whom."""
+"""The privacy loss of a run as a self-contained HTML page: for each kind of secrets, the losses between all robots."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from robochoc.system.plain_text import counted, listed
 
 _CELL, _SMALL_CELL = 34, 16
 MOST_NUMBERED = 40
-"""With more robots the cells are small, and have no numbers in them."""
+"""With more robots, the cells are small and have no numbers."""
 _LONGEST_LABEL, _LETTER = 16, 7.5
-"""Longer names are cut; the width of a letter at most."""
+"""The longest name that is not cut, in characters; the maximum width of a letter, in pixels."""
 _DARK = 0.55
-"""From this loss on a cell is so dark that its number is white."""
+"""The smallest loss whose cell is dark, with a white number."""
 _STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
@@ -37,7 +37,7 @@ _SECRETS = {
 
 
 def page_of(report: PrivacyReport, measure: Measure) -> str:
-    """Return the page, with a heat map by `measure` for each kind of secrets."""
+    """Return the page with a heat map by `measure` for each kind of secrets."""
     title = html.escape(f"Privacy loss: {report.team}, {report.protocol}")
     head = (
         f'<meta charset="utf-8"><title>{title}</title>'
@@ -51,18 +51,18 @@ def page_of(report: PrivacyReport, measure: Measure) -> str:
 def _body(report: PrivacyReport, measure: Measure) -> Iterator[str]:
     run = f"Run {report.run} of {report.runs}, " if report.runs > 1 else ""
     robots = counted(len(report.robots), "robot")
-    yield f"<p>{run}{robots}. 0: nothing is excluded; 1: all is known. Losses are lower bounds.</p>"
+    yield f"<p>{run}{robots}. 0: nothing is excluded; 1: everything is known. Losses are lower bounds.</p>"
     if report.without_rule:
         types = html.escape(listed(report.without_rule))
-        yield f"<p>Not known, where one of these messages was heard, as they have no rule: {types}.</p>"
+        yield f"<p>Losses are unknown for receivers of these messages, which have no rule: {types}.</p>"
     if report.undecided:
         yield f"<p>No decisions: {html.escape(report.undecided)}.</p>"
     yield _systems(report)
     if report.kinds():
         yield (
             "<h2>Who knows how much of whom</h2>"
-            f"<p>Loss by {measure}. A row for each robot that has secrets, a column for each observer. Where no cell"
-            f" is, there is no secret.</p>{_legend()}"
+            f"<p>Loss by {measure}. Each row is a robot with secrets, each column an observer. Pairs without a cell"
+            f" have no secrets.</p>{_legend()}"
         )
     for kind in report.kinds():
         caption = f"{kind.capitalize()}: {_SECRETS[kind]}"
@@ -71,7 +71,7 @@ def _body(report: PrivacyReport, measure: Measure) -> Iterator[str]:
 
 
 def _legend() -> str:
-    """Return an SVG with the colours of losses."""
+    """Return an SVG legend of the colours."""
     losses = (0.0, 0.25, 0.5, 0.75, 1.0, None)
     cells = "".join(_cell(_CELL * place + 1, 1, _CELL, loss) for place, loss in enumerate(losses))
     beside = _CELL * len(losses) + 8
@@ -91,7 +91,7 @@ def _systems(report: PrivacyReport) -> str:
 
 
 def heat_map(report: PrivacyReport, kind: Kind, measure: Measure) -> str:
-    """Return an SVG with a cell for each pair of a subject (row) and an observer (column)."""
+    """Return an SVG heat map with a cell for each pair of a subject (row) and an observer (column)."""
     found = {(loss.subject, loss.observer): loss.by(measure) for loss in report.losses if loss.kind is kind}
     names = [name if len(name) <= _LONGEST_LABEL else f"{name[: _LONGEST_LABEL - 1]}…" for name in report.robots]
     room = round(_LETTER * max(map(len, names))) + 8
@@ -121,13 +121,13 @@ def _cells(
         for column, observer in enumerate(robots):
             if (subject, observer) in found:
                 loss = found[subject, observer]
-                told = html.escape(f"{observer} of {subject}: {_text(loss)}")
+                title = html.escape(f"{observer} of {subject}: {_text(loss)}")
                 cell = _cell(room + width * column, room + width * row, width, loss)
-                yield f"<g><title>{told}</title>{cell}</g>"
+                yield f"<g><title>{title}</title>{cell}</g>"
 
 
 def _cell(x: int, y: int, width: int, loss: float | None) -> str:
-    """Return a square, the redder the more is known, grey where that is not known; with a number if there is room."""
+    """Return a square, redder for a larger loss, grey for an unknown one, with a number if there is room."""
     filled = 'class="unknown"' if loss is None else f'fill-opacity="{loss:.3f}"'
     square = f'<rect x="{x}" y="{y}" width="{width}" height="{width}" {filled}/>'
     if width < _CELL:

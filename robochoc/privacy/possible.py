@@ -1,9 +1,8 @@
-"""The costs that a secret may still have, narrowed down by statements about sums of secrets.
+"""The possible costs of secrets, narrowed by statements about sums of secrets.
 
-A secret is a cost: an integer from 0 up to a known largest one, or `INFINITE`. What is possible is a range of finite
-costs, and whether the secret may be infinite. Statements narrow that down until nothing changes (bounds consistency):
-all of them together are used, but each looks only at the bounds of the secrets in it. So nothing true is ever ruled
-out, and not all that is false.
+A secret is a cost: an integer from 0 to a known maximum, or `INFINITE`. Its possible costs are a range of finite costs,
+and possibly infinity. Statements narrow them until nothing changes (bounds consistency): all statements are used, but
+each only considers the bounds of its secrets. So no true cost is ever excluded, but not every false cost is.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ Secret = int
 Terms = tuple[Secret, ...]
 
 
-class Possible(NamedTuple):
+class PossibleCosts(NamedTuple):
     """The finite costs from `least` to `most` (none if `most` is smaller), and `INFINITE` if `infinite`."""
 
     least: int
@@ -42,18 +41,18 @@ class Possible(NamedTuple):
         """Return whether `cost` is possible."""
         return self.infinite if cost == INFINITE else self.least <= cost <= self.most
 
-    def at_least(self, cost: float) -> Possible:
+    def at_least(self, cost: float) -> PossibleCosts:
         """Return the remaining states if the secret is at least `cost`."""
         least = self.most + 1 if cost == INFINITE else max(self.least, math.ceil(cost))
-        return Possible(least, self.most, self.infinite)
+        return PossibleCosts(least, self.most, self.infinite)
 
-    def at_most(self, cost: float) -> Possible:
+    def at_most(self, cost: float) -> PossibleCosts:
         """Return the remaining states if the secret is at most `cost`, which is finite."""
-        return Possible(self.least, min(self.most, math.floor(cost)), infinite=False)
+        return PossibleCosts(self.least, min(self.most, math.floor(cost)), infinite=False)
 
 
-ANY = Possible(0, 2**53, infinite=False)
-"""Any finite cost: the sum of all is below 2^53 (`solver/exact_costs.py`)."""
+ANY = PossibleCosts(0, 2**53, infinite=False)
+"""Any finite cost: the sum of all costs is below 2^53 (`solver/exact_costs.py`)."""
 
 
 class AtLeast(NamedTuple):
@@ -77,8 +76,8 @@ class OneAtMost(NamedTuple):
     most: float
 
 
-class Case(NamedTuple):
-    """A way how things may be: the secrets in `finite` are so, and in each of `broken` one is infinite."""
+class CostCase(NamedTuple):
+    """A possible case: all secrets in `finite` are finite, and in each item of `broken` at least one is infinite."""
 
     finite: Terms
     broken: tuple[Terms, ...]
@@ -87,7 +86,7 @@ class Case(NamedTuple):
 class OneCase(NamedTuple):
     """One of `cases` is true."""
 
-    cases: tuple[Case, ...]
+    cases: tuple[CostCase, ...]
 
 
 Statement = AtLeast | AtMost | OneAtMost | OneCase
@@ -95,37 +94,37 @@ Statement = AtLeast | AtMost | OneAtMost | OneCase
 
 @dataclass
 class Knowledge:
-    """The costs that one observer still takes to be possible, for all secrets.
+    """The costs of all secrets that are still possible for an observer.
 
     Attributes:
-        most: The largest finite cost that a secret may have.
-        free: Secrets that may have any finite cost, of which nothing is concluded.
-        known: What is possible, of the secrets of which more than that is known.
+        most: The largest finite cost of a secret.
+        free: Secrets that may have any finite cost, and are never narrowed.
+        known: The possible costs of narrowed secrets.
     """
 
     most: int
     free: Collection[Secret] = frozenset()
-    known: dict[Secret, Possible] = field(default_factory=dict)
+    known: dict[Secret, PossibleCosts] = field(default_factory=dict)
     _statements: dict[tuple[type[Statement], Statement], Statement] = field(default_factory=dict)
 
-    def __getitem__(self, secret: Secret) -> Possible:
+    def __getitem__(self, secret: Secret) -> PossibleCosts:
         if secret in self.free:
             return ANY
         known = self.known.get(secret)
-        return Possible(0, self.most, infinite=True) if known is None else known
+        return PossibleCosts(0, self.most, infinite=True) if known is None else known
 
-    def tell(self, statement: Statement) -> None:
-        """Take note of a statement; `settle` draws the conclusions."""
-        self._statements[type(statement), statement] = statement  # tuples of two types may be equal
+    def add_statement(self, statement: Statement) -> None:
+        """Add a statement; `settle` draws the conclusions."""
+        self._statements[type(statement), statement] = statement  # tuples of different types may be equal
 
     def open_cases(self, statement: OneCase) -> list[int]:
-        """Return the places of the cases that may be true."""
+        """Return the indices of the possible cases."""
         return [place for place, case in enumerate(statement.cases) if self._may_be(case)]
 
     def settle(self) -> None:
-        """Draw all conclusions that single statements allow, until there is nothing new."""
+        """Draw all conclusions from single statements until nothing changes."""
         statements = list(self._statements.values())
-        naming = _naming(statements)
+        naming = _statements_by_secret(statements)
         waiting = deque(range(len(statements)))
         queued = set(waiting)
         while waiting:
@@ -137,7 +136,7 @@ class Knowledge:
                 waiting.extend(news)
 
     def _conclude(self, statement: Statement) -> list[Secret]:
-        """Return the secrets of which more is known now."""
+        """Apply a statement, and return the narrowed secrets."""
         match statement:
             case AtLeast(terms, least):
                 return self._at_least(terms, least)
@@ -148,12 +147,12 @@ class Knowledge:
                 return self._at_most(left[0], most) if len(left) == 1 else []
             case OneCase(cases):
                 left_open = self.open_cases(statement)
-                return self._take(cases[left_open[0]]) if len(left_open) == 1 else []
+                return self._apply(cases[left_open[0]]) if len(left_open) == 1 else []
             case never:
                 assert_never(never)
 
     def _at_least(self, terms: Terms, least: float) -> list[Secret]:
-        """Raise the least cost of each term to what the others at their largest leave of `least`."""
+        """Raise the least cost of each term to `least` minus the largest costs of the others."""
         changed: list[Secret] = []
         unbounded = [secret for secret in terms if self[secret].infinite]
         if len(unbounded) > 1:
@@ -165,14 +164,14 @@ class Knowledge:
         return changed
 
     def _at_most(self, terms: Terms, most: float) -> list[Secret]:
-        """Lower the largest cost of each term to what the others at their smallest leave of `most`."""
+        """Lower the largest cost of each term to `most` minus the smallest costs of the others."""
         changed: list[Secret] = []
         total = self._minimum(terms)
         for secret in terms if total < INFINITE else ():
             self._narrow(secret, self[secret].at_most(most - (total - self[secret].minimum)), changed)
         return changed
 
-    def _take(self, case: Case) -> list[Secret]:
+    def _apply(self, case: CostCase) -> list[Secret]:
         changed: list[Secret] = []
         for secret in case.finite:
             self._narrow(secret, self[secret]._replace(infinite=False), changed)
@@ -180,21 +179,21 @@ class Knowledge:
             changed += self._at_least(terms, INFINITE)
         return changed
 
-    def _may_be(self, case: Case) -> bool:
+    def _may_be(self, case: CostCase) -> bool:
         finite = all(self[secret].minimum < INFINITE for secret in case.finite)
         return finite and all(any(self[secret].infinite for secret in terms) for terms in case.broken)
 
     def _minimum(self, terms: Terms) -> float:
         return sum(self[secret].minimum for secret in terms)
 
-    def _narrow(self, secret: Secret, possible: Possible, changed: list[Secret]) -> None:
+    def _narrow(self, secret: Secret, possible: PossibleCosts, changed: list[Secret]) -> None:
         if secret not in self.free and possible.number < self[secret].number:
             self.known[secret] = possible
             changed.append(secret)
 
 
-def _naming(statements: Sequence[Statement]) -> Mapping[Secret, list[int]]:
-    """Return for each secret the places of the statements that name it."""
+def _statements_by_secret(statements: Sequence[Statement]) -> Mapping[Secret, list[int]]:
+    """Return for each secret the indices of the statements about it."""
     found: dict[Secret, list[int]] = {}
     for place, statement in enumerate(statements):
         for secret in dict.fromkeys(_secrets(statement)):
@@ -203,7 +202,7 @@ def _naming(statements: Sequence[Statement]) -> Mapping[Secret, list[int]]:
 
 
 def _secrets(statement: Statement) -> Iterable[Secret]:
-    """Yield all secrets that are named in a statement."""
+    """Yield all secrets in a statement."""
     match statement:
         case AtLeast(terms) | AtMost(terms):
             yield from terms

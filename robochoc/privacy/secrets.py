@@ -1,9 +1,9 @@
-"""The secrets of a team: what each robot's problem says, as far as others do not know it from the start.
+"""The secrets of a team: the parts of the robots' problems that other robots do not know initially.
 
-There are two kinds of them besides the values that robots take. What a robot's private constraints charge for each of
-its declared values (`INFINITE`: it cannot take the value), which no other robot knows. And what a shared constraint
-costs for each combination of declared values, which the robots of its scope know; of a partially known constraint each
-robot knows its own part only.
+Besides the robots' values there are two kinds of secrets. First, the cost of each declared value of a robot by its
+private constraints (`INFINITE` for an impossible value), which no other robot knows. Second, the cost of each
+combination of declared values by a shared constraint, which the robots of its scope know; in a partially known
+constraint, each robot knows only its part.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
-from robochoc.privacy.possible import Possible, Secret, Terms
+from robochoc.privacy.possible import PossibleCosts, Secret, Terms
 from robochoc.protocols.disclosure import View
 from robochoc.protocols.message import Value
 from robochoc.protocols.wording import is_withdrawn
@@ -25,17 +25,18 @@ from robochoc.solver.explanation import constraints_above, parts_below
 from robochoc.system.errors import RobochocError
 
 MOST_SECRETS = 200_000
-"""Robots' values and entries of constraints, in all."""
+"""The maximum number of secrets: robots' values and entries of constraints."""
 
 
 class TooManySecretsError(RobochocError, ValueError):
     """The team has too many values, or too large constraints."""
 
 
-class _Entries(NamedTuple):
-    """The entries of a shared constraint: where the values of its variables stand, and a secret for each combination.
+class _ConstraintSecrets(NamedTuple):
+    """The secrets of a shared constraint, one for each combination of values.
 
-    `knowing` are the robots that know the constraint.
+    `places` are the robots of its variables with the variables' indices; `knowing` are the robots that know the
+    constraint.
     """
 
     places: tuple[tuple[str, int], ...]
@@ -45,15 +46,15 @@ class _Entries(NamedTuple):
 
 
 class TeamSecrets:
-    """The secrets of a team, by number; `truths` has the true costs.
+    """The secrets of a team, numbered. `truths` are the true costs.
 
     Attributes:
-        declared: By robot, all combinations of declared values of its interface variables, in ascending order; and that
-            it is withdrawn, if robots may withdraw.
-        charges: By robot and value.
+        declared: By robot, all combinations of declared values of its interface variables, in ascending order, and the
+            withdrawn value if robots may withdraw.
+        charges: The secret costs of values by private constraints, by robot and value.
         entries: By robot, the secrets in its shared constraints.
-        most: The largest finite cost of them all.
-        neighbours: By robot, those that share a constraint with it, or that a file links with it.
+        most: The largest finite cost.
+        neighbours: By robot, the robots that share a constraint with it, or are linked with it by a file.
     """
 
     def __init__(self, team: CompiledTeam, parameters: RunParameters) -> None:
@@ -61,11 +62,11 @@ class TeamSecrets:
         self.declared: dict[str, tuple[Value, ...]] = {}
         self.charges: dict[str, dict[Value, Secret]] = {}
         self.entries: dict[str, dict[Secret, frozenset[str]]] = {}
-        """With the robots that know each from the start."""
+        """Each with the robots that know it initially."""
         self.neighbours: dict[str, set[str]] = {robot.name: set() for robot in team.team.robots}
         self.withdrawing: set[Secret] = set()
-        """Costs of withdrawing, and of values that look like it: they are not counted, and never narrowed."""
-        self._shared: dict[str, list[_Entries]] = {robot.name: [] for robot in team.team.robots}
+        """Costs of withdrawing, and of values that look like withdrawal: not counted, and never narrowed."""
+        self._shared: dict[str, list[_ConstraintSecrets]] = {robot.name: [] for robot in team.team.robots}
         self._team = team.team
         self._may_withdraw = parameters.withdrawal_cost is not None
         self._places = {
@@ -83,8 +84,8 @@ class TeamSecrets:
         finite = (int(cost) for number, cost in enumerate(self.truths) if self._is_counted_cost(number, cost))
         self.most = max(finite, default=0)
 
-    def known_from_the_start(self, observer: str) -> Iterator[tuple[Secret, Possible]]:
-        """Yield the secrets that `observer` knows."""
+    def known_from_the_start(self, observer: str) -> Iterator[tuple[Secret, PossibleCosts]]:
+        """Yield the secrets that `observer` knows initially, with their costs."""
         for secret in self.charges[observer].values():
             yield secret, exactly(self.truths[secret])
         for secret, knowing in self.entries[observer].items():
@@ -92,48 +93,48 @@ class TeamSecrets:
                 yield secret, exactly(self.truths[secret])
 
     def unknown_charges(self, subject: str, observer: str) -> list[Secret]:
-        """Return the charges of `subject` that `observer` does not know from the start."""
+        """Return the charges of `subject` that `observer` does not know initially."""
         found = self.charges[subject].values() if subject != observer else ()
         return [secret for secret in found if secret not in self.withdrawing]
 
     def unknown_entries(self, subject: str, observer: str) -> list[Secret]:
-        """Return the entries of constraints that `subject` knows, and `observer` does not know from the start."""
+        """Return the entries of constraints that `subject` knows, but `observer` does not know initially."""
         return [one for one, knowing in self.entries[subject].items() if subject in knowing and observer not in knowing]
 
     def own_cost(self, robot: str, value: Value, view: View) -> Terms:
-        """Return the secrets whose sum is the own cost of `value` of `robot` in `view` (`protocols/disclosure.py`)."""
+        """Return the secrets whose sum is the own cost of a value of `robot` in `view` (`protocols/disclosure.py`)."""
         charge = self.charges[robot].get(value)
         terms = [] if charge is None else [charge]
         return tuple(terms + self._between({**view, robot: value}, self._shared[robot]))
 
     def filtered(self, robot: str, value: Value, other: str, theirs: Value, *, parts_only: bool) -> Terms:
-        """Return the secrets in constraints between two robots that `robot` knows, for a value of each.
+        """Return the secrets for a pair of values in the constraints between two robots that `robot` knows.
 
-        With `parts_only` only in its parts of partially known ones.
+        With `parts_only`, only its parts of partially known constraints count.
         """
         view = {robot: value, other: theirs}
         own = [one for one in self._shared[robot] if robot in one.knowing]
         return tuple(self._between(view, [one for one in own if not parts_only or one.knowing == {robot}]))
 
     def among(self, view: View) -> Terms:
-        """Return the secrets in all constraints among the robots of `view`."""
+        """Return the secrets of `view` in all constraints among its robots."""
         shared = {id(one): one for robot in view for one in self._shared[robot]}
         return tuple(self._between(view, list(shared.values())))
 
     def total(self, view: View) -> Terms:
-        """Return the secrets whose sum is what the values in `view` charge, and all constraints among them cost."""
+        """Return the secrets whose sum is the cost of `view` by private constraints and those among its robots."""
         charged = [self.charges[robot][value] for robot, value in view.items() if value in self.charges[robot]]
         return (*charged, *self.among(view))
 
     def completions(self, view: View) -> Iterator[View]:
-        """Yield `view` with each combination of values for the variables that do not matter in it."""
-        every = [self._like(robot, value) for robot, value in view.items()]
+        """Yield all completions of `view` by values for its irrelevant variables (None)."""
+        every = [self._matching(robot, value) for robot, value in view.items()]
         if math.prod(map(len, every)) <= MOST_SECRETS:
             for values in itertools.product(*every):
                 yield dict(zip(view, values, strict=True))
 
-    def _like(self, robot: str, value: Value) -> Sequence[Value]:
-        """Return the declared values of `robot` that agree with `value` where it is not None."""
+    def _matching(self, robot: str, value: Value) -> Sequence[Value]:
+        """Return the declared values of `robot` that equal `value` except where it is None."""
         if is_withdrawn(value) or None not in value:
             return [value]
         return [
@@ -145,10 +146,10 @@ class TeamSecrets:
     def _is_counted_cost(self, secret: Secret, cost: float) -> bool:
         return cost < INFINITE and secret not in self.withdrawing
 
-    def _between(self, view: View, shared: Sequence[_Entries]) -> list[Secret]:
-        """Return the secrets in those of these constraints whose robots are all in `view`.
+    def _between(self, view: View, shared: Sequence[_ConstraintSecrets]) -> list[Secret]:
+        """Return the secrets in the constraints whose robots are all in `view`.
 
-        Constraints that are dropped because a robot is withdrawn have no secrets.
+        Constraints that are dropped because of a withdrawn robot have no secrets.
         """
         found = []
         for one in shared:
@@ -159,40 +160,40 @@ class TeamSecrets:
 
     def _add_charges(self, robot: Robot, team: CompiledTeam, parameters: RunParameters) -> None:
         columns = [sorted(self._team.variables[name].domain) for name in robot.interface]
-        self._make_room(math.prod(map(len, columns)), f"{robot.name} can show its neighbours")
+        self._check_size(math.prod(map(len, columns)), f"{robot.name} can show its neighbours")
         domain = team[robot.name]
         costs: dict[Value, float] = dict(zip(domain.values, domain.costs, strict=True))
         declared: list[Value] = list(itertools.product(*columns))
-        self.charges[robot.name] = {value: self._added(costs.get(value, INFINITE)) for value in declared}
+        self.charges[robot.name] = {value: self._add_secret(costs.get(value, INFINITE)) for value in declared}
         if parameters.withdrawal_cost is not None:
             away: Value = (None,) * len(robot.interface)
             if away not in declared:
                 declared.append(away)
-                self.charges[robot.name][away] = self._added(parameters.withdrawal_cost * robot.weight)
+                self.charges[robot.name][away] = self._add_secret(parameters.withdrawal_cost * robot.weight)
             self.withdrawing.add(self.charges[robot.name][away])
         self.declared[robot.name] = tuple(declared)
         self.entries[robot.name] = {}
 
     def _link(self, robot: str, other: str) -> None:
-        """Make neighbours of robots that a file links, also if a scenario has left no constraint between them."""
+        """Make two robots neighbours that a file links, even if a scenario has left no constraint between them."""
         self.neighbours[robot].add(other)
         self.neighbours[other].add(robot)
 
     def _add_constraint(self, constraint: Constraint, holder: str) -> None:
         names = constraint.variables
         columns = [sorted(self._team.variables[name].domain) for name in names]
-        self._make_room(math.prod(map(len, columns)), f"constraint {constraint.name} of {holder} has")
+        self._check_size(math.prod(map(len, columns)), f"constraint {constraint.name} of {holder} has")
         places = tuple(self._places[name] for name in names)
         owners = frozenset(robot for robot, _ in places)
         knowing = frozenset([holder]) if constraint.model == ConstraintModel.PKC else owners | {holder}
         secrets: dict[Value, Secret] = {
-            values: self._added(constraint.price(dict(zip(names, values, strict=True))))
+            values: self._add_secret(constraint.price(dict(zip(names, values, strict=True))))
             for values in itertools.product(*columns)
         }
         entries = tuple(secrets.values())
         if self._may_withdraw and may_count_when_absent(constraint):
             secrets.update(self._in_absence(constraint, places))
-        added = _Entries(places, owners, knowing, secrets)
+        added = _ConstraintSecrets(places, owners, knowing, secrets)
         for owner in sorted(owners | {holder}):
             self._shared[owner].append(added)
             self.neighbours[owner] |= owners - {owner}
@@ -209,20 +210,22 @@ class TeamSecrets:
                 columns: list[Sequence[int | None]] = [
                     [None] if name in gone else sorted(self._team.variables[name].domain) for name in names
                 ]
-                self._make_room(math.prod(map(len, columns)), f"constraint {constraint.name} has")
+                self._check_size(math.prod(map(len, columns)), f"constraint {constraint.name} has")
                 for values in itertools.product(*columns) if left is not None else ():
                     known = {name: value for name, value in zip(names, values, strict=True) if value is not None}
-                    yield values, self._added(left.price(known) if left is not None else 0)
+                    yield values, self._add_secret(left.price(known) if left is not None else 0)
 
-    def _added(self, cost: float) -> Secret:
+    def _add_secret(self, cost: float) -> Secret:
         self.truths.append(cost)
         return len(self.truths) - 1
 
-    def _make_room(self, number: int, who: str) -> None:
+    def _check_size(self, number: int, who: str) -> None:
         if len(self.truths) + number > MOST_SECRETS:
-            raise TooManySecretsError(f"{who} {number:,} combinations of values; all together at most {MOST_SECRETS:,}")
+            raise TooManySecretsError(f"{who} {number:,} combinations of values; at most {MOST_SECRETS:,} in all")
 
 
-def exactly(cost: float) -> Possible:
-    """Return the possible states of a known secret."""
-    return Possible(0, -1, infinite=True) if cost == INFINITE else Possible(int(cost), int(cost), infinite=False)
+def exactly(cost: float) -> PossibleCosts:
+    """Return the possible costs of a secret that is known to be `cost`."""
+    return (
+        PossibleCosts(0, -1, infinite=True) if cost == INFINITE else PossibleCosts(int(cost), int(cost), infinite=False)
+    )

@@ -26,7 +26,7 @@ View = Mapping[str, Value]
 """Values by robot; None where a variable does not matter."""
 
 
-class StandsAt(NamedTuple):
+class HasValue(NamedTuple):
     """`robot` has chosen `value`, and keeps it until the observer receives another value.
 
     Of several such statements about a robot the one with the largest `stamp` counts, and the last of these.
@@ -37,12 +37,12 @@ class StandsAt(NamedTuple):
     stamp: tuple[int, ...] = ()
 
 
-class StandsWhere(NamedTuple):
+class HasCompatibleValue(NamedTuple):
     """`robot` has chosen a value that is compatible with exactly the values of `other` whose bits are set in `allowed`.
 
     The bits are in the order of `other`'s declared values. Only constraints between these two robots that `robot` knows
     count; with `parts_only` its parts of partially known ones. The statement is valid until the observer receives
-    another one, as in `StandsAt`.
+    another one, as in `HasValue`.
     """
 
     robot: str
@@ -107,7 +107,7 @@ class Clash(NamedTuple):
     view: View
 
 
-Proof = StandsAt | StandsWhere | HasOnly | Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash
+Proof = HasValue | HasCompatibleValue | HasOnly | Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash
 NOTHING: tuple[Proof, ...] = ()
 """The proofs of a message without any. It has a rule, unlike a message whose `proves` returns None."""
 AT_THE_END = (2**62,)
@@ -116,7 +116,7 @@ FINITE = float(2**53)
 """The upper bound of a cost that is only known to be finite: above all costs of a problem."""
 
 
-class Hearing(ABC):
+class Reception(ABC):
     """A received message in its context: its sender, and the knowledge of its receiver, the observer.
 
     Attributes:
@@ -183,22 +183,22 @@ def partial_assignment(robots: Sequence[str], values: Sequence[Value]) -> list[P
 
 
 def table_proves(
-    axes: Sequence[str], cells: Iterable[tuple[Sequence[int], float]], hearing: Hearing
+    axes: Sequence[str], cells: Iterable[tuple[Sequence[int], float]], reception: Reception
 ) -> Sequence[Proof]:
     """Return the proofs of `cells` of the sender's table: places on its axes, and the least cost with these values.
 
     Robots whose values the receiver does not know are left out of the views: an upper bound on the cost of some value
     of the sender with one of their values is also one without them.
     """
-    sender = hearing.sender
-    near = [(robot, hearing.values(robot)) for robot in hearing.neighbours(sender) if robot not in axes]
+    sender = reception.sender
+    near = [(robot, reception.values(robot)) for robot in reception.neighbours(sender) if robot not in axes]
     single = {robot: values[0] for robot, values in near if values is not None and len(values) == 1}
-    none_below = {*axes, *single} >= set(hearing.neighbours(sender))
+    none_below = {*axes, *single} >= set(reception.neighbours(sender))
     least: dict[tuple[tuple[str, Value], ...], float] = {}
-    all_known = all(hearing.values(robot) is not None for robot in axes)
+    all_known = all(reception.values(robot) is not None for robot in axes)
     for places, cost in cells:
         known = zip(axes, places, strict=True)
-        view = tuple([(robot, values[at]) for robot, at in known if (values := hearing.values(robot)) is not None])
+        view = tuple([(robot, values[at]) for robot, at in known if (values := reception.values(robot)) is not None])
         least[view] = min(cost, least.get(view, INFINITE))
     found: list[Proof] = []
     for view, cost in least.items():

@@ -16,7 +16,7 @@ from robochoc.protocols.acts import INFORM, Act
 from robochoc.protocols.wording import Wording
 
 if TYPE_CHECKING:
-    from robochoc.protocols.disclosure import Hearing, Proof
+    from robochoc.protocols.disclosure import Proof, Reception
 
 __all__ = ["Envelope", "Message", "Value", "encode"]  # `Value`: for the authors of protocols
 
@@ -42,7 +42,7 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
         """Return the message as the sender's sentence: `V1.1 = 1 from now on`. Empty: its fields are shown."""
         return ""
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:  # noqa: ARG002 - for overrides
+    def proves(self, reception: Reception) -> Sequence[Proof] | None:  # noqa: ARG002 - for overrides
         """Return the proofs that the message gives its receiver about other robots (`protocols/disclosure.py`).
 
         None: there is no rule, and the receiver's knowledge is unknown. A message with `proves_nothing` needs no

@@ -62,7 +62,7 @@ def test_a_page_is_written_beside_the_table(saved: Path, tmp_path: Path) -> None
 def test_a_run_that_is_not_there_is_wrong_usage(saved: Path) -> None:
     result = run("privacy", saved, "--run", 3, "--no-cache")
     assert result.exit_code == USAGE
-    assert "there is no run 3: the journal holds 1" in result.output
+    assert "the journal has no run 3, only 1" in result.output
 
 
 def test_a_journal_that_ends_before_a_run_begins_is_not_measured(saved: Path, tmp_path: Path) -> None:
@@ -70,7 +70,7 @@ def test_a_journal_that_ends_before_a_run_begins_is_not_measured(saved: Path, tm
     cut.write_bytes(saved.read_bytes()[:700])
     result = run("privacy", cut, "--no-cache")
     assert result.exit_code == USAGE
-    assert result.output.strip().endswith("cut.journal: it ends before a run begins")
+    assert result.output.strip().endswith("cut.journal: the journal ends before the beginning of a run")
 
 
 def test_what_is_no_journal_is_invalid(tmp_path: Path) -> None:

@@ -37,7 +37,7 @@ from typing import ClassVar
 
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import INFINITE, NOTHING, Hearing, PartPays, Proof, can_take
+from robochoc.protocols.disclosure import INFINITE, NOTHING, PartPays, Proof, Reception, can_take
 from robochoc.protocols.local_search.mgm import saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, CycleProtocol, Value, gain
@@ -79,8 +79,8 @@ class Proposal(wire.Message, frozen=True):
             return "I propose no other value in this cycle"
         return f"{words.own_value(self.value)} is what I propose: what would it cost you?"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return NOTHING if self.value is None else [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return NOTHING if self.value is None else [can_take(reception.sender, self.value)]
 
 
 class Sides(wire.Message, frozen=True):
@@ -94,16 +94,16 @@ class Sides(wire.Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         return f"my side costs {saving_in_words(*self.now)} now, and {saving_in_words(*self.proposed)} as you propose"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The cost of the sender's part with both values of the receiver.
-        wanted = hearing.last(Proposal, hearing.receiver, hearing.sender)
-        own = hearing.last(Value, hearing.receiver, hearing.sender)
-        theirs = hearing.last(Value, hearing.sender, hearing.receiver)
+        wanted = reception.last(Proposal, reception.receiver, reception.sender)
+        own = reception.last(Value, reception.receiver, reception.sender)
+        theirs = reception.last(Value, reception.sender, reception.receiver)
         if wanted is None or wanted.value is None or own is None or theirs is None:
             return NOTHING
         sides = ((own.value, self.now), (wanted.value, self.proposed))
         return [
-            PartPays(hearing.sender, theirs.value, hearing.receiver, value, INFINITE if broken else cost)
+            PartPays(reception.sender, theirs.value, reception.receiver, value, INFINITE if broken else cost)
             for value, (broken, cost) in sides
         ]
 

@@ -48,7 +48,7 @@ from typing import ClassVar, Literal, assert_never, cast
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, Total, can_take
+from robochoc.protocols.disclosure import NOTHING, Proof, Reception, Total, can_take
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.syncbb import Backtrack, BestPath, Cost, SyncBB, Terminate, best_proves
 from robochoc.protocols.order import PriorityOrder
@@ -80,9 +80,9 @@ class CPA(Message, frozen=True):
         values, known = words.partial(self.values), incumbent_text(self.best.bound)
         return f"so far {values}, which costs {cost_text(self.paid)}; {known}; it is {words.receiver}'s turn"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        values = [can_take(*chosen) for chosen in zip(hearing.order, self.values, strict=False)]
-        return [*values, *best_proves(self.best, hearing)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        values = [can_take(*chosen) for chosen in zip(reception.order, self.values, strict=False)]
+        return [*values, *best_proves(self.best, reception)]
 
 
 class CPABack(Message, frozen=True):
@@ -103,7 +103,7 @@ class CPABack(Message, frozen=True):
         values = words.assigned([(self.robot, self.value)])
         return f"with {values} it costs {cost_text(self.paid)} so far; what does your side of it add?"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
+    def proves(self, _: Reception) -> Sequence[Proof]:
         return [can_take(self.robot, self.value)]
 
 
@@ -123,8 +123,8 @@ class FullBack(Message, frozen=True):
         values = words.partial(self.values)
         return f"all have values: {values}, which costs {cost_text(self.paid)} so far; what does your side add?"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(*chosen) for chosen in zip(hearing.order, self.values, strict=False)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(*chosen) for chosen in zip(reception.order, self.values, strict=False)]
 
 
 class Priced(Message, frozen=True):
@@ -137,20 +137,20 @@ class Priced(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"with {words.receiver}'s value it costs {cost_text(self.paid)} in all"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The cost of the CPA that the receiver has sent back.
-        above = hearing.order[: hearing.order.index(hearing.receiver)]
+        above = reception.order[: reception.order.index(reception.receiver)]
         if not above:
             return NOTHING
-        complete = hearing.last(FullBack, hearing.receiver, above[-1])
+        complete = reception.last(FullBack, reception.receiver, above[-1])
         if complete is not None:
-            return [Total(dict(zip(hearing.order, complete.values, strict=False)), self.paid)]
-        taken_up = hearing.last(CPA, above[-1], hearing.receiver)
-        asked = next((one for name in above[::-1] if (one := hearing.last(CPABack, hearing.receiver, name))), None)
-        if taken_up is None or asked is None or asked.robot != hearing.receiver:
+            return [Total(dict(zip(reception.order, complete.values, strict=False)), self.paid)]
+        taken_up = reception.last(CPA, above[-1], reception.receiver)
+        asked = next((one for name in above[::-1] if (one := reception.last(CPABack, reception.receiver, name))), None)
+        if taken_up is None or asked is None or asked.robot != reception.receiver:
             return NOTHING
         view = dict(zip(above, taken_up.values, strict=False))
-        return [Total({**view, hearing.receiver: asked.value}, self.paid)]
+        return [Total({**view, reception.receiver: asked.value}, self.paid)]
 
 
 class TooCostly(Message, frozen=True):

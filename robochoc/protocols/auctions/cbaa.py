@@ -41,7 +41,7 @@ from typing import cast
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.auctions.market import NO_LIMIT, Auction, Lot, lot_in_words, proofs_of_bid
-from robochoc.protocols.disclosure import Hearing, Proof
+from robochoc.protocols.disclosure import Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -63,8 +63,8 @@ class WinningBids(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return listed([winning_bid_in_words(words, *bid) for bid in self.bids])
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return winning_bids_prove(self.bids, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return winning_bids_prove(self.bids, reception)
 
 
 def winning_bid_in_words(words: Wording, lot: Lot, winner: str, amount: int) -> str:
@@ -76,13 +76,13 @@ def winning_bid_in_words(words: Wording, lot: Lot, winner: str, amount: int) -> 
     return f"{task} is {whose} for {amount:,}"
 
 
-def winning_bids_prove(standings: Sequence[WinningBid], hearing: Hearing) -> list[Proof]:
+def winning_bids_prove(standings: Sequence[WinningBid], reception: Reception) -> list[Proof]:
     """Return what the sender's own bids in `standings` prove.
 
     Those of other winners prove nothing, as the sender's name for a task is not the winner's.
     """
-    own = [(lot, amount) for lot, winner, amount in standings if winner == hearing.sender]
-    return [proof for lot, amount in own for proof in proofs_of_bid(hearing.sender, lot, amount, hearing)]
+    own = [(lot, amount) for lot, winner, amount in standings if winner == reception.sender]
+    return [proof for lot, amount in own for proof in proofs_of_bid(reception.sender, lot, amount, reception)]
 
 
 class CBAA(Auction):

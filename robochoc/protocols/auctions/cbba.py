@@ -55,7 +55,7 @@ from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.auctions.cbaa import WinningBid, winning_bid_in_words, winning_bids_prove
 from robochoc.protocols.auctions.market import NO_LIMIT, Auction
-from robochoc.protocols.disclosure import Hearing, Proof
+from robochoc.protocols.disclosure import Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -81,8 +81,8 @@ class Bundles(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return listed([winning_bid_in_words(words, *one) for one in self.standings])
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return winning_bids_prove(self.standings, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return winning_bids_prove(self.standings, reception)
 
 
 class Action(Enum):

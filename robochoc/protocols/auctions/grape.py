@@ -46,7 +46,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.auctions.market import Auction, Lot, lot_in_words, proofs_of_task
-from robochoc.protocols.disclosure import Hearing, Proof
+from robochoc.protocols.disclosure import Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -73,8 +73,8 @@ class Partition(wire.Message, frozen=True):
         who = [f"{robot} does {lot_in_words(words, robot, lot)}" for robot, lot in self.coalitions.items()]
         return f"after move {self.evolution:,}, which was {self.mover}'s, {listed(who) or 'nobody does anything'}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [proof for robot, lot in self.coalitions.items() for proof in proofs_of_task(robot, lot, hearing)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [proof for robot, lot in self.coalitions.items() for proof in proofs_of_task(robot, lot, reception)]
 
 
 STAMPS = 1 << 32

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.disclosure import Hearing, Pays, Proof, SomeValuePays, can_take
+from robochoc.protocols.disclosure import Pays, Proof, Reception, SomeValuePays, can_take
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.wording import Wording
@@ -42,35 +42,35 @@ def lot_in_words(words: Wording, robot: str, lot: Lot) -> str:
     return f"task {listed(words.facts(robot, [value if at == place else None for at in range(size)]))}"
 
 
-def proofs_of_task(robot: str, lot: Lot, hearing: Hearing) -> list[Proof]:
+def proofs_of_task(robot: str, lot: Lot, reception: Reception) -> list[Proof]:
     """Return the proofs given by the fact that `robot` does a task which it calls `lot`: it can take that value.
 
     The other values of a robot of several variables are not known: that proves nothing about a whole value.
     """
     place, value = lot
-    if robot == hearing.receiver or place != 0 or hearing.width(robot) != 1:
+    if robot == reception.receiver or place != 0 or reception.width(robot) != 1:
         return []
     return [can_take(robot, (value,))]
 
 
-def proofs_of_bid(robot: str, lot: Lot, amount: int, hearing: Hearing) -> list[Proof]:
+def proofs_of_bid(robot: str, lot: Lot, amount: int, reception: Reception) -> list[Proof]:
     """Return the proofs given by a bid of `robot` for the task that it calls `lot`.
 
     The bid is the cost of its value for the task less that of the cheapest value without a task, which is not above the
     largest cost. A robot of one variable has one task at most, so no other bid has been subtracted.
     """
-    does = proofs_of_task(robot, lot, hearing)
+    does = proofs_of_task(robot, lot, reception)
     if not does:
-        return proofs_of_next_bid(robot, amount, hearing)
-    return [Pays(robot, (lot[1],), {}, 0, hearing.max_cost - amount)]
+        return proofs_of_next_bid(robot, amount, reception)
+    return [Pays(robot, (lot[1],), {}, 0, reception.max_cost - amount)]
 
 
-def proofs_of_next_bid(robot: str, amount: int, hearing: Hearing) -> list[Proof]:
+def proofs_of_next_bid(robot: str, amount: int, reception: Reception) -> list[Proof]:
     """Return the proofs given by a bid of `robot` for an unnamed task: one value is cheaper than another by the amount.
 
     This also holds where the robot has other tasks: the bid is never above the value of the next task.
     """
-    return [SomeValuePays(robot, {}, hearing.max_cost - amount)] if amount > 0 else []
+    return [SomeValuePays(robot, {}, reception.max_cost - amount)] if amount > 0 else []
 
 
 NO_LIMIT = 2**63 - 1

@@ -54,7 +54,7 @@ from robochoc.protocols.auctions.market import (
     proofs_of_next_bid,
     proofs_of_task,
 )
-from robochoc.protocols.disclosure import Hearing, Proof
+from robochoc.protocols.disclosure import Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -77,8 +77,8 @@ class Bid(wire.Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         return _next_bid_in_words(self.amount)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return proofs_of_next_bid(hearing.sender, self.amount, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return proofs_of_next_bid(reception.sender, self.amount, reception)
 
 
 class Won(wire.Message, frozen=True):
@@ -93,10 +93,10 @@ class Won(wire.Message, frozen=True):
         lots = listed([lot_in_words(words, words.sender, lot) for lot in self.lots])
         return f"{lots} {'is' if len(self.lots) == 1 else 'are'} mine, and {_next_bid_in_words(self.amount)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The sender can do the tasks. Its former bids for them may be unknown.
-        won = [proof for lot in self.lots for proof in proofs_of_task(hearing.sender, lot, hearing)]
-        return [*won, *proofs_of_next_bid(hearing.sender, self.amount, hearing)]
+        won = [proof for lot in self.lots for proof in proofs_of_task(reception.sender, lot, reception)]
+        return [*won, *proofs_of_next_bid(reception.sender, self.amount, reception)]
 
 
 class SSI(Auction):

@@ -58,7 +58,7 @@ import msgspec
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import NOTHING, HasOnly, Hearing, Proof, StandsAt, table_proves
+from robochoc.protocols.disclosure import NOTHING, HasOnly, HasValue, Proof, Reception, table_proves
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.inference.dpop_tables import (
     Codes,
@@ -129,8 +129,8 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return words.domain(self.values)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 class Dimensions(Message, frozen=True):
@@ -187,21 +187,21 @@ class UTIL(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         return piece_in_words(self.costs, self.width)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+    def proves(self, reception: Reception) -> Sequence[Proof] | None:
         """Return the bounds on the sender's costs. There is no rule for large tables.
 
         For each combination of values, some value of the sender costs no more than its cell, as all robots below cost
         at least 0. If all neighbours of the sender are above it, no robot is below; then no value costs less.
         """
-        axes = axes_of(hearing, hearing.receiver, hearing.sender)
-        dimensions = hearing.last(Dimensions, hearing.sender, hearing.receiver)
+        axes = axes_of(reception, reception.receiver, reception.sender)
+        dimensions = reception.last(Dimensions, reception.sender, reception.receiver)
         if axes is None or dimensions is None:
             return NOTHING  # received in another epoch, or as labels (MB-DPOP)
         shape = [dimensions.separator[robot] for robot in axes]
         cells = cells_of(self.costs, self.width)
         if len(cells) != math.prod(shape) or len(cells) > MOST_CELLS:
             return None
-        return table_proves(axes, zip(itertools.product(*map(range, shape)), cells, strict=True), hearing)
+        return table_proves(axes, zip(itertools.product(*map(range, shape)), cells, strict=True), reception)
 
 
 class VALUE(Message, frozen=True):
@@ -217,17 +217,17 @@ class VALUE(Message, frozen=True):
         places = listed([str(place + 1) for place in self.assignment])
         return f"by number, the values of the robots in your separator are {places}, the nearest robot first"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        axes = axes_of(hearing, hearing.sender, hearing.receiver)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        axes = axes_of(reception, reception.sender, reception.receiver)
         if axes is None:
             return NOTHING  # received in another epoch
-        known = [(robot, hearing.values(robot), place) for robot, place in zip(axes, self.assignment, strict=True)]
-        return [StandsAt(robot, values[place]) for robot, values, place in known if values is not None]
+        known = [(robot, reception.values(robot), place) for robot, place in zip(axes, self.assignment, strict=True)]
+        return [HasValue(robot, values[place]) for robot, values, place in known if values is not None]
 
 
-def axes_of(hearing: Hearing, parent: str, child: str) -> Sequence[str] | None:
+def axes_of(reception: Reception, parent: str, child: str) -> Sequence[str] | None:
     """Return the axes of a child's table; None if they were not sent in this run."""
-    proceed = hearing.last(Proceed, parent, child)
+    proceed = reception.last(Proceed, parent, child)
     return None if proceed is None else proceed.separator
 
 

@@ -53,7 +53,7 @@ import numpy as np
 
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import HasOnly, Hearing, Proof
+from robochoc.protocols.disclosure import HasOnly, Proof, Reception
 from robochoc.protocols.inference.dpop import (
     DPOP,
     MOST_AXES,
@@ -113,8 +113,8 @@ class DomainAtDepth(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{counted(self.depth, 'robot')} above me in the tree; {words.domain(self.values)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 class SeparatorAxis(msgspec.Struct, frozen=True, array_like=True):

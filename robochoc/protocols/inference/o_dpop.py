@@ -42,7 +42,7 @@ import numpy as np
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, table_proves
+from robochoc.protocols.disclosure import NOTHING, Proof, Reception, table_proves
 from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of
 from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
 from robochoc.protocols.message import Message
@@ -80,10 +80,10 @@ class Good(Message, frozen=True):
         where = f", with the values {places} (by number) in my separator" if places else ""
         return f"the next best for my subtree costs {cost_text(self.cost)}{where}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the same proofs as for this cell of DPOP's table."""
-        axes = axes_of(hearing, hearing.receiver, hearing.sender)
-        return NOTHING if axes is None else table_proves(axes, [(self.assignment, self.cost)], hearing)
+        axes = axes_of(reception, reception.receiver, reception.sender)
+        return NOTHING if axes is None else table_proves(axes, [(self.assignment, self.cost)], reception)
 
 
 class Done(Message, frozen=True):

@@ -43,7 +43,7 @@ from typing import Any, ClassVar, cast
 
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.local_search.dsa import DSA, DSASettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -71,8 +71,8 @@ class Tick(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} {'for good' if self.last else 'at present'}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(reception.sender, self.value)]
 
 
 class ADSA(DSA):

@@ -62,11 +62,11 @@ from robochoc.protocols.disclosure import (
     NOTHING,
     EveryValuePays,
     HasOnly,
-    Hearing,
+    HasValue,
     PartPays,
     Proof,
+    Reception,
     SomeValuePays,
-    StandsAt,
     can_take,
 )
 from robochoc.protocols.local_search.mgm import saving_in_words
@@ -97,8 +97,8 @@ class Inquiry(wire.Message, frozen=True):
         so_far = f"; so far {words.assigned(self.known.items())}" if self.known else ""
         return f"what would each of my {counted(len(self.values), 'value')} cost you at least?{so_far}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values)), *(can_take(*known) for known in self.known.items())]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values)), *(can_take(*known) for known in self.known.items())]
 
 
 class Costs(wire.Message, frozen=True):
@@ -115,22 +115,22 @@ class Costs(wire.Message, frozen=True):
         price = saving_in_words(*self.burdens[place])
         return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} would cost me least: {price}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the sender's costs for the receiver's values, given others' final values.
 
         If it shares constraints with the receiver only, and has no final value, all its values cost that much.
         """
-        asked = hearing.last(Inquiry, hearing.receiver, hearing.sender)
+        asked = reception.last(Inquiry, reception.receiver, reception.sender)
         if asked is None:
             return NOTHING
-        alone = hearing.is_only_neighbour() and hearing.last(SetValue, hearing.sender, hearing.receiver) is None
+        alone = reception.is_only_neighbour() and reception.last(SetValue, reception.sender, reception.receiver) is None
         found: list[Proof] = []
         for value, (broken, cost) in zip(asked.values, self.burdens, strict=False):
-            view = {hearing.receiver: value}
+            view = {reception.receiver: value}
             if not broken:
-                found.append(SomeValuePays(hearing.sender, view, cost))
+                found.append(SomeValuePays(reception.sender, view, cost))
             if alone:
-                found.append(EveryValuePays(hearing.sender, view, INFINITE if broken else cost))
+                found.append(EveryValuePays(reception.sender, view, INFINITE if broken else cost))
         return found
 
 
@@ -150,8 +150,11 @@ class CostsAt(Costs, frozen=True):
             return text
         return f"{text}, with {words.own_value(self.values[self.burdens.index(min(self.burdens))])}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [*super().proves(hearing), *(can_take(hearing.sender, value) for value in dict.fromkeys(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [
+            *super().proves(reception),
+            *(can_take(reception.sender, value) for value in dict.fromkeys(self.values)),
+        ]
 
 
 class FinalSide(wire.Message, frozen=True):
@@ -168,14 +171,14 @@ class FinalSide(wire.Message, frozen=True):
         price = saving_in_words(*self.burdens[place])
         return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} costs my side least: {price}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the costs of the sender's side, for its value and all values of the inquiry."""
-        asked = hearing.last(Inquiry, hearing.receiver, hearing.sender)
-        final = hearing.last(SetValue, hearing.sender, hearing.receiver)
+        asked = reception.last(Inquiry, reception.receiver, reception.sender)
+        final = reception.last(SetValue, reception.sender, reception.receiver)
         if asked is None or final is None:
             return NOTHING
         return [
-            PartPays(hearing.sender, final.value, hearing.receiver, value, INFINITE if broken else cost)
+            PartPays(reception.sender, final.value, reception.receiver, value, INFINITE if broken else cost)
             for value, (broken, cost) in zip(asked.values, self.burdens, strict=False)
         ]
 
@@ -200,8 +203,8 @@ class SetValue(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} for good"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [StandsAt(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasValue(reception.sender, self.value)]
 
 
 class SearchState(StrEnum):

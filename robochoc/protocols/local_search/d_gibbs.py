@@ -53,7 +53,7 @@ import msgspec
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleCount, gain
@@ -101,8 +101,8 @@ class Value(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} in this sample; {_record(self.kept)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(reception.sender, self.value)]
 
 
 class Difference(wire.Message, frozen=True):

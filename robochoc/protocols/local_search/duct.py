@@ -59,10 +59,10 @@ from robochoc.protocols.disclosure import (
     INFINITE,
     NOTHING,
     EveryValuePays,
-    Hearing,
+    HasValue,
     Proof,
+    Reception,
     SomeValuePays,
-    StandsAt,
     can_take,
 )
 from robochoc.protocols.order import PriorityOrder
@@ -128,7 +128,7 @@ class SampleContext(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"sample your subtree with {words.assigned(self.values.items())}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
+    def proves(self, _: Reception) -> Sequence[Proof]:
         return [can_take(*chosen) for chosen in self.values.items()]
 
 
@@ -154,21 +154,21 @@ class SampleCost(wire.Message, frozen=True):
             best = "no solution yet" if self.best is None else f"the best so far costs {cost_text(self.best)}"
         return f"this sample costs my subtree {cost_text(self.cost)}{broken}; {best}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the proofs that the sender pays no more than its subtree does.
 
         If all its neighbours are in the context, no robot is below, and a hopeless context breaks its own constraints.
         """
-        asked = hearing.last(SampleContext, hearing.receiver, hearing.sender)
+        asked = reception.last(SampleContext, reception.receiver, reception.sender)
         if asked is None:
             return NOTHING
         found: list[Proof] = []
         if not self.broken:
-            found.append(SomeValuePays(hearing.sender, asked.values, self.cost))
+            found.append(SomeValuePays(reception.sender, asked.values, self.cost))
         if self.best is not None:
-            found.append(SomeValuePays(hearing.sender, asked.values, self.best))
-        if self.hopeless and asked.values.keys() >= set(hearing.neighbours(hearing.sender)):
-            found.append(EveryValuePays(hearing.sender, asked.values, INFINITE))
+            found.append(SomeValuePays(reception.sender, asked.values, self.best))
+        if self.hopeless and asked.values.keys() >= set(reception.neighbours(reception.sender)):
+            found.append(EveryValuePays(reception.sender, asked.values, INFINITE))
         return found
 
 
@@ -182,8 +182,8 @@ class Fixed(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.assigned(self.values.items())} for good; choose your own value"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        return [StandsAt(*chosen) for chosen in self.values.items()]
+    def proves(self, _: Reception) -> Sequence[Proof]:
+        return [HasValue(*chosen) for chosen in self.values.items()]
 
 
 class Samples:

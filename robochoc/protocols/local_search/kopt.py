@@ -59,7 +59,7 @@ from numpy.typing import NDArray
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Pays, Proof
+from robochoc.protocols.disclosure import Pays, Proof, Reception
 from robochoc.protocols.local_search.mgm import saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
@@ -119,12 +119,12 @@ class Region(wire.Message, frozen=True):
         tables = sum(len(part.tables) for part in self.parts.values())
         return f"{counted(tables, 'constraint')} of {listed(self.parts)}, value by value"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the costs of single values and of pairs of robots' values.
 
         Constraints of more robots are left out, as other messages may contain others of the same robots.
         """
-        return [proof for robot, part in self.parts.items() for proof in _part_proves(robot, part, hearing)]
+        return [proof for robot, part in self.parts.items() for proof in _part_proves(robot, part, reception)]
 
 
 class Values(wire.Message, frozen=True):
@@ -178,15 +178,15 @@ class MoveTogether(wire.Message, frozen=True):
         return f"go: {listed(self.moves)}" if self.moves else "I have heard of no move that is made"
 
 
-def _part_proves(robot: str, part: ProblemPart, hearing: Hearing) -> Iterator[Proof]:
+def _part_proves(robot: str, part: ProblemPart, reception: Reception) -> Iterator[Proof]:
     """Yield the proofs of a robot's part, if the receiver knows the values of its places."""
-    values = hearing.values(robot)
+    values = reception.values(robot)
     if values is None:
         return
     for value, charge in zip(values, part.charges, strict=True):
         yield Pays(robot, value, {}, charge, charge)
     for other, costs in _pairs(robot, part).items():
-        theirs = hearing.values(other) or ()
+        theirs = reception.values(other) or ()
         rows = itertools.product(zip(values, part.charges, strict=True), theirs)
         for ((value, charge), their), cost in zip(rows, costs, strict=False):
             yield Pays(robot, value, {other: their}, charge + cost, charge + cost)

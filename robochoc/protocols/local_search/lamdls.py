@@ -50,7 +50,7 @@ import msgspec
 
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, Value
@@ -70,8 +70,8 @@ class Colour(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} at first, and my colour is number {self.colour + 1}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(reception.sender, self.value)]
 
 
 class LAMDLS(CycleProtocol):

@@ -51,7 +51,7 @@ from typing import ClassVar, NamedTuple
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import INFINITE, NOTHING, Hearing, Pays, Proof
+from robochoc.protocols.disclosure import INFINITE, NOTHING, Pays, Proof, Reception
 from robochoc.protocols.local_search.mgm import Gain, Gainers, saving_in_words
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
@@ -95,19 +95,19 @@ class Offer(wire.Message, frozen=True):
             return f"let us move together: of {many}, no two would save me anything"
         return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the costs of pairs of values above the cheapest pair, if no other robot's value is in them."""
-        own = hearing.last(Domain, hearing.receiver, hearing.sender)
-        theirs = hearing.last(Domain, hearing.sender, hearing.receiver)
-        if own is None or theirs is None or not self.gains or not hearing.is_only_neighbour():
+        own = reception.last(Domain, reception.receiver, reception.sender)
+        theirs = reception.last(Domain, reception.sender, reception.receiver)
+        if own is None or theirs is None or not self.gains or not reception.is_only_neighbour():
             return NOTHING
         most_broken = max(broken for row in self.gains for broken, _ in row)
         most = max(cost for row in self.gains for _, cost in row)
         return [
             Pays(
-                hearing.sender,
+                reception.sender,
                 value,
-                {hearing.receiver: received},
+                {reception.receiver: received},
                 INFINITE if broken < most_broken else most - cost,
                 INFINITE,
             )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from robochoc.protocols import acts, message
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Proof, StandsAt
+from robochoc.protocols.disclosure import HasValue, Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
 from robochoc.protocols.wording import Wording, cost_text
@@ -23,8 +23,8 @@ class Value(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} from now on (change {self.counter})"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [StandsAt(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasValue(reception.sender, self.value)]
 
 
 class Cost(Message, frozen=True):
@@ -39,8 +39,8 @@ class Cost(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return bounds_in_words(words, self.context, self.lb, self.ub)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return bounds_prove(self.context, self.lb, self.ub, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return bounds_prove(self.context, self.lb, self.ub, reception)
 
 
 class Threshold(Message, frozen=True):

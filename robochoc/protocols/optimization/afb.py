@@ -62,10 +62,10 @@ from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import (
     NOTHING,
     EveryValuePays,
-    Hearing,
+    HasValue,
     Proof,
+    Reception,
     SomeValuePays,
-    StandsAt,
     Total,
     partial_assignment,
 )
@@ -111,16 +111,16 @@ class CPA(Message, frozen=True):
             return f"no solution has {values}: take another value"
         return f"no solution with {values} costs less than {cost_text(self.bound)}: take another value"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The cost of the CPA; if it was sent back, a lower bound on the last robot's cost.
         values = [value for value, _ in self.assignments]
-        found = partial_assignment(hearing.order, values)
-        view = dict(zip(hearing.order, values, strict=False))
+        found = partial_assignment(reception.order, values)
+        view = dict(zip(reception.order, values, strict=False))
         if self.least:
             return [*found, Total(view, self.least[-1])]
-        sent = hearing.last(CPA, hearing.receiver, hearing.sender)
-        if sent and sent.least and sent.assignments == self.assignments and hearing.is_lowest(hearing.sender):
-            found.append(EveryValuePays(hearing.sender, view, self.bound - sent.least[-1]))
+        sent = reception.last(CPA, reception.receiver, reception.sender)
+        if sent and sent.least and sent.assignments == self.assignments and reception.is_lowest(reception.sender):
+            found.append(EveryValuePays(reception.sender, view, self.bound - sent.least[-1]))
         return found
 
 
@@ -135,8 +135,8 @@ class FBCPA(Message, frozen=True):
         values = words.partial([value for value, _ in self.assignments])
         return f"so far {values}; what does a value of yours add to it at least?"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return partial_assignment(hearing.order, [value for value, _ in self.assignments])
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return partial_assignment(reception.order, [value for value, _ in self.assignments])
 
 
 class FBEstimate(Message, frozen=True):
@@ -158,11 +158,11 @@ class FBEstimate(Message, frozen=True):
             return last
         return f"{last}; to its beginnings, the empty one first, at least {costs_text(shorter)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The last robot's estimates contain no costs of robots below.
         asked = [
-            hearing.last(CPA, hearing.receiver, hearing.sender),
-            hearing.last(FBCPA, hearing.receiver, hearing.sender),
+            reception.last(CPA, reception.receiver, reception.sender),
+            reception.last(FBCPA, reception.receiver, reception.sender),
         ]
         for_these = [one.assignments for one in asked if one and stamp_of(one.assignments) == [*self.stamp]]
         if not for_these:
@@ -170,10 +170,10 @@ class FBEstimate(Message, frozen=True):
         found: list[Proof] = []
         values = [value for value, _ in for_these[0]]
         for length, estimate in enumerate(self.estimates):
-            view = dict(zip(hearing.order, values[:length], strict=False))
-            found.append(SomeValuePays(hearing.sender, view, estimate))
-            if hearing.is_lowest(hearing.sender):
-                found.append(EveryValuePays(hearing.sender, view, estimate))
+            view = dict(zip(reception.order, values[:length], strict=False))
+            found.append(SomeValuePays(reception.sender, view, estimate))
+            if reception.is_lowest(reception.sender):
+                found.append(EveryValuePays(reception.sender, view, estimate))
         return found
 
 
@@ -188,10 +188,10 @@ class NewSolution(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"the best solution so far costs {cost_text(self.cost)}: {words.partial(self.values)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # Robots take these values unless a better solution follows.
-        view = dict(zip(hearing.order, self.values, strict=False))
-        return [Total(view, self.cost), *(StandsAt(robot, value) for robot, value in view.items())]
+        view = dict(zip(reception.order, self.values, strict=False))
+        return [Total(view, self.cost), *(HasValue(robot, value) for robot, value in view.items())]
 
 
 class Terminate(Message, frozen=True):
@@ -202,12 +202,12 @@ class Terminate(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         return "the search is over: no solution is better than the best one so far"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The last robot learns that its last solution is final.
-        best = hearing.last(NewSolution, hearing.receiver, hearing.sender)
+        best = reception.last(NewSolution, reception.receiver, reception.sender)
         if best is None:
             return NOTHING
-        return [StandsAt(robot, value) for robot, value in zip(hearing.order, best.values, strict=False)]
+        return [HasValue(robot, value) for robot, value in zip(reception.order, best.values, strict=False)]
 
 
 class AFB(Protocol):

@@ -66,7 +66,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts, message
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import FINITE, NOTHING, EveryValuePays, HasOnly, Hearing, Proof
+from robochoc.protocols.disclosure import FINITE, NOTHING, EveryValuePays, HasOnly, Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.optimization import bnb_adopt_messages as bnb_adopt
 from robochoc.protocols.optimization.bounding_messages import Number, Terminate, bounds_in_words, bounds_prove
@@ -190,8 +190,8 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.domain(self.values)}; what can you move to each of them?"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 class Moved(Message, frozen=True):
@@ -208,14 +208,14 @@ class Moved(Message, frozen=True):
         told = ", ".join(cost_text(cost) for cost in self.costs)
         return f"count as your own, with your values one by one: {told}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # Costs of robots below the sender, and of its constraints with others, may be among the moved ones. So there
         # is a proof only if there are no such robots: then each of the sender's values costs at least that much.
-        values = hearing.values(hearing.receiver)
-        if not hearing.is_only_neighbour() or values is None or len(values) != len(self.costs):
+        values = reception.values(reception.receiver)
+        if not reception.is_only_neighbour() or values is None or len(values) != len(self.costs):
             return NOTHING
         pairs = zip(values, self.costs, strict=True)
-        return [EveryValuePays(hearing.sender, {hearing.receiver: value}, cost) for value, cost in pairs]
+        return [EveryValuePays(reception.sender, {reception.receiver: value}, cost) for value, cost in pairs]
 
 
 class Value(bnb_adopt.Value, frozen=True):
@@ -236,10 +236,10 @@ class Cost(bnb_adopt.Cost, frozen=True):
         beyond = "" if math.isinf(self.lb) else " more than it has moved up"
         return f"{told}{beyond}{'; tell me my threshold again' if self.threshold_request else ''}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # Costs were moved out of the bounds, to robots that the receiver may not know. So the lower bound is valid only
         # if no robot is below the sender; of the upper bound, only its finiteness can be used.
-        return bounds_prove(self.context, self.lb, self.ub if math.isinf(self.ub) else FINITE, hearing)
+        return bounds_prove(self.context, self.lb, self.ub if math.isinf(self.ub) else FINITE, reception)
 
 
 MAX_ENTRIES = 65_536

@@ -8,7 +8,7 @@ from typing import Literal
 
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts, message
-from robochoc.protocols.disclosure import HasOnly, Hearing, Proof, StandsAt
+from robochoc.protocols.disclosure import HasOnly, HasValue, Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.bounding_messages import Context, Number, bounds_in_words, bounds_prove
 from robochoc.protocols.settings import Settings
@@ -36,8 +36,8 @@ class Value(Message, frozen=True):
             return change
         return f"{change}; your subtree may cost {cost_text(self.threshold)} then"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [StandsAt(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasValue(reception.sender, self.value)]
 
 
 class Cost(Message, frozen=True):
@@ -54,8 +54,8 @@ class Cost(Message, frozen=True):
         asked = "; tell me my threshold again" if self.threshold_request else ""
         return f"{bounds_in_words(words, self.context, self.lb, self.ub)}{asked}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return bounds_prove(self.context, self.lb, self.ub, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return bounds_prove(self.context, self.lb, self.ub, reception)
 
 
 class Domain(Message, frozen=True):
@@ -68,8 +68,8 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.domain(self.values)}; what do you cost at least with each of them?"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 class Floor(Message, frozen=True):

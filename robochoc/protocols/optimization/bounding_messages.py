@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from robochoc.protocols import acts, message
-from robochoc.protocols.disclosure import EveryValuePays, Hearing, Proof, SomeValuePays, StandsAt
+from robochoc.protocols.disclosure import EveryValuePays, HasValue, Proof, Reception, SomeValuePays
 from robochoc.protocols.message import Message
 from robochoc.protocols.wording import Wording, cost_text
 
@@ -33,8 +33,8 @@ class Terminate(Message, frozen=True):
         condition = words.context(self.context).removeprefix("as long as ").removesuffix(", ")
         return f"all above you have taken their last values{': ' if condition else ''}{condition}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        return [StandsAt(robot, value) for robot, (value, _) in self.context.items()]
+    def proves(self, _: Reception) -> Sequence[Proof]:
+        return [HasValue(robot, value) for robot, (value, _) in self.context.items()]
 
 
 def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Number) -> str:
@@ -50,13 +50,13 @@ def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Numb
     return f"{words.context(context)}my subtree {costs}"
 
 
-def bounds_prove(context: Context, lower: Number, upper: Number, hearing: Hearing) -> Sequence[Proof]:
+def bounds_prove(context: Context, lower: Number, upper: Number, reception: Reception) -> Sequence[Proof]:
     """Return the proofs of bounds on the cost of the sender's subtree. Costs below the sender are at least 0.
 
     If all neighbours of the sender are in the context, no robot is below it, and the lower bound is on its own cost.
     """
     view = {robot: value for robot, (value, _) in context.items()}
-    found: list[Proof] = [SomeValuePays(hearing.sender, view, upper)]
-    if view.keys() >= set(hearing.neighbours(hearing.sender)):
-        found.append(EveryValuePays(hearing.sender, view, lower))
+    found: list[Proof] = [SomeValuePays(reception.sender, view, upper)]
+    if view.keys() >= set(reception.neighbours(reception.sender)):
+        found.append(EveryValuePays(reception.sender, view, lower))
     return found

@@ -27,11 +27,11 @@ from robochoc.protocols.disclosure import (
     AT_THE_END,
     NOTHING,
     EveryValuePays,
-    Hearing,
+    HasValue,
     Pays,
     Proof,
+    Reception,
     SomeValuePays,
-    StandsAt,
     can_take,
 )
 from robochoc.protocols.findings import Findings, Incumbent
@@ -70,8 +70,8 @@ class Request(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} for now; what will you cost at least?"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(reception.sender, self.value)]
 
 
 class Report(Message, frozen=True):
@@ -86,11 +86,13 @@ class Report(Message, frozen=True):
             return "no value of mine is allowed with your value and those above you"
         return f"with your value and those above you, I cost at least {cost_text(self.bound)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The receiver may not know the values above it.
-        asked = hearing.last(Request, hearing.receiver, hearing.sender)
+        asked = reception.last(Request, reception.receiver, reception.sender)
         return (
-            NOTHING if asked is None else [SomeValuePays(hearing.sender, {hearing.receiver: asked.value}, self.bound)]
+            NOTHING
+            if asked is None
+            else [SomeValuePays(reception.sender, {reception.receiver: asked.value}, self.bound)]
         )
 
 
@@ -107,16 +109,16 @@ class Result(Message, frozen=True):
             return "my subtree has nothing that costs less than you allow"
         return f"my subtree costs {cost_text(self.cost)}, with {words.assigned(self.values.items())}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # No robot of the subtree pays more than all of them together. A sender that shares constraints only with the
         # receiver answers with its least cost.
         found: list[Proof] = []
-        asked = hearing.last(Request, hearing.receiver, hearing.sender)
-        view = {} if asked is None else {hearing.receiver: asked.value}
+        asked = reception.last(Request, reception.receiver, reception.sender)
+        view = {} if asked is None else {reception.receiver: asked.value}
         for robot, value in self.values.items():
             found.append(Pays(robot, value, {**view, **_without(robot, self.values)}, 0, self.cost))
-        if asked is not None and hearing.is_only_neighbour():
-            found.append(EveryValuePays(hearing.sender, view, self.cost))
+        if asked is not None and reception.is_only_neighbour():
+            found.append(EveryValuePays(reception.sender, view, self.cost))
         return found
 
 
@@ -130,8 +132,8 @@ class Terminate(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"the search is over, with {words.assigned(self.values.items())}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        return [StandsAt(robot, value, AT_THE_END) for robot, value in self.values.items()]
+    def proves(self, _: Reception) -> Sequence[Proof]:
+        return [HasValue(robot, value, AT_THE_END) for robot, value in self.values.items()]
 
 
 def allowance(bound: Number) -> str:

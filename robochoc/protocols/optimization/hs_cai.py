@@ -49,7 +49,7 @@ from numpy.typing import NDArray
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts, message
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import HasOnly, Hearing, Proof, table_proves
+from robochoc.protocols.disclosure import HasOnly, Proof, Reception, table_proves
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.branching import BranchingProtocol, Number, Result, Terminate, allowance
 from robochoc.protocols.order import PriorityOrder
@@ -161,8 +161,8 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.domain(self.values)}; my depth in the tree is {self.level}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 class PreUtil(Message, frozen=True):
@@ -184,8 +184,8 @@ class PreUtil(Message, frozen=True):
         told = f"my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
         return f"{told}; left out: {listed(name for name, _, _ in self.dropped)}" if self.dropped else told
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return bounds_prove(self.axes, self.costs, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return bounds_prove(self.axes, self.costs, reception)
 
 
 class CPA(Message, frozen=True):
@@ -228,8 +228,8 @@ class CtxtUtil(Message, frozen=True):
         names = listed(name for name, _, _ in self.axes)
         return f"with these values my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return bounds_prove(self.axes, self.costs, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return bounds_prove(self.axes, self.costs, reception)
 
 
 def places_in_words(places: dict[str, int]) -> str:
@@ -246,10 +246,10 @@ def span_in_words(costs: list[Number]) -> str:
     return f"at least {cost_text(least)}{'' if least == most else f' to {cost_text(most)}'}"
 
 
-def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], hearing: Hearing) -> Sequence[Proof]:
+def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], reception: Reception) -> Sequence[Proof]:
     """Return the proofs of lower bounds over `axes`: those of a DPOP table, as they hold for all omitted robots."""
     places = itertools.product(*[range(size) for _, _, size in axes])
-    return table_proves([name for name, _, _ in axes], zip(places, costs, strict=True), hearing)
+    return table_proves([name for name, _, _ in axes], zip(places, costs, strict=True), reception)
 
 
 Places = Mapping[str, int]

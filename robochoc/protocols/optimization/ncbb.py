@@ -44,7 +44,7 @@ from typing import assert_never, cast
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.findings import Incumbent
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.optimization.branching import (
@@ -75,8 +75,8 @@ class Greedy(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} in the first assignment"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(reception.sender, self.value)]
 
 
 class Search(Message, frozen=True):

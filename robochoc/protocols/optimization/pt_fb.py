@@ -47,7 +47,7 @@ from typing import assert_never, cast
 
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Proof, SomeValuePays
+from robochoc.protocols.disclosure import Proof, Reception, SomeValuePays
 from robochoc.protocols.message import Message
 from robochoc.protocols.optimization.branching import Members, Number, Report, Request, Result, Terminate, allowance
 from robochoc.protocols.optimization.forward_bounding import ForwardBoundingProtocol
@@ -75,7 +75,7 @@ class CPA(Message, frozen=True):
         least = cost_text(sum(self.reports.values()))
         return f"{asked}; at least {least} of it is paid by {listed(self.reports)}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
+    def proves(self, _: Reception) -> Sequence[Proof]:
         # The receiver may not know the values on which the bounds depend.
         return [SomeValuePays(robot, {}, bound) for robot, bound in self.reports.items()]
 

@@ -79,10 +79,10 @@ from robochoc.protocols.disclosure import (
     FINITE,
     INFINITE,
     HasOnly,
-    Hearing,
+    HasValue,
     Pays,
     Proof,
-    StandsAt,
+    Reception,
     Total,
     View,
     partial_assignment,
@@ -140,9 +140,9 @@ class Above(Message, frozen=True):
         domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         return f"above you there are {_sizes(words.order, domains)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        domains = expanded(self.domains, cut_off(self.runs, len(hearing.order)))
-        return [HasOnly(robot, tuple(values)) for robot, values in zip(hearing.order, domains, strict=False)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        domains = expanded(self.domains, cut_off(self.runs, len(reception.order)))
+        return [HasOnly(robot, tuple(values)) for robot, values in zip(reception.order, domains, strict=False)]
 
 
 class Below(Message, frozen=True):
@@ -177,8 +177,8 @@ class Below(Message, frozen=True):
         names = order[order.index(words.receiver) + 1 :] if words.receiver in order else []
         return f"below you there are {_sizes(names, domains)}; all together they cost at most {cost_text(self.most)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        below = hearing.order[hearing.order.index(hearing.receiver) + 1 :]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        below = reception.order[reception.order.index(reception.receiver) + 1 :]
         found: list[Proof] = []
         for robot, (values, charges) in zip(below, self.robots, strict=False):
             paid = [Pays(robot, value, {}, cost, cost) for value, cost in zip(values, charges, strict=True)]
@@ -204,13 +204,13 @@ class CPAs(Message, frozen=True):
         known = incumbent_text(self.least if self.least < self.ceiling else math.inf)
         return f"{counted(self.count, 'partial assignment')} for {words.receiver} to extend; {known}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+    def proves(self, reception: Reception) -> Sequence[Proof] | None:
         # Each row contains the costs of the robots from the receiver on.
         if self.count > MOST_ROWS:
             return None
-        if hearing.minimises:
-            return [*costs_prove(self.rows, self.count, self.ceiling, hearing)]
-        return [*bits_prove(self.rows, self.count, hearing)]
+        if reception.minimises:
+            return [*costs_prove(self.rows, self.count, self.ceiling, reception)]
+        return [*bits_prove(self.rows, self.count, reception)]
 
 
 class Explored(Message, frozen=True):
@@ -238,18 +238,18 @@ class Solution(Message, frozen=True):
             f" by number, robots' values in it are {places}"
         )
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        view = _chosen(hearing.order, self.places, hearing)
-        return [*(StandsAt(*one) for one in view.items()), Total(view, self.cost)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        view = _chosen(reception.order, self.places, reception)
+        return [*(HasValue(*one) for one in view.items()), Total(view, self.cost)]
 
 
 def _sizes(names: Sequence[str], domains: Sequence[Domain]) -> str:
     return listed([f"{name} ({counted(len(values), 'value')})" for name, values in along(names, domains)]) or "nobody"
 
 
-def _chosen(robots: Sequence[str], places: Sequence[int], hearing: Hearing) -> dict[str, Value]:
+def _chosen(robots: Sequence[str], places: Sequence[int], reception: Reception) -> dict[str, Value]:
     """Return the values of robots whose domains the receiver knows."""
-    known = [(robot, hearing.values(robot), place) for robot, place in zip(robots, places, strict=False)]
+    known = [(robot, reception.values(robot), place) for robot, place in zip(robots, places, strict=False)]
     return {robot: values[place] for robot, values, place in known if values is not None}
 
 
@@ -259,9 +259,9 @@ _SIZES = (1, 2, 4, 8)
 _COST, _VALUES = 1, 2
 
 
-def costs_prove(content: bytes, count: int, ceiling: int, hearing: Hearing) -> Iterator[Proof]:
+def costs_prove(content: bytes, count: int, ceiling: int, reception: Reception) -> Iterator[Proof]:
     """Yield the proofs of rows of costs. Raises `ValueError` if `content` is not of that form."""
-    rank, domains = _known(hearing)
+    rank, domains = _known(reception)
     largest = max(2 * ceiling, *map(len, domains))
     size = next(size for size in _SIZES if largest < 1 << 8 * size - (size == _SIZES[-1]))
     columns = _VALUES + rank + sum(map(len, domains[rank:]))
@@ -271,19 +271,19 @@ def costs_prove(content: bytes, count: int, ceiling: int, hearing: Hearing) -> I
         cells = [
             int.from_bytes(content[start + at * size : start + (at + 1) * size], "little") for at in range(columns)
         ]
-        view = _view(cells[_VALUES : _VALUES + rank], hearing, domains)
+        view = _view(cells[_VALUES : _VALUES + rank], reception, domains)
         yield Total(view, cells[_COST])
         at = _VALUES + rank
-        for robot, values in zip(hearing.order[rank:], domains[rank:], strict=True):
+        for robot, values in zip(reception.order[rank:], domains[rank:], strict=True):
             for value in values:
                 cost = INFINITE if cells[at] >= ceiling else cells[at]
                 yield Pays(robot, value, view, cost, cost)
                 at += 1
 
 
-def bits_prove(content: bytes, count: int, hearing: Hearing) -> Iterator[Proof]:
+def bits_prove(content: bytes, count: int, reception: Reception) -> Iterator[Proof]:
     """Yield the proofs of rows of bits. Raises `ValueError` if `content` is not of that form."""
-    rank, domains = _known(hearing)
+    rank, domains = _known(reception)
     largest = max(map(len, domains))
     size = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
     length = rank * size + (sum(len(values) + 1 for values in domains[rank:]) + 7) // 8
@@ -292,10 +292,10 @@ def bits_prove(content: bytes, count: int, hearing: Hearing) -> Iterator[Proof]:
     for start in range(0, len(content), length):
         row = content[start : start + length]
         places = [int.from_bytes(row[at * size : (at + 1) * size], "little") for at in range(rank)]
-        view = _view(places, hearing, domains)
+        view = _view(places, reception, domains)
         yield from partial_assignment(list(view), list(view.values()))
         left = int.from_bytes(row[rank * size :], "little")
-        for robot, values in zip(hearing.order[rank:], domains[rank:], strict=True):
+        for robot, values in zip(reception.order[rank:], domains[rank:], strict=True):
             for value in values:
                 least, most = (0.0, FINITE) if left & 1 else (INFINITE, INFINITE)
                 yield Pays(robot, value, view, least, most)
@@ -303,17 +303,17 @@ def bits_prove(content: bytes, count: int, hearing: Hearing) -> Iterator[Proof]:
             left >>= 1
 
 
-def _known(hearing: Hearing) -> tuple[int, list[Sequence[Value]]]:
+def _known(reception: Reception) -> tuple[int, list[Sequence[Value]]]:
     """Return the receiver's rank, and all robots' values, as received."""
-    domains = [hearing.values(robot) for robot in hearing.order]
+    domains = [reception.values(robot) for robot in reception.order]
     known = [values for values in domains if values is not None]
     if len(known) < len(domains):
         raise ValueError("rows arrive before all robots' values")
-    return hearing.order.index(hearing.receiver), known
+    return reception.order.index(reception.receiver), known
 
 
-def _view(places: Sequence[int], hearing: Hearing, domains: Sequence[Sequence[Value]]) -> View:
-    return {robot: values[at] for robot, values, at in zip(hearing.order, domains, places, strict=False)}
+def _view(places: Sequence[int], reception: Reception, domains: Sequence[Sequence[Value]]) -> View:
+    return {robot: values[at] for robot, values, at in zip(reception.order, domains, places, strict=False)}
 
 
 LARGEST = 4 * MIB

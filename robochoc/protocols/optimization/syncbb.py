@@ -43,7 +43,7 @@ import msgspec
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
-from robochoc.protocols.disclosure import EveryValuePays, Hearing, Pays, Proof, StandsAt, Total
+from robochoc.protocols.disclosure import EveryValuePays, HasValue, Pays, Proof, Reception, Total
 from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
@@ -76,11 +76,11 @@ class Path(Message, frozen=True):
         known = incumbent_text(self.best.bound)
         return f"so far {values}, which costs {paid}; {known}; it is {words.receiver}'s turn"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        found = best_proves(self.best, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        found = best_proves(self.best, reception)
         view: dict[str, Value] = {}
-        for robot, (value, cost) in zip(hearing.order, self.assignments, strict=False):
-            found += [StandsAt(robot, value), Pays(robot, value, dict(view), cost, cost)]
+        for robot, (value, cost) in zip(reception.order, self.assignments, strict=False):
+            found += [HasValue(robot, value), Pays(robot, value, dict(view), cost, cost)]
             view[robot] = value
         return found
 
@@ -99,13 +99,13 @@ class Backtrack(Message, frozen=True):
         bound = cost_text(self.best.bound)
         return f"{words.receiver}'s value leads to nothing that costs less than {bound}: take another one"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        found = best_proves(self.best, hearing)
-        path = hearing.last(Path, hearing.receiver, hearing.sender)
-        if path is not None and hearing.is_lowest(hearing.sender):
-            view = {robot: value for robot, (value, _) in zip(hearing.order, path.assignments, strict=False)}
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        found = best_proves(self.best, reception)
+        path = reception.last(Path, reception.receiver, reception.sender)
+        if path is not None and reception.is_lowest(reception.sender):
+            view = {robot: value for robot, (value, _) in zip(reception.order, path.assignments, strict=False)}
             left = self.best.bound - sum(cost for _, cost in path.assignments)
-            found.append(EveryValuePays(hearing.sender, view, left))
+            found.append(EveryValuePays(reception.sender, view, left))
         return found
 
 
@@ -122,14 +122,14 @@ class Terminate(Message, frozen=True):
         values = words.partial(self.best.values)
         return f"the search is over: nothing costs less than {cost_text(self.best.bound)}, with {values}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        stands = [StandsAt(robot, value) for robot, value in zip(hearing.order, self.best.values, strict=False)]
-        return [*stands, *best_proves(self.best, hearing)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        stands = [HasValue(robot, value) for robot, value in zip(reception.order, self.best.values, strict=False)]
+        return [*stands, *best_proves(self.best, reception)]
 
 
-def best_proves(best: BestPath, hearing: Hearing) -> list[Proof]:
+def best_proves(best: BestPath, reception: Reception) -> list[Proof]:
     """Return the proofs of the best path."""
-    return [Total(dict(zip(hearing.order, best.values, strict=False)), best.bound)] if best.values else []
+    return [Total(dict(zip(reception.order, best.values, strict=False)), best.bound)] if best.values else []
 
 
 class SyncBB(Protocol):

@@ -54,7 +54,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from robochoc.protocols.disclosure import EveryValuePays, Hearing, Proof
+from robochoc.protocols.disclosure import EveryValuePays, Proof, Reception
 from robochoc.protocols.findings import NO_FINDINGS, Findings
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -89,12 +89,12 @@ class Table(UTIL, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{super().in_words(words)}, for turn {self.turn + 1}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return P-DPOP's proofs; after the first turn none about every value of the sender.
 
         The sender may have had its turn since, and then the table is about one value.
         """
-        found = super().proves(hearing)
+        found = super().proves(reception)
         return found if self.turn == 0 else [one for one in found if not isinstance(one, EveryValuePays)]
 
 

@@ -64,7 +64,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import NOTHING, EveryValuePays, HasOnly, Hearing, Proof, SomeValuePays, StandsAt
+from robochoc.protocols.disclosure import NOTHING, EveryValuePays, HasOnly, HasValue, Proof, Reception, SomeValuePays
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.message import Message, Value
@@ -121,8 +121,8 @@ class Codes(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"call me {self.codename[:4]}; {words.domain(self.values)}, and you get a key for each"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 class UTIL(Message, frozen=True):
@@ -140,14 +140,14 @@ class UTIL(Message, frozen=True):
         axes = counted(len(self.axes), "codename")
         return f"a table over {axes}: {counted(len(self.cells) // WIDTH, 'cost')}, hidden by keys"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return bounds on the sender's costs, if no other robot's key is in the table.
 
         Then all robots below the sender share constraints with the receiver alone, which can subtract its keys.
         """
-        subtree = _without(hearing)
-        near = [robot for robot in sorted(subtree) if robot in hearing.neighbours(hearing.receiver)]
-        last = [hearing.last(Codes, hearing.receiver, robot) for robot in near]
+        subtree = _without(reception)
+        near = [robot for robot in sorted(subtree) if robot in reception.neighbours(reception.receiver)]
+        last = [reception.last(Codes, reception.receiver, robot) for robot in near]
         codes = [one for one in last if one is not None]
         if len(codes) < len(last) or list(self.axes) != [codes[0].codename]:
             return NOTHING
@@ -156,9 +156,9 @@ class UTIL(Message, frozen=True):
         for value, cell, key in zip(codes[0].values, numbers(self.cells), keys, strict=True):
             cost = cell - key
             paid = INFINITE if cost >= BROKEN else cost
-            found.append(SomeValuePays(hearing.sender, {hearing.receiver: value}, paid))
+            found.append(SomeValuePays(reception.sender, {reception.receiver: value}, paid))
             if len(subtree) == 1:
-                found.append(EveryValuePays(hearing.sender, {hearing.receiver: value}, paid))
+                found.append(EveryValuePays(reception.sender, {reception.receiver: value}, paid))
         return found
 
 
@@ -172,11 +172,14 @@ class VALUE(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         return f"the codes of {counted(len(self.codes), 'value')} above you"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the values of the robots that have sent the receiver their codes."""
-        last = {robot: hearing.last(Codes, robot, hearing.receiver) for robot in hearing.neighbours(hearing.receiver)}
+        last = {
+            robot: reception.last(Codes, robot, reception.receiver)
+            for robot in reception.neighbours(reception.receiver)
+        }
         return [
-            StandsAt(robot, codes.values[self.codes[codes.codename]])
+            HasValue(robot, codes.values[self.codes[codes.codename]])
             for robot, codes in sorted(last.items())
             if codes is not None and codes.codename in self.codes
         ]
@@ -197,13 +200,13 @@ def cells_of(shape: Shape) -> int:
     return math.prod(shape.values())
 
 
-def _without(hearing: Hearing) -> set[str]:
+def _without(reception: Reception) -> set[str]:
     """Return the robots that are connected with the sender without the receiver."""
-    found = {hearing.sender}
-    waiting = [hearing.sender]
+    found = {reception.sender}
+    waiting = [reception.sender]
     while waiting:
-        for robot in hearing.neighbours(waiting.pop()):
-            if robot not in found and robot != hearing.receiver:
+        for robot in reception.neighbours(waiting.pop()):
+            if robot not in found and robot != reception.receiver:
                 found.add(robot)
                 waiting.append(robot)
     return found

@@ -67,7 +67,7 @@ from typing import Any, ClassVar, assert_never, cast
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt
+from robochoc.protocols.disclosure import INFINITE, NOTHING, EveryValuePays, HasValue, Proof, Reception
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -183,9 +183,9 @@ class Ok(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{_one_of(words, words.sender, self.values)} from now on"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The sender's value is the first one of its aggregate.
-        return [StandsAt(hearing.sender, self.values[0])] if self.values else NOTHING
+        return [HasValue(reception.sender, self.values[0])] if self.values else NOTHING
 
 
 class Nogood(Message, frozen=True):
@@ -203,15 +203,15 @@ class Nogood(Message, frozen=True):
         rest = "" if while_they else ", whatever the others do"
         return f"{condition}it cannot be that {_one_of(words, words.receiver, self.values)}{rest}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # A nogood of any robot but the lowest may follow from constraints of the robots below it.
-        if not hearing.fixed_holders or not hearing.is_lowest(hearing.sender):
+        if not reception.fixed_holders or not reception.is_lowest(reception.sender):
             return NOTHING
-        broken: Mapping[str, tuple[Value, ...]] = {**self.lhs, hearing.receiver: self.values}
+        broken: Mapping[str, tuple[Value, ...]] = {**self.lhs, reception.receiver: self.values}
         if math.prod(map(len, broken.values())) > MOST_PROVEN:
             return NOTHING
         chosen = product(*broken.values())
-        return [EveryValuePays(hearing.sender, dict(zip(broken, one, strict=True)), INFINITE) for one in chosen]
+        return [EveryValuePays(reception.sender, dict(zip(broken, one, strict=True)), INFINITE) for one in chosen]
 
 
 class Narrow(Message, frozen=True):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.protocols import acts
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 from robochoc.system.plain_text import listed
@@ -25,9 +25,9 @@ class Ok(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} from now on; {_not_ruled_out(self.left)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # Once the order has changed, the sender need not send its next value.
-        return [can_take(hearing.sender, self.value)]
+        return [can_take(reception.sender, self.value)]
 
 
 class Nogood(Message, frozen=True):

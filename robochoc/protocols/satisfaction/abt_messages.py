@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.protocols import acts
-from robochoc.protocols.disclosure import Hearing, Proof, StandsAt
+from robochoc.protocols.disclosure import HasValue, Proof, Reception
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 
@@ -20,8 +20,8 @@ class Ok(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} from now on"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [StandsAt(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasValue(reception.sender, self.value)]
 
 
 class AddLink(Message, frozen=True):

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import INFINITE, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
+from robochoc.protocols.disclosure import INFINITE, EveryValuePays, HasValue, Proof, Reception, partial_assignment
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 
@@ -25,8 +25,8 @@ class CPA(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return _partial(self.assignments, self.sc, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return _partial(self.assignments, self.sc, reception)
 
 
 class FcCPA(Message, frozen=True):
@@ -40,8 +40,8 @@ class FcCPA(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"so far {words.partial(self.assignments)}; look which of your values still go with it"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return _partial(self.assignments, self.sc, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return _partial(self.assignments, self.sc, reception)
 
 
 class NotOk(Message, frozen=True):
@@ -55,9 +55,9 @@ class NotOk(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The sender has found it by forward checking, with only its own constraints.
-        return [EveryValuePays(hearing.sender, dict(zip(hearing.branch, self.assignments, strict=False)), INFINITE)]
+        return [EveryValuePays(reception.sender, dict(zip(reception.branch, self.assignments, strict=False)), INFINITE)]
 
 
 class BacktrackCPA(Message, frozen=True):
@@ -78,7 +78,7 @@ class BacktrackCPA(Message, frozen=True):
         return f"no solution has {words.partial(self.assignments)}: take another value"
 
 
-def _partial(assignments: Assignments, sc: int, hearing: Hearing) -> Sequence[Proof]:
+def _partial(assignments: Assignments, sc: int, reception: Reception) -> Sequence[Proof]:
     """Return the proofs of a consistent CPA of step `sc`."""
-    stands = [StandsAt(robot, value, (sc,)) for robot, value in zip(hearing.branch, assignments, strict=False)]
-    return [*stands, *partial_assignment(hearing.branch, assignments)]
+    stands = [HasValue(robot, value, (sc,)) for robot, value in zip(reception.branch, assignments, strict=False)]
+    return [*stands, *partial_assignment(reception.branch, assignments)]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import AT_THE_END, Hearing, Proof, StandsAt, partial_assignment
+from robochoc.protocols.disclosure import AT_THE_END, HasValue, Proof, Reception, partial_assignment
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 
@@ -25,14 +25,14 @@ class CPA(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"so far {words.partial([value for value, _ in self.assignments])}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         values = [value for value, _ in self.assignments]
         counters = tuple([counter for _, counter in self.assignments])
         stands = [
-            StandsAt(robot, value, counters[: place + 1])
-            for place, (robot, value) in enumerate(zip(hearing.branch, values, strict=False))
+            HasValue(robot, value, counters[: place + 1])
+            for place, (robot, value) in enumerate(zip(reception.branch, values, strict=False))
         ]
-        return [*stands, *partial_assignment(hearing.branch, values)]
+        return [*stands, *partial_assignment(reception.branch, values)]
 
 
 class Solved(Message, frozen=True):
@@ -46,7 +46,7 @@ class Solved(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"a solution is found, and the search is over: {words.assigned(self.solution.items())}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        robots = [robot for robot in hearing.order if robot in self.solution]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        robots = [robot for robot in reception.order if robot in self.solution]
         values = [self.solution[robot] for robot in robots]
-        return [*(StandsAt(*one, AT_THE_END) for one in self.solution.items()), *partial_assignment(robots, values)]
+        return [*(HasValue(*one, AT_THE_END) for one in self.solution.items()), *partial_assignment(robots, values)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.protocols import acts
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 
@@ -25,5 +25,5 @@ class Accept(Message, frozen=True):
         values = f", with {words.assigned(self.subtree.items())}" if self.subtree else ""
         return f"all below {words.receiver}, from me down, accept its partial assignment{values}"
 
-    def proves(self, _: Hearing) -> Sequence[Proof]:
+    def proves(self, _: Reception) -> Sequence[Proof]:
         return [can_take(robot, value) for robot, value in self.subtree.items()]

@@ -71,7 +71,7 @@ from typing import assert_never, cast
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import FINITE, Clash, HasOnly, Hearing, Pays, Proof, StandsAt
+from robochoc.protocols.disclosure import FINITE, Clash, HasOnly, HasValue, Pays, Proof, Reception
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -97,8 +97,8 @@ class Init(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return words.domain(self.values)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, self.values), StandsAt(hearing.sender, self.values[0], (0,))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, self.values), HasValue(reception.sender, self.values[0], (0,))]
 
 
 class Ok(Message, frozen=True):
@@ -112,8 +112,8 @@ class Ok(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} from now on"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [StandsAt(hearing.sender, self.value, (self.count,))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasValue(reception.sender, self.value, (self.count,))]
 
 
 class Evaluate(Message, frozen=True):
@@ -149,12 +149,12 @@ class Evaluation(Message, frozen=True):
         shown = f"; my constraints are {counted(len(self.tables), 'table')}" if self.tables else ""
         return f"do mediate: I keep my value number {self.place + 1}{shown}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+    def proves(self, reception: Reception) -> Sequence[Proof] | None:
         # The sender's value, and the combinations that its constraints allow.
         if sum(math.prod(table.sizes) for table in self.tables) > MOST_PROOFS:
             return None
-        shown = [proof for table in self.tables for proof in _table_proves(table, self.tables, hearing)]
-        return [*_current_values({hearing.sender: (self.place, self.count)}, hearing), *shown]
+        shown = [proof for table in self.tables for proof in _table_proves(table, self.tables, reception)]
+        return [*_current_values({reception.sender: (self.place, self.count)}, reception), *shown]
 
 
 class Wait(Message, frozen=True):
@@ -190,11 +190,11 @@ class Assign(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         return f"the mediation is over: take your value number {self.place + 1}{_shown(self.changes)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The sender learns the receiver's value, too.
-        agreed = hearing.last(Evaluation, hearing.receiver, hearing.sender)
+        agreed = reception.last(Evaluation, reception.receiver, reception.sender)
         count = 0 if agreed is None else agreed.count + (agreed.place != self.place)
-        return _current_values({**self.changes, hearing.receiver: (self.place, count)}, hearing)
+        return _current_values({**self.changes, reception.receiver: (self.place, count)}, reception)
 
 
 class Release(Message, frozen=True):
@@ -207,8 +207,8 @@ class Release(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"the mediation is over: {words.variables(words.receiver)} may change again{_shown(self.changes)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return _current_values(self.changes, hearing)
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return _current_values(self.changes, reception)
 
 
 def _shown(changes: Changes) -> str:
@@ -217,18 +217,18 @@ def _shown(changes: Changes) -> str:
     return f"; {listed(shown)}" if shown else ""
 
 
-def _current_values(changes: Changes, hearing: Hearing) -> list[Proof]:
+def _current_values(changes: Changes, reception: Reception) -> list[Proof]:
     """Return the values of robots, as far as the observer knows their domains."""
-    known = [(robot, hearing.values(robot), place, count) for robot, (place, count) in changes.items()]
-    return [StandsAt(robot, values[place], (count,)) for robot, values, place, count in known if values is not None]
+    known = [(robot, reception.values(robot), place, count) for robot, (place, count) in changes.items()]
+    return [HasValue(robot, values[place], (count,)) for robot, values, place, count in known if values is not None]
 
 
-def _table_proves(table: Table, tables: Sequence[Table], hearing: Hearing) -> Iterator[Proof]:
+def _table_proves(table: Table, tables: Sequence[Table], reception: Reception) -> Iterator[Proof]:
     """Yield the proofs of one of the sender's `tables`: the values that clash, and those that all constraints allow.
 
     There are none if the receiver does not know the domains that the places refer to.
     """
-    values = [hearing.values(robot) for robot in table.robots]
+    values = [reception.values(robot) for robot in table.robots]
     if any(known is None for known in values):
         return
     within = [other for other in tables if {*other.robots} <= {*table.robots}]
@@ -238,7 +238,7 @@ def _table_proves(table: Table, tables: Sequence[Table], hearing: Hearing) -> It
         if not table.allows(places):
             yield Clash(view)
         elif all(other.allows(at[robot] for robot in other.robots) for other in within):
-            yield Pays(hearing.sender, view.pop(hearing.sender), view, 0, FINITE)
+            yield Pays(reception.sender, view.pop(reception.sender), view, 0, FINITE)
 
 
 class CompAPO(Protocol):

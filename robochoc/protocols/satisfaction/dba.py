@@ -57,7 +57,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import FINITE, NOTHING, Hearing, Pays, Proof
+from robochoc.protocols.disclosure import FINITE, NOTHING, Pays, Proof, Reception
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Value
@@ -93,17 +93,19 @@ class Improve(wire.Message, frozen=True):
             return f"I violate nothing; for {counted(self.counter, 'cycle')} nobody near me has"
         return f"what I violate weighs {self.weight:,}, and my move would make that {self.reduction:,} less"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # Whether the two values are consistent; an inconsistency only if no other robot can have caused it.
-        own = hearing.last(Value, hearing.receiver, hearing.sender)
-        theirs = hearing.last(Value, hearing.sender, hearing.receiver)
+        own = reception.last(Value, reception.receiver, reception.sender)
+        theirs = reception.last(Value, reception.sender, reception.receiver)
         if own is None or theirs is None:
             return NOTHING
-        view = {hearing.receiver: own.value}
+        view = {reception.receiver: own.value}
         if not self.weight:
-            return [Pays(hearing.sender, theirs.value, view, 0, FINITE)]
+            return [Pays(reception.sender, theirs.value, view, 0, FINITE)]
         return (
-            [Pays(hearing.sender, theirs.value, view, INFINITE, INFINITE)] if hearing.is_only_neighbour() else NOTHING
+            [Pays(reception.sender, theirs.value, view, INFINITE, INFINITE)]
+            if reception.is_only_neighbour()
+            else NOTHING
         )
 
 

@@ -36,7 +36,7 @@ from typing import assert_never, cast
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import HasOnly, Hearing, Proof
+from robochoc.protocols.disclosure import HasOnly, Proof, Reception
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
@@ -58,8 +58,8 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return words.domain(self.values)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, self.values)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, self.values)]
 
 
 class Del(Message, frozen=True):

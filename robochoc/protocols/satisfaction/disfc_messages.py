@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.protocols import acts
-from robochoc.protocols.disclosure import Hearing, Proof, StandsWhere
+from robochoc.protocols.disclosure import HasCompatibleValue, Proof, Reception
 from robochoc.protocols.message import Message
 from robochoc.protocols.wording import Wording
 from robochoc.system.plain_text import counted, listed
@@ -25,9 +25,9 @@ class Ok(Message, frozen=True):
             f"my assignment number {self.counter} stands from now on; it leaves {words.receiver} {left} of its domain"
         )
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        upwards = hearing.order.index(hearing.sender) > hearing.order.index(hearing.receiver)
-        return [StandsWhere(hearing.sender, hearing.receiver, self.allowed, parts_only=upwards)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        upwards = reception.order.index(reception.sender) > reception.order.index(reception.receiver)
+        return [HasCompatibleValue(reception.sender, reception.receiver, self.allowed, parts_only=upwards)]
 
 
 class Nogood(Message, frozen=True):

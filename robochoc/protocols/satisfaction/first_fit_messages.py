@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from robochoc.protocols.disclosure import NOTHING, Hearing, Proof, StandsAt
+from robochoc.protocols.disclosure import NOTHING, HasValue, Proof, Reception
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 
@@ -19,5 +19,5 @@ class Placed(Message, frozen=True):
             return "I withdraw"
         return f"I fly, with {words.own_value(self.value, 'a value')}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return NOTHING if self.value is None else [StandsAt(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return NOTHING if self.value is None else [HasValue(reception.sender, self.value)]

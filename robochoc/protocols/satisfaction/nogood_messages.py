@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from robochoc.protocols import acts
-from robochoc.protocols.disclosure import INFINITE, NOTHING, Clash, EveryValuePays, Hearing, Proof
+from robochoc.protocols.disclosure import INFINITE, NOTHING, Clash, EveryValuePays, Proof, Reception
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.wording import Wording
 
@@ -22,11 +22,13 @@ class Nogood(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return words.nogood(self.lhs, self.value)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        broken = {**self.lhs, hearing.receiver: self.value}
-        if not hearing.fixed_holders:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        broken = {**self.lhs, reception.receiver: self.value}
+        if not reception.fixed_holders:
             return NOTHING
-        if hearing.order.index(hearing.sender) < hearing.order.index(hearing.receiver):
+        if reception.order.index(reception.sender) < reception.order.index(reception.receiver):
             return [Clash(broken)]  # the sender's part of a partially known constraint
         # A nogood of any other robot may follow from constraints of robots below it, not from its own.
-        return [EveryValuePays(hearing.sender, broken, INFINITE)] if hearing.is_lowest(hearing.sender) else NOTHING
+        return (
+            [EveryValuePays(reception.sender, broken, INFINITE)] if reception.is_lowest(reception.sender) else NOTHING
+        )

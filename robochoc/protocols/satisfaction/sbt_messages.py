@@ -9,9 +9,9 @@ from robochoc.protocols.disclosure import (
     INFINITE,
     NOTHING,
     EveryValuePays,
-    Hearing,
+    HasValue,
     Proof,
-    StandsAt,
+    Reception,
     partial_assignment,
 )
 from robochoc.protocols.message import Message, Value
@@ -28,9 +28,9 @@ class CPA(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        stands = [StandsAt(robot, value) for robot, value in zip(hearing.branch, self.assignments, strict=False)]
-        return [*stands, *partial_assignment(hearing.branch, self.assignments)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        stands = [HasValue(robot, value) for robot, value in zip(reception.branch, self.assignments, strict=False)]
+        return [*stands, *partial_assignment(reception.branch, self.assignments)]
 
 
 class Backtrack(Message, frozen=True):
@@ -42,8 +42,8 @@ class Backtrack(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"nobody below {words.receiver} has a value left that goes with its own: take another one"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        cpa = hearing.last(CPA, hearing.receiver, hearing.sender)
-        if cpa is None or not hearing.is_lowest(hearing.sender):
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        cpa = reception.last(CPA, reception.receiver, reception.sender)
+        if cpa is None or not reception.is_lowest(reception.sender):
             return NOTHING
-        return [EveryValuePays(hearing.sender, dict(zip(hearing.branch, cpa.assignments, strict=False)), INFINITE)]
+        return [EveryValuePays(reception.sender, dict(zip(reception.branch, cpa.assignments, strict=False)), INFINITE)]

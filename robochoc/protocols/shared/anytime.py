@@ -34,7 +34,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.disclosure import Hearing, Proof, can_take
+from robochoc.protocols.disclosure import Proof, Reception, can_take
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.encoding import Cost
@@ -75,8 +75,8 @@ class Step(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} in the next step that is to be priced"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [can_take(hearing.sender, self.value)]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [can_take(reception.sender, self.value)]
 
 
 class Paid(wire.Message, frozen=True):

@@ -25,7 +25,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
 from robochoc.protocols.chance import one_of
-from robochoc.protocols.disclosure import HasOnly, Hearing, Proof, can_take
+from robochoc.protocols.disclosure import HasOnly, Proof, Reception, can_take
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -64,9 +64,9 @@ class Value(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)} in this cycle"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, reception: Reception) -> Sequence[Proof]:
         # The sender may change its value after the last cycle without another message.
-        return [can_take(hearing.sender, self.value)]
+        return [can_take(reception.sender, self.value)]
 
 
 class Domain(wire.Message, frozen=True):
@@ -79,8 +79,8 @@ class Domain(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         return words.domain(self.values)
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        return [HasOnly(hearing.sender, tuple(self.values))]
+    def proves(self, reception: Reception) -> Sequence[Proof]:
+        return [HasOnly(reception.sender, tuple(self.values))]
 
 
 T = TypeVar("T")

@@ -6,7 +6,17 @@ import itertools
 from random import Random
 
 from robochoc.model.problem import INFINITE
-from robochoc.privacy.possible import ANY, AtLeast, AtMost, Case, Knowledge, OneAtMost, OneCase, Possible, Statement
+from robochoc.privacy.possible import (
+    ANY,
+    AtLeast,
+    AtMost,
+    CostCase,
+    Knowledge,
+    OneAtMost,
+    OneCase,
+    PossibleCosts,
+    Statement,
+)
 
 MOST = 2
 COSTS = (0, 1, 2, INFINITE)
@@ -40,7 +50,7 @@ def random_statement(chance: Random, costs: tuple[float, ...]) -> Statement:
             AtLeast(terms(), chance.choice([1, 2, 3, INFINITE])),
             AtMost(terms(), chance.randint(0, 4)),
             OneAtMost((terms(), terms()), chance.randint(0, 3)),
-            OneCase((Case(terms(), (terms(),)), Case(terms(), ()))),
+            OneCase((CostCase(terms(), (terms(),)), CostCase(terms(), ()))),
         ]
         statement = chance.choice(drawn)
         if true_of(statement, costs):
@@ -55,7 +65,7 @@ def test_what_may_be_is_never_ruled_out_and_something_is() -> None:
         statements = [random_statement(chance, truth) for _ in range(chance.randint(1, 5))]
         knowledge = Knowledge(MOST)
         for statement in statements:
-            knowledge.tell(statement)
+            knowledge.add_statement(statement)
         knowledge.settle()
         worlds = [w for w in itertools.product(COSTS, repeat=3) if all(true_of(one, w) for one in statements)]
         for world in worlds:
@@ -66,23 +76,23 @@ def test_what_may_be_is_never_ruled_out_and_something_is() -> None:
 
 def test_a_single_unbounded_term_makes_up_for_the_others() -> None:
     knowledge = Knowledge(5)
-    knowledge.tell(AtMost((1,), 2))
-    knowledge.tell(AtLeast((0, 1), 6))
+    knowledge.add_statement(AtMost((1,), 2))
+    knowledge.add_statement(AtLeast((0, 1), 6))
     knowledge.settle()
-    assert knowledge[0] == Possible(4, 5, infinite=True)
+    assert knowledge[0] == PossibleCosts(4, 5, infinite=True)
 
 
 def test_of_a_free_secret_nothing_is_concluded() -> None:
     knowledge = Knowledge(5, free={0})
-    knowledge.tell(AtLeast((0,), INFINITE))
-    knowledge.tell(AtMost((0,), 1))
+    knowledge.add_statement(AtLeast((0,), INFINITE))
+    knowledge.add_statement(AtMost((0,), 1))
     knowledge.settle()
     assert knowledge[0] == ANY
 
 
 def test_equal_numbers_of_two_kinds_of_statements_are_two_statements() -> None:
     knowledge = Knowledge(5)
-    knowledge.tell(AtLeast((0,), 3))
-    knowledge.tell(AtMost((0,), 3))
+    knowledge.add_statement(AtLeast((0,), 3))
+    knowledge.add_statement(AtMost((0,), 3))
     knowledge.settle()
-    assert knowledge[0] == Possible(3, 3, infinite=False)
+    assert knowledge[0] == PossibleCosts(3, 3, infinite=False)
