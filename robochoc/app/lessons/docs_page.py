@@ -10,10 +10,10 @@ from robochoc.app.lessons.recording import before, reasons
 
 _LETTERS = "abcd"
 _INTRO = (
-    "Ten short lessons on how robots decide together. Ada, Bob, Cleo and Dan are a team of four; each has to take a "
-    "level to fly at. In every step you are asked what comes next: decide first, then open the answer. What the robots "
-    "say is from real runs, in the words of the [sniffer](../guides/sniffer.md). The same lessons can be played in the "
-    "application, `robochoc app`."
+    "Ten short lessons on how robots decide together. Ada, Bob, Cleo and Dan are a team of four; each of them has to "
+    "choose a level to fly at. Each step asks for the next event: answer first, then open the answer. The messages are "
+    "from real runs, in the words of the [sniffer](../guides/sniffer.md). The same lessons are in the application, "
+    "`robochoc app`."
 )
 
 
