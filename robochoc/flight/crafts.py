@@ -1,7 +1,8 @@
-"""Crafts: one drone per robot, or one per place where a robot decides about several places.
+"""Crafts: one drone per robot, or one per place for a robot that decides about several places.
 
-A craft's cell and level come from the first of these that fits: the coordinates of its topic under the assignment;
-the two numbers its name ends in (`Robot3.1`, `V3.1`), with its first value for the level; its first value alone.
+A craft's cell and level come from the first of these sources that applies: the coordinates of its topic under the
+assignment; the two numbers at the end of its name (`Robot3.1`, `V3.1`), with its first value for the level; its first
+value alone.
 """
 
 from __future__ import annotations
@@ -16,20 +17,20 @@ from robochoc.model.expression import Expression, UndefinedValueError, evaluate,
 from robochoc.model.problem import Assignment, Robot, Topic
 
 Cell = tuple[int, int]
-"""Row and column, or the x and y that a topic gives."""
+"""Row and column, or the x and y of a topic."""
 
 # Longer numbers are dates or serial numbers, not rows.
 _ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
 
 _COORDINATE_MAX = 10**300
-"""Larger numbers do not fit into floating point; they are cut to this one."""
+"""The largest coordinate: larger numbers do not fit into floating point, and are cut."""
 _DECISIONS_MAX = 1_000
-"""All possible places of a robot with more decisions than that are not listed."""
+"""The possible places of a robot with more decisions are not listed."""
 
 
 @dataclass(frozen=True)
 class Craft:
-    """A drone before it has a place in the layout. It flies when it has a level."""
+    """A drone without a place in the layout yet. It flies if it has a level."""
 
     name: str
     cell: Cell | None = None
@@ -37,19 +38,19 @@ class Craft:
     robot: str = ""
     """The robot that decides about it; empty where only a variable is known."""
     topic: Topic | None = None
-    """The topic of its waypoints, if its file names one."""
+    """The topic of its waypoints, if there is one in its file."""
     decided_by: tuple[str, ...] = field(default=(), compare=False)
     """The variables on which its place depends."""
 
 
 def row_and_column(name: str) -> Cell | None:
-    """Return the row and the column that a name such as `Robot3.1` ends in."""
+    """Return the row and the column at the end of a name such as `Robot3.1`."""
     found = _ROW_AND_COLUMN.search(name)
     return (int(found[1]), int(found[2])) if found else None
 
 
 def craft_of_variable(variable: str, values: Assignment) -> Craft:
-    """Return the craft of `variable`, if nothing else is known of its robot."""
+    """Return the craft of `variable`, whose robot is not known."""
     return _craft(variable, [variable], None, values)
 
 
@@ -71,7 +72,7 @@ def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
 
 
 def possible_crafts(robot: Robot) -> Iterator[Craft]:
-    """Yield the crafts of `robot` for all possible decisions. None if there are too many."""
+    """Yield the crafts of `robot` for all possible decisions; nothing if there are too many."""
     if 0 < prod(len(own.domain) for own in robot.variables) <= _DECISIONS_MAX:
         names = [own.name for own in robot.variables]
         for decided in product(*(own.domain for own in robot.variables)):
@@ -79,7 +80,7 @@ def possible_crafts(robot: Robot) -> Iterator[Craft]:
 
 
 def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
-    """Return the craft `name`. Its cell is its topic's, or the one in its name, or in its first variable's name."""
+    """Return the craft `name`. Its cell is that of its topic, or is in its name, or in that of its first variable."""
     named = (row_and_column(one) for one in (name, *variables[:1]))
     cells = [_cell_of(topic, values) if topic else None, *named]
     known = [values[own] for own in variables if own in values]
@@ -92,7 +93,7 @@ def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Ass
 
 
 def _decided_by(topic: Topic | None, variables: Sequence[str]) -> tuple[str, ...]:
-    """Return the variables in the coordinates of `topic`, and the one that is the level where it gives none."""
+    """Return the variables in the coordinates of `topic`, and the variable of the level if the topic has no z."""
     across = [topic.x, topic.y] if topic else []
     height = topic.z if topic else None
     given = [*(across if None not in across else []), height]

@@ -1,15 +1,16 @@
-"""The simulated flight: quadrotors fly a mission's legs, in wind, with motors that fail and obstacles in the way.
+"""The simulated flight: quadrotors fly a mission's legs, with wind, motor failures and obstacles.
 
-A drone stands at its home with its motors off until its route takes it into the air. It stops its motors when it has
-landed. On the way this may happen:
+A drone stands at its home with its motors off until its route begins, and stops its motors after landing. Possible
+events:
 
-- A motor stops. The drone tumbles; its other motors are switched off once it is tilted by 60 degrees (as autopilots'
-  failure detectors do), and it lies where it falls. It never flies again. Later routes keep their distance from it.
+- A motor stops. The drone tumbles; its other motors are switched off once it is tilted by 60 degrees (as failure
+  detectors of autopilots do), and it stays where it falls. It never flies again. Later routes keep their distance from
+  it.
 - An obstacle, a point, is nearer than `CLEARANCE_M` to a goal (or than the planned distance, if that is more). The
-  planner knows nothing of such an obstacle before a drone sees it; it avoids all others. A drone whose route leads too
-  near to one sees it from `SIGHT_M` away at the latest, or from further away if it needs more room to stop: the
-  clearance, the way on which the common clock stops (`quadrotor/trajectory.py`), and `_LOOK_M` for tracking errors and
-  for looking at samples only.
+  planner learns of such an obstacle only when a drone sees it; it avoids all others from the start. A drone whose route
+  passes too near sees it from a distance of `SIGHT_M`, or more if it needs more space to stop: the clearance, the
+  length on which the common clock stops (`quadrotor/trajectory.py`), and `_SIGHT_MARGIN_M` for tracking errors and the
+  time between samples.
 - A drone cannot follow its setpoints. No leg waits for it longer than `SETTLING_S` after the planned end.
 """
 
@@ -36,7 +37,7 @@ from robochoc.flight.quadrotor.goals import Hazards, LegGoals, check_separation,
 from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.quadrotor.trajectory import STOP_S, ObstacleEncounter, Trajectory, encounters
-from robochoc.flight.reports import Blocked, OutOfOrder, Report
+from robochoc.flight.reports import BlockedReport, OutOfOrderReport, Report
 from robochoc.flight.wall_watch import WallWatch
 from robochoc.maps.routes.distances import squashed
 from robochoc.maps.routes.wall_plan import WallPlan
@@ -45,45 +46,45 @@ from robochoc.maps.walls import Walls
 DISTANCE_M = 0.5
 """The default distance between drones' centres."""
 _SHARE = 0.8
-"""The share of their distance that is kept between two homes or goals that are nearer than `DISTANCE_M`."""
+"""The kept share of the distance between two homes or goals that are nearer than `DISTANCE_M`."""
 LIMITS = MotionLimits()
 CLEARANCE_M = 0.5
 SIGHT_M = 1.5
-_LOOK_M = 0.2
+_SIGHT_MARGIN_M = 0.2
 SETTLING_S = 5.0
 _LATE_S = 1.5
-"""A drone that is to land, and after that time is still not right above its landing point, lands where it is."""
+"""After this time, a landing drone that is not directly above its landing point lands in place."""
 _STILL_S = 1.0
-"""All drones stand still before the first leg, and hover after the last one."""
+"""The time for which all drones stand still before the first leg, and hover after the last leg."""
 _CLOSE_M = 0.005
 _SLOW_M_S = 0.02
 _FAR_M = 0.05
-"""A drone further from its setpoint has not finished the leg."""
+"""The largest distance from its setpoint at which a drone has completed a leg."""
 DRONES_MAX = 1_000
-"""At a time: planning looks at all pairs."""
+"""The maximum number of drones: planning considers all pairs."""
 COORDINATE_MAX_M = 1e8
-"""Up to there, floating point distinguishes places by a tenth of a micrometre."""
+"""The largest coordinate: floating point has a resolution of a tenth of a micrometre there."""
 _NEAR_ORIGIN_M = 1_000.0
-"""Homes that are no further from the origin are flown where they are."""
+"""Flights whose homes are nearer to the origin are not moved."""
 PATH_MAX_M = 2_000.0
-"""Of a drone in a leg. Planning looks at steps of a twentieth of a second, or less."""
+"""The longest path of a drone in a leg: planning uses steps of a twentieth of a second, or less."""
 _SAMPLES_MAX = 3_000_000
-"""Of all drones together, some 300 bytes each: 1,000 drones for 100 s, or 100 for a quarter of an hour."""
+"""The maximum number of samples of all drones, of some 300 bytes each: 1,000 drones for 100 s, or 100 for 1,000 s."""
 
 
 class Flight:
     """Drones that stand at their homes, and fly legs one after the other.
 
-    They are flown around an origin of their own where homes are far away, as floating point is finer there.
+    If homes are far away, the simulation uses an origin near them, where floating point is finer.
 
     Args:
         names: The drones' names.
-        homes: Where they stand in the beginning, in metres: (N, 3).
+        homes: Their places in the beginning, in metres: (N, 3).
         conditions: Distance, wind, failures and obstacles.
-        progress: Called with what is being done, in words, at every simulated moment that is logged.
-        rises: Whether drones leave the ground, and land, straight up and down where they can.
+        progress: Called with a description of the progress at every logged sample.
+        rises: Whether drones leave the ground, and land, vertically where possible.
         ground: The height of the ground. None: the lowest home stands on it.
-        walls: Walls that drones fly around, as slowly as the team was told.
+        walls: Walls that drones fly around, at the speed for which the team was made.
 
     Raises:
         ValueError: There are no drones, or too many; the conditions name others; or homes are
@@ -135,40 +136,40 @@ class Flight:
     def fly(
         self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False, blocks: Sequence[Point] = ()
     ) -> tuple[Report, ...]:
-        """Fly one leg, from where all drones are, and return what they report.
+        """Fly one leg from the present places, and return the reports of the drones.
 
         Args:
             title: The leg's title in the log.
-            goals: Goals by the drones' numbers. A drone without one stays where it is.
-            stop_on_report: Whether all drones stop and hover as soon as one has something to report. The goals are then
-                not reached. Without it, nothing is returned.
-            blocks: Points that routes avoid, but for those that are too near to where somebody starts or ends.
+            goals: Goals by the drones' numbers. A drone without a goal stays in place.
+            stop_on_report: Whether all drones stop and hover at the first report. The goals are then not reached.
+                Without it, nothing is returned.
+            blocks: Points that routes avoid, except those too near to a start or an end.
 
         Raises:
-            ValueError: Two goals are nearer to each other than the distance, a drone has too far to fly, or obstacles
-                leave no way.
+            ValueError: Two goals are nearer to each other than the distance, a drone's path is too long, or obstacles
+                leave no route.
         """
         began = time.perf_counter()
         if blocks and self._downwash > 1:
-            raise ValueError("with downwash nothing may be in the way, as the blocks of a map are")
-        with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
+            raise ValueError("downwash cannot be combined with obstacles, such as the blocked cells of a map")
+        with np.errstate(all="ignore"):  # the simulation checks for nan itself
             self._blocks = np.array(blocks, dtype=np.float64).reshape(-1, 3) - self._origin
             leg_goals = self._leg_goals(goals)
             if not self._legs:
-                self._stay()
+                self._hover()
             begins_s = self._simulation.now_s
-            reports = self._leg(leg_goals, stop_on_report=stop_on_report)
+            reports = self._fly_leg(leg_goals, stop_on_report=stop_on_report)
         self._legs.append(LegTimes(title, begins_s, self._simulation.now_s))
         self._hovers = False
         self._wall_s += time.perf_counter() - began
         return reports
 
-    def flown(self) -> FlightLog:
-        """Return the log of all that was flown until now, and of a second of hovering."""
+    def log(self) -> FlightLog:
+        """Return the log of the flight so far, and of a second of hovering."""
         began = time.perf_counter()
         if not self._hovers:
             with np.errstate(all="ignore"):
-                self._stay()
+                self._hover()
             self._hovers = True
         simulation = self._simulation
         times, positions, attitudes = simulation.record()
@@ -198,13 +199,13 @@ class Flight:
         errors[self._simulation.failed] = np.nan
         return errors
 
-    def _stay(self) -> None:
+    def _hover(self) -> None:
         for _ in range(round(_STILL_S / DT)):
             self._simulation.advance()
 
     def _leg_goals(self, goals: Mapping[int, Goal]) -> LegGoals:
         if strange := [number for number in goals if not 0 <= number < len(self.names)]:
-            raise ValueError(f"there are {len(self.names)} drones, from number 0 on, and no number {strange[0]}")
+            raise ValueError(f"there is no drone with the number {strange[0]}: numbers are 0 to {len(self.names) - 1}")
         simulation = self._simulation
         places = np.array([goal.at for goal in goals.values()]).reshape(-1, 3)
         check_near([self.names[number] for number in goals], places)
@@ -217,8 +218,8 @@ class Flight:
         self._asked.update(goals)
         return leg_goals
 
-    def _leg(self, leg_goals: LegGoals, *, stop_on_report: bool) -> tuple[Report, ...]:
-        """Plan and fly; without `stop_on_report`, again and again as long as obstacles are found."""
+    def _fly_leg(self, leg_goals: LegGoals, *, stop_on_report: bool) -> tuple[Report, ...]:
+        """Plan and fly; without `stop_on_report`, repeat as long as obstacles are found."""
         simulation = self._simulation
         reported = len(simulation.failures)
         preferred = leg_goals.places.copy()
@@ -232,9 +233,9 @@ class Flight:
                 break
             preferred = simulation.setpoints[:3].T.copy()
             delays = np.zeros_like(delays)
-        failed = [OutOfOrder(self.names[drone], why, at_s) for drone, why, at_s in simulation.failures[reported:]]
+        failed = [OutOfOrderReport(self.names[drone], why, at_s) for drone, why, at_s in simulation.failures[reported:]]
         if not (stop_on_report and (reports or failed)):
-            self._tell_unfinished()
+            self._log_unfinished()
         return tuple(sorted([*reports, *failed], key=lambda report: report.at_s)) if stop_on_report else ()
 
     def _trajectory(
@@ -244,7 +245,7 @@ class Flight:
         simulation = self._simulation
         starts = simulation.setpoints[:3].T.copy()
         check_paths(self.names, starts, leg_goals.places)
-        keep = max(CLEARANCE_M, leg_goals.planned(starts))
+        keep = max(CLEARANCE_M, leg_goals.planned_distance(starts))
         ends = np.array([goal.at for goal in leg_goals.goals.values()]).reshape(-1, 3)
         known = self._known | (nearest_distances(self._obstacles, ends) >= keep)
         hazards = self._hazards(known, keep, np.vstack((starts, leg_goals.places)))
@@ -258,9 +259,9 @@ class Flight:
         return trajectory, encounters(trajectory, unknown, keep)
 
     def _hazards(self, known: Mask, keep: float, ends: Array) -> Hazards:
-        """Return what routes avoid: fallen drones by the distance, known obstacles and blocks by `keep`.
+        """Return the hazards for routes: fallen drones at the distance, known obstacles and blocks at `keep`.
 
-        Blocks nearer than that to one of `ends` (K, 3) are not avoided: nobody gives way to them.
+        Blocks nearer than `keep` to one of `ends` (K, 3) are not avoided: goals do not move away from them.
         """
         fallen = self._simulation.places[self._simulation.failed & ~self._simulation.falling]
         blocks = self._blocks[nearest_distances(self._blocks, ends) >= keep]
@@ -273,7 +274,7 @@ class Flight:
         self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array, floor_plan: WallPlan | None
     ) -> RoutePlan:
         """Plan the routes of a leg, from `starts` (N, 3)."""
-        planned = leg_goals.planned(starts, hazards)
+        planned = leg_goals.planned_distance(starts, hazards)
         self._simulation.set_spare_distance(planned - self._distance)
         who = leg_goals.who
         self._progress(f"planning routes of {len(who)} drones")
@@ -296,68 +297,69 @@ class Flight:
             raise ValueError(self._refusal(refused, who)) from refused
 
     def _refusal(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
-        """Return `refused` in words, with the drones' names. The planner knows only their places in `who`."""
+        """Return the error text of `refused`, with the drones' names. The planner has only their places in `who`."""
         numbers = refused.drones if isinstance(refused, NoRouteError) else (refused.first, refused.second)
-        named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
+        named = [self.names[who[number]] if number < len(who) else "an obstacle" for number in numbers]
         if isinstance(refused, NoRouteError) and refused.indoors:
             past = f"{named[0]} gets past the others" if len(named) == 1 else f"{', '.join(named)} get past each other"
-            told = f"no order of flying was found in which {past} between the walls"
-            return f"{told}: ask for a smaller distance, or send them elsewhere"
+            problem = f"no order of flying was found in which {past} between the walls"
+            return f"{problem}: use a smaller distance, or other goals"
         if isinstance(refused, NoRouteError):
-            return f"there is no way for {', '.join(named)}: what is in the way encloses where they start or end"
+            return f"there is no route for {', '.join(named)}: obstacles enclose the start or the end"
         ends = "start" if refused.where == "start" else "are to end"
         return f"{' and '.join(named)} {ends} only {refused.distance_m:.3g} m from each other"
 
     def _follow(
         self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter], reported: int | None
-    ) -> list[Blocked]:
-        """Fly the trajectory to its end, or until it was stopped because of what is seen.
+    ) -> list[BlockedReport]:
+        """Fly the trajectory to its end, or until it has stopped because of an obstacle.
 
-        Unless `reported` is None, it is also stopped once there are more failures than that.
+        Unless `reported` is None, it also stops once there are more failures than that.
         """
         simulation = self._simulation
-        reports: list[Blocked] = []
+        reports: list[BlockedReport] = []
         waited = 0.0
         while True:
             late = waited > _LATE_S
             simulation.advance(trajectory, late=late)
             if not simulation.is_sampled:
                 continue
-            self._progress(
-                f"leg {len(self._legs) + 1}, {trajectory.s:.1f} s of {trajectory.plan.duration_s:.1f} s flown"
-            )
-            reports += self._look(trajectory, watched)
+            planned_s = trajectory.plan.duration_s
+            self._progress(f"leg {len(self._legs) + 1}, {trajectory.s:.1f} s of {planned_s:.1f} s flown")
+            reports += self._newly_seen_obstacles(trajectory, watched)
             if reports or (reported is not None and len(simulation.failures) > reported):
                 trajectory.stop()
-            if trajectory.over:
-                trajectory.refer()
+            if trajectory.has_ended:
+                trajectory.update_setpoints()
                 if reports and reported is None:
                     return reports
                 if simulation.settled(_CLOSE_M, _SLOW_M_S) or waited > SETTLING_S:
                     return reports
                 waited += 1 / SAMPLE_RATE_HZ
 
-    def _look(self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter]) -> list[Blocked]:
-        """Return which unknown obstacles are seen now, and by which drone."""
+    def _newly_seen_obstacles(
+        self, trajectory: Trajectory, watched: Sequence[ObstacleEncounter]
+    ) -> list[BlockedReport]:
+        """Return a report for each unknown obstacle that a drone sees now."""
         simulation = self._simulation
         reports = []
         for number, drone, until, keep in watched:
             if self._known[number] or simulation.failed[drone] or trajectory.s > until:
                 continue
             gap = float(np.sqrt(np.square(simulation.places[drone] - self._obstacles[number]).sum()))
-            if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _LOOK_M):
+            if gap <= max(SIGHT_M, keep + LIMITS.speed * STOP_S / 2 + _SIGHT_MARGIN_M):
                 self._known[number] = True
                 self._seen_s[number] = simulation.now_s
                 place = self.conditions.obstacles[number]
                 simulation.log_event(drone, f"sees an obstacle at ({', '.join(f'{x:g}' for x in place)})")
-                reports.append(Blocked(self.names[drone], place, simulation.now_s))
+                reports.append(BlockedReport(self.names[drone], place, simulation.now_s))
         return reports
 
-    def _tell_unfinished(self) -> None:
+    def _log_unfinished(self) -> None:
         apart = self._simulation.tracking_errors()
         worst = int(apart.argmax())
         if apart[worst] > _FAR_M:
-            self._simulation.log_event(worst, f"is {apart[worst]:.2f} m from where it is wanted as the leg ends")
+            self._simulation.log_event(worst, f"is {apart[worst]:.2f} m from its setpoint at the end of the leg")
 
 
 def fly(
@@ -367,7 +369,7 @@ def fly(
 
     Args:
         mission: The drones and the legs.
-        conditions: Distance, wind, failures and obstacles; without them the air is calm, and nothing fails.
+        conditions: Distance, wind, failures and obstacles. None: calm air, and no failures.
         progress: See `Flight`.
 
     Raises:
@@ -387,7 +389,7 @@ def fly(
     blocks = [block for block in mission.blocks if not block.is_cube]
     for number, leg in enumerate(mission.legs):
         flight.fly(leg.opened_by, leg.goals, blocks=[block.at for block in blocks if block.leg <= number])
-    return flight.flown()
+    return flight.log()
 
 
 def _distance(places: Sequence[Array], downwash: float) -> float:
@@ -399,9 +401,9 @@ def _distance(places: Sequence[Array], downwash: float) -> float:
 def check_homes(names: Sequence[str], homes: Array) -> None:
     """Raise `ValueError` if there are no drones, too many, or one is too far away."""
     if not names:
-        raise ValueError("there are no drones to fly: the run has decided about none")
+        raise ValueError("there are no drones to fly: the run has no decision for any")
     if len(names) > DRONES_MAX:
-        raise ValueError(f"{len(names):,} drones are more than can be flown at a time ({DRONES_MAX:,})")
+        raise ValueError(f"there are {len(names):,} drones, more than the maximum of {DRONES_MAX:,}")
     check_near(names, homes)
 
 
@@ -412,23 +414,23 @@ def check_near(names: Sequence[str], places: npt.ArrayLike) -> None:
     if len(far):
         place = ", ".join(f"{part:g}" for part in places[far[0]])
         raise ValueError(
-            f"{names[far[0]]}: the place ({place}) m is over {COORDINATE_MAX_M:,.0f} m away; ask for a smaller scale"
+            f"{names[far[0]]}: the place ({place}) m is over {COORDINATE_MAX_M:,.0f} m away; use a smaller scale"
         )
 
 
 def origin_of(homes: Array) -> Array:
-    """Return the origin (3,) to fly around: 0, or, where `homes` are far away, whole metres amid them."""
+    """Return the origin (3,) of the simulation: 0, or the rounded mean of `homes` if these are far away."""
     return np.zeros(3) if np.abs(homes).max() <= _NEAR_ORIGIN_M else np.asarray(np.round(homes.mean(axis=0)))
 
 
 def check_paths(names: Sequence[str], starts: Array, places: Array) -> None:
-    """Raise `ValueError` if a drone has too far to fly from `starts` to `places` (N, 3)."""
+    """Raise `ValueError` if the path of a drone from `starts` to `places` (N, 3) is too long."""
     ways = np.sqrt(np.square(places - starts).sum(1))
     longest = int(ways.argmax())
     if not ways[longest] <= PATH_MAX_M:
         raise ValueError(
-            f"{names[longest]} would have {ways[longest]:,.0f} m to fly, and {PATH_MAX_M:,.0f} m is the most: "
-            "ask for a smaller scale"
+            f"{names[longest]} would have to fly {ways[longest]:,.0f} m, more than the maximum of {PATH_MAX_M:,.0f} m: "
+            "use a smaller scale"
         )
 
 
@@ -436,4 +438,4 @@ def check_length(drones: int, until_s: float) -> None:
     """Raise `ValueError` if the log of a flight up to `until_s` would be too long."""
     most_s = _SAMPLES_MAX / drones / SAMPLE_RATE_HZ
     if until_s > most_s:
-        raise ValueError(f"the flight would last {until_s:,.0f} s; of {drones:,} drones {most_s:,.0f} s are the most")
+        raise ValueError(f"the flight would last {until_s:,.0f} s; the limit for {drones:,} drones is {most_s:,.0f} s")

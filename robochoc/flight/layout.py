@@ -1,4 +1,4 @@
-"""The layout of a mission: where drones stand, fly to and land, in a box of rows, columns and levels.
+"""The layout of a mission: homes, goals and landing points of drones, in a box of rows, columns and levels.
 
 Lengths are in cells. A drone is a little narrower than a cell. An axis maps cells to values of the problem.
 """
@@ -20,15 +20,15 @@ Point = tuple[float, float, float]
 _GAP = 2
 """Cells from the box to the first line of drones beside it."""
 _TALL = 6
-"""The largest number of levels of a box that is not scaled, even for a single drone."""
+"""The largest number of levels of an unscaled box, even for a single drone."""
 _LEVELS = range(4, 13)
-"""Minimum and maximum of levels in a box whose levels are scaled."""
+"""The possible numbers of levels in a box with scaled levels."""
 _TICKS = 15
-"""Maximum of labels on an axis."""
+"""The maximum number of labels on an axis."""
 _LEAST_POWER = -3
 """The exponent of ten of the smallest step between labels in metres."""
 _FAR = 1000
-"""Axes that begin beyond it are moved to begin at 1: a browser draws in single precision."""
+"""Axes with a larger first value are moved to begin at 1: a browser draws in single precision."""
 _PLACE = ("x", "y", "z")
 _TOO_CLOSE = 0.5
 """Places nearer to each other count as the same place."""
@@ -36,10 +36,10 @@ _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 @dataclass(frozen=True)
-class Axis:
+class BoxAxis:
     """One side of the box: values `first` to `last` are spread evenly over cells `low` to `high`.
 
-    On a map that says how long a value is, `unit_m`, the axis is labelled in metres of the map's frame.
+    On a map with a length of a unit, `unit_m`, the axis is labelled in metres of the map's frame.
     """
 
     name: str
@@ -50,8 +50,8 @@ class Axis:
     unit_m: float | None = None
 
     @classmethod
-    def over(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> Axis:
-        """Return the axis that holds `values`: a cell for each of up to `most` numbers, else `scaled` cells in all."""
+    def spanning(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> BoxAxis:
+        """Return the axis for `values`: with a cell for each of up to `most` numbers, else with `scaled` cells."""
         found = [*values] or [1]
         first, last = min(found), max(found)
         if last - first < most:
@@ -65,25 +65,25 @@ class Axis:
         return self.high - self.low + 1
 
     def at(self, value: float) -> float:
-        """Return the cell in which `value` lies."""
+        """Return the cell of `value`."""
         if self._is_even:
             return float(self.low + value - self.first)
         return self.low + (value - self.first) * (self.high - self.low) / (self.last - self.first)
 
     def value(self, cell: float) -> float:
-        """Return the value that lies at `cell`: the inverse of `at`."""
+        """Return the value at `cell`: the inverse of `at`."""
         if self._is_even:
             return cell - self.low + self.first
         return self.first + (cell - self.low) * (self.last - self.first) / (self.high - self.low)
 
     @property
     def _is_even(self) -> bool:
-        """Return whether each value has a cell of its own."""
+        """Whether each value has its own cell."""
         return self.cells == self.last - self.first + 1
 
     @property
     def middle(self) -> float:
-        """The cell half way from end to end."""
+        """The cell in the middle."""
         return (self.low + self.high) / 2
 
     @property
@@ -93,19 +93,19 @@ class Axis:
 
     @property
     def title(self) -> str:
-        """The name, and the unit of the labels where they have one."""
+        """The name, with the unit of the labels if they have one."""
         return self.name if self.unit_m is None else f"{self.name} (m)"
 
     def text(self, value: Fraction | float) -> str:
-        """Return how a value is shown: in metres, to the millimetre, where it has a length."""
+        """Return a value as text: in metres, to the millimetre, if units have a length."""
         return str(value) if self.unit_m is None else f"{round(float(value) * self.unit_m, 3) + 0.0:.10g}"
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Positions and texts of the labels: round numbers, not too many."""
+        """Positions and texts of the labels: round numbers, at most `_TICKS`."""
         unit = Fraction(1) if self.unit_m is None else Fraction(str(self.unit_m))
         span = (self.last - self.first) * unit
-        if unit != 1 and not span:  # a single level, say, may be at no round number
+        if unit != 1 and not span:  # a single level may not be at a round number
             return [(self.at(self.first), self.text(self.first))]
         tens = (Fraction(10) ** power for power in count(0 if self.unit_m is None else _LEAST_POWER))
         step = next(digit * ten for ten in tens for digit in (1, 2, 5) if span < _TICKS * digit * ten)
@@ -115,10 +115,10 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Layout:
-    """The box, and for each craft its home: the point on the ground where it stands in the beginning."""
+class MissionLayout:
+    """The box, and the home of each craft: the point on the ground on which it stands in the beginning."""
 
-    axes: tuple[Axis, Axis, Axis]
+    axes: tuple[BoxAxis, BoxAxis, BoxAxis]
     homes: tuple[Point, ...]
 
     @property
@@ -126,14 +126,14 @@ class Layout:
         """The height of the ground: one cell below the lowest level."""
         return self.axes[2].ground
 
-    def in_metres(self, unit_m: float) -> Layout:
-        """Return the same layout, whose axes are labelled in metres: so many are one unit of `x`, `y` and `z`."""
+    def in_metres(self, unit_m: float) -> MissionLayout:
+        """Return the same layout, with axes in metres: `unit_m` is the length of a unit of `x`, `y` and `z`."""
         rows, columns, levels = (replace(axis, unit_m=unit_m if axis.name in _PLACE else None) for axis in self.axes)
         return replace(self, axes=(rows, columns, levels))
 
     def places(self, crafts: Sequence[Craft]) -> list[Point | None]:
-        """Return where each of `crafts` flies to, in the order of `homes`; None without a level. No two meet."""
-        taken = _Taken()
+        """Return the goal of each craft, in the order of `homes`; None without a level. All goals differ."""
+        taken = _OccupiedPoints()
         around: dict[Point, Iterator[Point]] = {}
         found: list[Point | None] = []
         rows, columns, levels = self.axes
@@ -149,18 +149,18 @@ class Layout:
         return found
 
     def edge(self, number: int) -> Iterator[Point]:
-        """Yield landing points for `number` drones that withdraw, in lines before the box."""
+        """Yield landing points for `number` withdrawn drones, in lines before the box."""
         rows, columns, _ = self.axes
         across = max(1, min(number, max(rows.cells, columns.cells) * 3 // 2))
         for x, y in _lines(rows.middle - (across - 1) / 2, across, columns.low - _GAP, -1):
             yield x, y, self.ground
 
 
-def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: GroundMap | None = None) -> Layout:
-    """Return the layout for `crafts`. Its axes also hold `others`: where crafts may be at another time.
+def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: GroundMap | None = None) -> MissionLayout:
+    """Return the layout for `crafts`. Its axes also include `others`: places of crafts at other times.
 
-    With a map of the `ground`, they hold all of it, and robots of one craft have their homes where they stand on it; if
-    it is three-dimensional, where they are in the air.
+    With a map of the `ground`, the axes include the whole map, and robots with one craft have their homes at their
+    places on it; on a three-dimensional map, these are in the air.
     """
     others = [*others]
     cells = _cells(crafts)
@@ -174,7 +174,7 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []
-    taken = _Taken()
+    taken = _OccupiedPoints()
     exact = _exact_places(crafts, ground) if ground else {}
     for number, (craft, cell) in enumerate(zip(crafts, cells, strict=True)):
         x, y = exact.get(number, cell)
@@ -183,11 +183,11 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
         beside_others = taken.is_near(home) and number not in exact
         homes.append((*next(beside), levels.ground) if beside_others else home)
         taken.add(homes[-1])
-    return Layout(axes, tuple(homes))
+    return MissionLayout(axes, tuple(homes))
 
 
 def _cells(crafts: Sequence[Craft]) -> list[Cell]:
-    """Return the crafts' cells. Those without one get a square grid, behind the others."""
+    """Return the crafts' cells. Crafts without a cell are placed on a square grid, behind the others."""
     known = [craft.cell for craft in crafts if craft.cell]
     side = math.ceil(math.sqrt(len(crafts) - len(known)))
     x = min((x for x, _ in known), default=1)
@@ -197,7 +197,7 @@ def _cells(crafts: Sequence[Craft]) -> list[Cell]:
 
 
 def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap) -> list[Cell]:
-    """Return where crafts stand on the map; where their robot has several, or is not on it, their own cells."""
+    """Return the cells of crafts on the map; the given cell if their robot has several crafts, or is not on the map."""
     count = Counter(craft.robot for craft in crafts)
     return [
         ground.x_and_y(*ground.starts[craft.robot])
@@ -208,7 +208,7 @@ def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap)
 
 
 def _exact_places(crafts: Sequence[Craft], ground: GroundMap) -> dict[int, tuple[float, float]]:
-    """Return where crafts stand exactly, in units of topics, by their numbers."""
+    """Return the exact places of crafts, in units of topics, by their numbers."""
     count = Counter(craft.robot for craft in crafts)
     found = {}
     for number, craft in enumerate(crafts):
@@ -218,8 +218,8 @@ def _exact_places(crafts: Sequence[Craft], ground: GroundMap) -> dict[int, tuple
     return found
 
 
-def _height(craft: Craft, ground: GroundMap | None, levels: Axis, *, is_exact: bool) -> float:
-    """Return the height at which a craft is, in cells: on the ground, or where a three-dimensional map says."""
+def _height(craft: Craft, ground: GroundMap | None, levels: BoxAxis, *, is_exact: bool) -> float:
+    """Return the height of a craft, in cells: on the ground, or as given by a three-dimensional map."""
     volume = ground.volume if ground else None
     level = volume.starts.get(craft.robot) if volume else None
     if ground is None or volume is None or level is None:
@@ -230,19 +230,19 @@ def _height(craft: Craft, ground: GroundMap | None, levels: Axis, *, is_exact: b
 
 def _axes(
     crafts: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell], side_of_map: int, heights: Sequence[int]
-) -> tuple[Axis, Axis, Axis]:
+) -> tuple[BoxAxis, BoxAxis, BoxAxis]:
     most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crafts))), side_of_map)
     names = _axis_names(crafts)
-    rows = Axis.over(names[0], (x for x, _ in cells), most=most, scaled=most)
-    columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)
+    rows = BoxAxis.spanning(names[0], (x for x, _ in cells), most=most, scaled=most)
+    columns = BoxAxis.spanning(names[1], (y for _, y in cells), most=most, scaled=most)
     side = max(rows.cells, columns.cells)
     values = [craft.level for craft in (*crafts, *others) if craft.level is not None]
     values += heights
     if names[2] == "level" and all(1 <= value <= side for value in values):
-        return rows, columns, Axis(names[2], 1, side, 1, side)
+        return rows, columns, BoxAxis(names[2], 1, side, 1, side)
     scaled = min(max(side, _LEVELS[0]), _LEVELS[-1])
     tall = max(_TALL, 2 * side, *heights) - min(0, *heights) if heights else max(_TALL, 2 * side)
-    return rows, columns, Axis.over(names[2], values, most=tall, scaled=scaled)
+    return rows, columns, BoxAxis.spanning(names[2], values, most=tall, scaled=scaled)
 
 
 def _axis_names(crafts: Sequence[Craft]) -> tuple[str, str, str]:
@@ -252,13 +252,13 @@ def _axis_names(crafts: Sequence[Craft]) -> tuple[str, str, str]:
 
 
 def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, float]]:
-    """Yield points beside the box, in lines of `across`: the first line at `y`, the next `step` further."""
+    """Yield points beside the box, in lines of `across` points: the first line at `y`, the next `step` further."""
     for number in count():
         yield float(x + number % across), float(y + number // across * step)
 
 
-class _Taken:
-    """Points that are taken, sorted into boxes, so that a look-up compares a few points only."""
+class _OccupiedPoints:
+    """Occupied points, sorted into boxes, so that a search compares few points."""
 
     def __init__(self) -> None:
         self._boxes: dict[tuple[int, ...], list[Point]] = {}
@@ -278,7 +278,7 @@ class _Taken:
 
 
 def _spiral(point: Point) -> Iterator[Point]:
-    """Yield the point itself, then points around it, further and further out, as seeds of a sunflower lie."""
+    """Yield the point itself, then points around it in a spiral, like the seeds of a sunflower."""
     x, y, z = point
     for number in count():
         turn, radius = number * _GOLDEN_ANGLE, _TOO_CLOSE * math.sqrt(number)

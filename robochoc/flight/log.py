@@ -1,4 +1,4 @@
-"""The flight log: what was flown, as data, for pictures, recordings and reports."""
+"""The flight log: a flight as data, for pictures, recordings and reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAMPLE_RATE_HZ = 30
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """The smallest distance between two drones, by their numbers, and when they had it."""
+    """The smallest distance between two drones, by their numbers, and its time."""
 
     distance_m: float
     first: int
@@ -26,7 +26,7 @@ class ClosestApproach:
 
 @dataclass(frozen=True)
 class NearestWall:
-    """The smallest distance of a drone, by its number, from a wall, when it had it, and the distance to be kept."""
+    """The smallest distance of a drone, by its number, from a wall, its time, and the distance to keep."""
 
     distance_m: float
     drone: int
@@ -61,18 +61,18 @@ class FlightLog:
         times: (T,).
         positions: (T, N, 3), of the drones' centres.
         attitudes: (T, N, 4), unit quaternions x, y, z, w from the drone's frame to the world's.
-        legs: The legs that were flown.
-        events: What happened to drones.
+        legs: The flown legs.
+        events: The events of drones.
         errors_m: (N,), each drone's distance from its last goal at the end; 0 without a goal, nan if it has fallen.
         nearest: The closest approach of two drones, in the air or on the ground, at any step of the simulation.
-        nearest_fallen: The same of pairs of which at least one has fallen, or falls.
-        distance: The distance that was to be kept.
+        nearest_fallen: The closest approach of two drones at least one of which has fallen, or falls.
+        distance: The distance to keep.
         obstacles: All obstacles.
-        wall_s: How long simulation and planning took.
-        seen_s: When each obstacle was seen first; 0 for one that the planner knew.
+        wall_s: The duration of simulation and planning.
+        seen_s: The time at which each obstacle was first seen; 0 for an obstacle known to the planner.
         downwash: The number by which heights are divided in `nearest` and `distance`.
-        nearest_wall: The closest approach to a wall, of all samples of drones that have not fallen; None: there are no
-            walls, or none came near.
+        nearest_wall: The closest approach to a wall, over all samples of drones that have not fallen; None without
+            walls, or if none was near.
     """
 
     names: tuple[str, ...]
@@ -93,5 +93,5 @@ class FlightLog:
 
     @property
     def simulated_s(self) -> float:
-        """Return the duration of the flight in seconds."""
+        """The duration of the flight, in seconds."""
         return float(self.times[-1])

@@ -1,8 +1,8 @@
-"""The mission: what a team's decisions ask of its drones, epoch by epoch.
+"""The mission: the goals of a team's drones, epoch by epoch, derived from the team's decisions.
 
 The paper's drones stand on the ground in the beginning (Figure 5), and are at the places of the solution in the end
-(Figure 6). In between, an epoch may have sent them elsewhere. Lengths are in metres, in a frame whose z is up. One unit
-of a topic's coordinates is `scale` metres.
+(Figure 6). In between, an epoch may have sent them elsewhere. Lengths are in metres, in a frame whose z axis points up.
+One unit of a topic's coordinates is `scale` metres.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
-from robochoc.flight.layout import Axis, Layout, Point, layout_of
+from robochoc.flight.layout import BoxAxis, MissionLayout, Point, layout_of
 from robochoc.maps.ground_map import ALL_SIDES, GroundMap
 from robochoc.maps.walls import Walls, walls_of
 from robochoc.model.cost_units import Cost
@@ -28,19 +28,19 @@ _Array = npt.NDArray[np.float64]
 UNIT_M = 1.0
 """The default length of a unit of coordinates: drones are a little narrower."""
 VAST_M = 40.0
-"""By default, a box is no longer than that."""
+"""The default maximum length of a box."""
 _DENSE_M = 0.025
-"""A unit is no shorter, unless the box would be longer than `_FLOWN_M`: neighbours need some room."""
+"""The minimum length of a unit, unless the box would be longer than `_FLOWN_M`: neighbours need some space."""
 _FLOWN_M = 1_000.0
 _FAR_BELOW = 40
-"""Levels below all decided ones that are not shown."""
+"""Possible levels further below all decided levels are not shown."""
 _BLOCK_HIGH = 0.6
-"""The height of a blocked cell's point above the ground, in cells: a drone at the lowest level has to go over it."""
+"""The height of a blocked cell's point above the ground, in cells: a drone at the lowest level has to fly over it."""
 
 
 @dataclass(frozen=True)
 class Drone:
-    """A drone of a mission. It stands at `home` in the beginning. Drones of a `group`, a row, have the same colour."""
+    """A drone of a mission. It stands at `home` in the beginning. Drones of a `group` (a row) have the same colour."""
 
     name: str
     robot: str
@@ -61,43 +61,42 @@ class Goal:
 
 @dataclass(frozen=True)
 class Leg:
-    """The goals of the drones in an epoch, by drone number. A drone without a goal stays where it is."""
+    """The goals of the drones in an epoch, by drone number. A drone without a goal stays in place."""
 
     opened_by: str
     verdict: Verdict
     goals: Mapping[int, Goal]
     cost: Cost | None = field(default=None, compare=False)
-    """The cost of the decision, which changes nothing for drones. None: it is not known, or there is none."""
+    """The cost of the decision, which has no effect on drones. None: not known, or no cost."""
 
 
 @dataclass(frozen=True)
-class Block:
-    """A blocked cell of the map: routes keep their distance from the point `at`, from a leg on."""
+class MissionBlock:
+    """A blocked cell of the map: from leg `leg` on, routes keep their distance from the point `at`."""
 
     at: Point
     leg: int = 0
     is_cube: bool = False
-    """True for a cell of a three-dimensional map, with its middle at `at`. Routes keep from its voxels (`walls`)."""
+    """True for a cell of a three-dimensional map, with its middle at `at`. Routes avoid only its voxels (`walls`)."""
     sides: int = ALL_SIDES
-    """From which sides a cube is seen, as `Volume.sides` has them."""
+    """The visible sides of a cube, as in `Volume.sides`."""
 
 
 @dataclass(frozen=True)
 class Mission:
     """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places.
 
-    With a map of the ground, drones rise from where they stand before they fly elsewhere (`rises`), and there are
-    `blocks` to be avoided, or `walls`. With a three-dimensional one (`has_volume`), they are in the air in the
-    beginning.
+    With a map of the ground, drones first rise vertically (`rises`), and avoid `blocks` or `walls`. With a
+    three-dimensional map (`has_volume`), they are in the air in the beginning.
     """
 
     team: str
     drones: tuple[Drone, ...]
     legs: tuple[Leg, ...]
-    axes: tuple[Axis, Axis, Axis]
+    axes: tuple[BoxAxis, BoxAxis, BoxAxis]
     scale: float
     rises: bool = False
-    blocks: tuple[Block, ...] = ()
+    blocks: tuple[MissionBlock, ...] = ()
     has_volume: bool = False
     walls: Walls | None = None
 
@@ -108,20 +107,21 @@ class Mission:
 
 
 class MissionBuilder:
-    """Builds the mission of a run whose epochs come one after the other.
+    """Builds the mission of a run epoch by epoch.
 
     Args:
-        robots: All robots that ever take part, those that join later among them.
-        first: Where they go first.
-        names: Names of variables and of robots, where nothing else is known.
-        others: Crafts at other times; the box holds them, too.
-        leaving: How many drones will leave; None: any may.
-        scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
-        ground: A map of the ground. Robots whose files name no waypoint then stay where they stand. Where it has walls,
-            drones that withdraw go back to where they have been.
+        robots: All robots that ever take part, including those that join later.
+        first: The first assignment.
+        names: Names of variables and of robots, if nothing else is known.
+        others: Crafts at other times, which the box also includes.
+        leaving: The number of drones that will leave; None: any may.
+        scale: The length of a unit, in metres; by default the map's scale, or `UNIT_M`, or less if the box would be too
+            large.
+        ground: A map of the ground. Robots without a waypoint in their files then stay in place. If the map has walls,
+            withdrawn drones return to their homes.
 
     Raises:
-        ValueError: The map has walls, and another `scale` is asked for.
+        ValueError: The map has walls, and `scale` differs from its scale.
     """
 
     def __init__(
@@ -143,18 +143,18 @@ class MissionBuilder:
         crafts = sorted(self._crafts(first), key=lambda craft: (natural_key(craft.name), craft.name))
         self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crafts)}
         self._crafts_in_order = crafts
-        self.layout: Layout = layout_of(crafts, others, ground)
+        self.layout: MissionLayout = layout_of(crafts, others, ground)
         given = ground.scale if scale is None and ground else scale
         self.scale = _scale(self.layout.axes) if given is None else given
         if ground and ground.scale is not None:
             self.layout = self.layout.in_metres(self.scale)
         self._edge = self.layout.edge(len(crafts) if leaving is None else leaving)
-        self._aside: dict[int, Point] = {}
+        self._landing_points: dict[int, Point] = {}
         self._seen: set[str] = set()
         self.drones = tuple(map(self._drone, crafts, self.layout.homes))
 
     def leg(self, epoch: EpochOutcome, withdrawn: Iterable[str] = ()) -> Leg:
-        """Return what `epoch`, the next one, asks of the drones. A drone whose robot has left lands at the edge."""
+        """Return the leg of the next `epoch`. A drone whose robot has left lands at the edge."""
         values: Assignment = {} if epoch.verdict == Verdict.NO_SOLUTION else epoch.assignment
         here = {*(epoch.robots if self._robots else values or self._seen)} - {*withdrawn}
         gone = (self._seen | {*withdrawn}) - here
@@ -170,7 +170,7 @@ class MissionBuilder:
             if place is not None:
                 goals[number] = Goal(self._metres(place))
             elif _owner(craft) in gone:
-                goals[number] = Goal(self._metres(self._spot(number)), lands=True)
+                goals[number] = Goal(self._metres(self._landing_point(number)), lands=True)
         return Leg(epoch.opened_by, epoch.verdict, goals, epoch.cost)
 
     def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
@@ -198,17 +198,17 @@ class MissionBuilder:
 
     @property
     def rises(self) -> bool:
-        """Return whether drones leave the ground straight up: where they stand is known from a map."""
+        """Whether drones leave the ground vertically, since their places are known from a map."""
         return self._ground is not None
 
-    def _blocks(self) -> Iterator[Block]:
+    def _blocks(self) -> Iterator[MissionBlock]:
         if self._ground is None:
             return
         rows, columns, levels = self.layout.axes
         for cell in self._ground.blocked:
             x, y = self._ground.x_and_y(cell.x, cell.y)
             spot = rows.at(x), columns.at(y), self.layout.ground + _BLOCK_HIGH
-            yield Block(self._metres(spot), cell.epoch)
+            yield MissionBlock(self._metres(spot), cell.epoch)
         volume = self._ground.volume
         if volume is None:
             return
@@ -216,10 +216,10 @@ class MissionBuilder:
         for (column, row, level), sides in zip(volume.blocked, all_sides, strict=True):
             x, y = self._ground.x_and_y(column, row)
             at = self._metres((rows.at(x), columns.at(y), levels.at(volume.z(level))))
-            yield Block(at, is_cube=True, sides=sides)
+            yield MissionBlock(at, is_cube=True, sides=sides)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
-        """Yield the crafts of all robots, or of those that are `here`."""
+        """Yield the crafts of all robots, or of the robots in `here`."""
         for name, robot in self._robots.items():
             if here is None or name in here:
                 for craft in crafts_of(robot, values):
@@ -233,10 +233,10 @@ class MissionBuilder:
         group = craft.cell[0] if craft.cell and not self._ground else round(self.layout.axes[0].value(home[0]))
         return Drone(craft.name, craft.robot, craft.topic, self._metres(home), group)
 
-    def _spot(self, number: int) -> Point:
-        if number not in self._aside:
-            self._aside[number] = self.layout.homes[number] if self.walls else next(self._edge)
-        return self._aside[number]
+    def _landing_point(self, number: int) -> Point:
+        if number not in self._landing_points:
+            self._landing_points[number] = self.layout.homes[number] if self.walls else next(self._edge)
+        return self._landing_points[number]
 
     def _metres(self, point: Point) -> Point:
         x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.layout.axes, point, strict=True))
@@ -244,21 +244,21 @@ class MissionBuilder:
 
 
 def check_scale(scale: float | None, ground: GroundMap | None) -> None:
-    """Raise `ValueError` where a map has walls, and its scale is not the one that is asked for."""
+    """Raise `ValueError` if a map has walls, and `scale` differs from its scale."""
     walled = ground and (ground.walls or (ground.volume and ground.volume.walls))
     if ground and walled and scale not in {None, ground.scale}:
-        raise ValueError(f"the map has walls, and a unit is {ground.scale:g} m on it, not {scale:g} m")
+        raise ValueError(f"the scale is {scale:g} m, but a map with walls has the scale {ground.scale:g} m: omit it")
 
 
 def mission_of(
     outcome: Outcome, team: Team | None = None, scale: float | None = None, ground: GroundMap | None = None
 ) -> Mission:
-    """Return what `outcome` asks of the drones.
+    """Return the mission of `outcome`.
 
     Args:
-        outcome: What was decided.
+        outcome: The outcome of a run.
         team: The team as its files have it, before its scenario. Without it, only names are known.
-        scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
+        scale: The length of a unit, in metres; see `MissionBuilder`.
         ground: A map of the ground, if there is one.
 
     Raises:
@@ -287,16 +287,13 @@ def mission_of(
 
 
 def all_robots(team: Team) -> list[Robot]:
-    """Return all robots that ever take part: those of the beginning, and those that the scenario adds."""
+    """Return all robots that ever take part: those of the team, and those added by its scenario."""
     added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
     return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]
 
 
 def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
-    """Return the lowest possible crafts, unless they are far below all `decided`.
-
-    They give all runs the same ground.
-    """
+    """Return the lowest possible craft, unless it is far below all `decided`. It gives all runs the same ground."""
     possible = [craft for robot in robots for craft in possible_crafts(robot) if craft.level is not None]
     if not possible:
         return []
@@ -306,17 +303,17 @@ def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
 
 
 def _leaving(epochs: Sequence[EpochOutcome], outcome: Outcome) -> int:
-    """Return about how many drones leave before the end: a robot may fly several."""
+    """Return an estimate of the number of drones that leave before the end: a robot may have several."""
     stay = {*epochs[-1].robots} - {*outcome.withdrawn}
     return len({*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)} - stay)
 
 
 def _owner(craft: Craft) -> str:
-    """Return the name by which a craft is known to take part: its robot's, or its own."""
+    """Return the name of a craft's robot, or that of the craft if its robot is not known."""
     return craft.robot or craft.name
 
 
-def _scale(axes: Sequence[Axis]) -> float:
+def _scale(axes: Sequence[BoxAxis]) -> float:
     longest = max(1, *(axis.last - axis.first for axis in axes))
     dense = _DENSE_M if longest * _DENSE_M <= _FLOWN_M else 0.0
     return min(UNIT_M, max(VAST_M / longest, dense))
@@ -328,7 +325,7 @@ def in_cells(mission: Mission, metres: _Array) -> _Array:
     return np.stack(parts, axis=-1)
 
 
-def _cells(axis: Axis, values: _Array) -> _Array:
-    """Return `Axis.at` of many values."""
+def _cells(axis: BoxAxis, values: _Array) -> _Array:
+    """Return `BoxAxis.at` of many values."""
     span = axis.last - axis.first
     return axis.low + (values - axis.first) * ((axis.high - axis.low) / span if span else 1.0)

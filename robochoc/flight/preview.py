@@ -1,4 +1,4 @@
-"""A preview flight: a mission flown in calm air, to be shown. It is refused where it would take minutes."""
+"""A preview flight: a mission flown in calm air, for a picture. Missions that would take minutes are refused."""
 
 from __future__ import annotations
 
@@ -8,33 +8,32 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robochoc.flight.flight import fly
-from robochoc.flight.layout import Axis, Point
+from robochoc.flight.layout import BoxAxis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission, in_cells
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
-"""The errors of an impossible flight: places too close to each other, no way between them, numbers beyond all bounds.
-The rest can still be shown."""
+"""The errors of an impossible flight: places too close to each other, no route between them, numbers out of range.
+The mission can still be shown."""
 _DRONES_MAX = 500
-"""To plan the routes of more drones takes minutes."""
+"""The largest number of drones: planning routes for more takes minutes."""
 _FLIGHTS_MAX = 2_000
-"""The product of drones and epochs; likewise."""
+"""The largest product of drones and epochs: more take minutes."""
 _LEGS_MAX = 60
-"""Each leg takes a fifth of a second, however few drones there are."""
+"""The largest number of legs: each takes a fifth of a second, even for few drones."""
 _CELL_MIN_M = 0.25
-"""A drone does not fit into a smaller cell."""
+"""The smallest cell into which a drone fits."""
 _CELL_MAX_M = 4.0
-"""A drone flies for minutes where cells are larger."""
+"""The largest cell: in larger cells drones would fly for minutes."""
 _OFFSET_MAX_M = 1e6
-"""A place further from the origin is flown near the origin."""
+"""Missions with places further from the origin are moved near the origin."""
 
 
 @dataclass(frozen=True)
 class Preview:
-    """A mission and how it was flown, or why it was not.
+    """The flown mission and its log, or the reason why it was not flown.
 
-    `mission` is the one that was flown. It is not to scale where cells of the mission that was asked for are smaller
-    than drones, or vast.
+    `mission` is not to scale if cells of the given mission are smaller than drones, or very large.
     """
 
     mission: Mission
@@ -43,11 +42,11 @@ class Preview:
 
 
 def preview_of(mission: Mission, progress: Callable[[str], None] | None = None) -> Preview:
-    """Return how the drones fly `mission` in calm air. If no drone has a goal, or they cannot fly, nothing was flown.
+    """Fly `mission` in calm air. Nothing is flown if no drone has a goal, or the flight is impossible.
 
     Args:
-        mission: What the drones are asked to do.
-        progress: Called now and then with what is being done, in words.
+        mission: The mission.
+        progress: Called regularly with a description of the progress.
     """
     scaled = _with_flyable_cells(mission)
     if not any(leg.goals for leg in mission.legs):
@@ -55,7 +54,7 @@ def preview_of(mission: Mission, progress: Callable[[str], None] | None = None) 
     drones, legs = len(mission.drones), len(mission.legs)
     if drones > _DRONES_MAX or drones * legs > _FLIGHTS_MAX or legs > _LEGS_MAX:
         many = f"{_counted(drones, 'drone')} in {_counted(legs, 'epoch')}"
-        return Preview(scaled, why_not=f"{many} are more than are flown for a picture")
+        return Preview(scaled, why_not=f"{many} are too many for a preview flight")
     try:
         return Preview(scaled, fly(scaled, progress=progress))
     except _NO_FLIGHT as error:
@@ -67,7 +66,7 @@ def _counted(number: int, noun: str) -> str:
 
 
 def _with_flyable_cells(mission: Mission) -> Mission:
-    """Return `mission`; where its cells are smaller than drones, or vast, the same in a box whose cells are metres."""
+    """Return `mission`, with cells of a metre if its cells are smaller than drones, or very large."""
     cells_m = [_cell_m(axis) * mission.scale for axis in mission.axes]
     ends_m = [abs(end) * mission.scale for axis in mission.axes for end in (axis.first, axis.last)]
     if min(cells_m) >= _CELL_MIN_M and max(cells_m) <= _CELL_MAX_M and max(ends_m) <= _OFFSET_MAX_M:
@@ -92,6 +91,6 @@ def _with_flyable_cells(mission: Mission) -> Mission:
     )
 
 
-def _cell_m(axis: Axis) -> float:
-    """Return how many units of the problem a cell of `axis` is long."""
+def _cell_m(axis: BoxAxis) -> float:
+    """Return the length of a cell of `axis`, in units of the problem."""
     return (axis.last - axis.first) / (axis.high - axis.low) if axis.high > axis.low else 1.0

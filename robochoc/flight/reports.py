@@ -1,7 +1,7 @@
-"""Robots' reports on their situation: the paper's "read the robot situation" (Section 4.2). Pure data.
+"""Robots' reports on their situation: the paper's "read the robot situation" (Section 4.2), as data.
 
-Places are in metres, in the mission's frame. `at_s` is the time of the report, in seconds since an epoch that all
-reports of a source share.
+Places are in metres, in the mission's frame. `at_s` is the time of the report, in seconds since a common beginning of
+all reports of a source.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from robochoc.flight.layout import Point
 
 
 @dataclass(frozen=True)
-class Blocked:
+class BlockedReport:
     """An obstacle is at `place`: no drone can be there."""
 
     drone: str
@@ -21,7 +21,7 @@ class Blocked:
 
 
 @dataclass(frozen=True)
-class Cleared:
+class ClearedReport:
     """The obstacle at `place` is gone."""
 
     drone: str
@@ -30,7 +30,7 @@ class Cleared:
 
 
 @dataclass(frozen=True)
-class OutOfOrder:
+class OutOfOrderReport:
     """The drone cannot fly any more."""
 
     drone: str
@@ -39,7 +39,7 @@ class OutOfOrder:
 
 
 @dataclass(frozen=True)
-class Battery:
+class BatteryReport:
     """The charge of the drone's battery: 1 is full, 0 is empty."""
 
     drone: str
@@ -48,7 +48,7 @@ class Battery:
 
 
 @dataclass(frozen=True)
-class Pose:
+class PoseReport:
     """The position of a drone."""
 
     drone: str
@@ -56,4 +56,4 @@ class Pose:
     at_s: float = 0.0
 
 
-Report = Blocked | Cleared | OutOfOrder | Battery | Pose
+Report = BlockedReport | ClearedReport | OutOfOrderReport | BatteryReport | PoseReport

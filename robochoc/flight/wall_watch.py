@@ -1,8 +1,8 @@
-"""Walls during a flight: the floor plan for each leg, and how near drones have come to it.
+"""Walls during a flight: the floor plan for each leg, and the closest approach of drones to walls.
 
-Drones keep the radius for which the team was made between their centres and all that is not free. Places of teams that
-were not generated, or by an earlier version, and places between voxels may be a little nearer to a wall: then drones
-keep what their places leave.
+Drones keep the radius for which the team was made between their centres and everything that is not free. Places of
+teams that were not generated, or by an earlier version, and places between voxels may be a little nearer to a wall:
+then drones keep the distance of these places.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from robochoc.maps.routes.wall_plan import WallPlan, wall_plan_of
 from robochoc.maps.walls import Walls
 
 _SPARES_M = (0.06, 0.04, 0.02, 0.0)
-"""Routes keep so much more than the radius, the most that leaves a way for all."""
+"""Margins beyond the radius; routes use the largest margin that leaves a route for all."""
 _ERROR_M = 0.04
-"""In sharp turns, in calm air, tracking errors take 3 cm of what routes keep."""
+"""The allowance for tracking errors: 3 cm in sharp turns in calm air."""
 _SHARE = 0.999
-"""Of what a place leaves: rounding must not make a route impossible."""
+"""The used share of the distance of a place from walls: rounding must not make a route impossible."""
 _CLOSE_M = 1e-6
 _LEAST_S = 1.0
-"""From one corner to the next."""
+"""The least time from one corner to the next."""
 _LEAST_M = 0.03
-"""Places that are nearer to a wall are refused."""
+"""The least distance of places from a wall."""
 _NEAR_M = 0.3
-"""Drones that are further from walls than their radius and this are not told of."""
+"""Distances from walls larger than the radius and this are not reported."""
 
 
 class WallWatch:
-    """Watches the distance of drones, called `names`, from walls. Samples that were looked at once are not again."""
+    """Measures the distance of drones, called `names`, from walls. Each sample is checked once."""
 
     def __init__(self, walls: Walls, names: Sequence[str]) -> None:
         self._names = names
@@ -45,15 +45,15 @@ class WallWatch:
         self._plan = wall_plan_of(walls)
         self._plans: dict[float, WallPlan] = {}
         self._kept = walls.radius
-        self._looked = 0
+        self._checked = 0
         self._nearest: tuple[float, int, int] | None = None
 
     def limits(self, usual: MotionLimits) -> MotionLimits:
-        """Return the limits of a motion whose mean speed is that of the walls' robots, or the `usual` ones if less."""
+        """Return the limits for motion with the mean speed of the walls' robots, at most the `usual` limits."""
         return replace(usual, speed=min(usual.speed, PEAK * self._speed), least_s=_LEAST_S)
 
     def floor_plan(self, places: Array) -> WallPlan:
-        """Return the plan for routes between `places` (K, 3), those of all drones once, or several times.
+        """Return the plan for routes between `places` (K, 3): a multiple of the number of drones, in their order.
 
         Raises:
             ValueError: A place is in a wall, or too near to one.
@@ -65,7 +65,8 @@ class WallWatch:
         if leave < min(_LEAST_M, self._radius):
             where = "in a wall" if not leave else f"{leave:.2g} m from a wall"
             name = self._names[worst % len(self._names)]
-            raise ValueError(f"{name} is to be at {self._told(places[worst])}, {where} or what nobody knows")
+            place = self._point_text(places[worst])
+            raise ValueError(f"the place of {name}, {place}, is {where} or an unknown part of the map")
         return self._keeping(wish) if leave >= wish else self._leaving(leave)
 
     def floor(self, place: Array) -> float | None:
@@ -73,51 +74,51 @@ class WallWatch:
         return self._plan.floor(place) if isinstance(self._plan, VoxelPlan) else None
 
     def with_ways(self, plan: WallPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> WallPlan:
-        """Return `plan`, or one of less distance from walls if only that has ways for the drones `who`.
+        """Return `plan`, or a plan with a smaller distance from walls if only that has routes for the drones `who`.
 
         Raises:
-            ValueError: Walls do not let one of them through from its start to its goal; all have some (N, 3).
+            ValueError: Walls leave no route for one of them from its start to its goal, which are given for all (N, 3).
         """
         without = [number for number in who.tolist() if plan.way(starts[number], goals[number]) is None]
         if not without:
             return plan
-        if plan.keep > _SHARE * self._radius:  # a door may leave the radius, and nothing else
+        if plan.keep > _SHARE * self._radius:  # a door may be just as wide as the radius requires
             wider = (self._radius + spare for spare in _SPARES_M)
             less = next((keep for keep in wider if keep < plan.keep - _CLOSE_M), self._radius)
             return self.with_ways(self._leaving(less), who, starts, goals)
-        ends = f"from {self._told(starts[without[0]])} to {self._told(goals[without[0]])}"
+        ends = f"from {self._point_text(starts[without[0]])} to {self._point_text(goals[without[0]])}"
         has_heights = isinstance(self._plan, VoxelPlan)
-        made = "a team that is made with a larger radius" if has_heights else "a team that is generated anew"
+        hint = "generate the team with a larger radius" if has_heights else "generate the team again"
         raise ValueError(
-            f"{self._names[without[0]]} has no way around the walls {ends} that keeps its radius of {self._radius:g} m:"
-            f" {made} is told of no such way"
+            f"{self._names[without[0]]} has no route around the walls {ends} that keeps its radius of"
+            f" {self._radius:g} m: {hint}"
         )
 
     def nearest(self, positions: Array, failures: Sequence[tuple[int, str, float]]) -> NearestWall | None:
-        """Return the closest approach in all `positions` (T, N, 3) so far, but for those of drones that have failed."""
-        new = positions[self._looked :]
+        """Return the closest approach in all `positions` (T, N, 3) so far, except those of failed drones."""
+        new = positions[self._checked :]
         if len(new):
             counts = np.ones(new.shape[:2], dtype=np.bool_)
             for drone, _, at_s in failures:
-                counts[max(round(at_s * SAMPLE_RATE_HZ) - self._looked, 0) :, drone] = False
+                counts[max(round(at_s * SAMPLE_RATE_HZ) - self._checked, 0) :, drone] = False
             apart = self._plan.clearances(new[counts], self._radius + _NEAR_M)
             if len(apart) and apart.min() < min(self._radius + _NEAR_M, self._nearest[0] if self._nearest else np.inf):
                 worst = int(apart.argmin())
                 sample, drone = np.argwhere(counts)[worst].tolist()
-                self._nearest = (float(apart[worst]), sample + self._looked, drone)
-            self._looked = len(positions)
+                self._nearest = (float(apart[worst]), sample + self._checked, drone)
+            self._checked = len(positions)
         if self._nearest is None:
             return None
         distance, sample, drone = self._nearest
         return NearestWall(distance, drone, sample / SAMPLE_RATE_HZ, self._kept)
 
-    def _told(self, place: Array) -> str:
-        """Return a place in words: its height counts only on a map that has heights."""
+    def _point_text(self, place: Array) -> str:
+        """Return a place as text, with its height only on a three-dimensional map."""
         parts = place if isinstance(self._plan, VoxelPlan) else place[:2]
         return f"({', '.join(f'{part:.2f}' for part in parts)})"
 
     def _leaving(self, leave: float) -> WallPlan:
-        """Return the plan for places, or doors, that leave only so much."""
+        """Return the plan for places, or doors, that allow only a smaller distance."""
         self._kept = min(self._kept, max(leave - _ERROR_M, leave / 2))
         return self._keeping(_SHARE * leave)
 

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Leg, Mission
-from robochoc.flight.reports import OutOfOrder, Report
+from robochoc.flight.reports import OutOfOrderReport, Report
 
 SECOND_NS = 1_000_000_000
 POSES_HZ = 20
@@ -75,7 +75,9 @@ def publish_flight(mission: Mission, flown: FlightLog, publishers: Sequence[Miss
         return
     fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
     falls = {one.drone: one for one in reversed(flown.events) if one.drone in fallen}
-    reports = sorted((OutOfOrder(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s)
+    reports = sorted(
+        (OutOfOrderReport(flown.names[n], one.what, one.at_s) for n, one in falls.items()), key=lambda r: r.at_s
+    )
     broadcast = FlightBroadcast()
     begins_s = [0.0, *(times.begins_s for times in flown.legs[1:]), flown.simulated_s]
     for leg, (begin_s, end_s) in zip(mission.legs, pairwise(begins_s), strict=True):

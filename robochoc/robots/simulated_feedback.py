@@ -14,7 +14,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
-from robochoc.flight.reports import OutOfOrder, Report
+from robochoc.flight.reports import OutOfOrderReport, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.closed_loop import TOGETHER_S, Feedback
 from robochoc.robots.mission_publisher import FlightBroadcast, nanoseconds
@@ -136,13 +136,13 @@ class SimulatedFeedback(Feedback):
             return None
         return self._waiting.popleft()
 
-    def flown(self) -> FlightLog | None:
+    def log(self) -> FlightLog | None:
         """Return the flight log, a leg for each decision; None if nothing was flown. Raises `CannotFlyError`."""
         if self._flight is None or self._leg is None:
             return None
         if not self._calls[-1]:
             self._fly_leg(self._flight, self._leg, self._leg.goals)
-        flown = self._flight.flown()
+        flown = self._flight.log()
         stages = iter(flown.legs)
         parts = [list(islice(stages, calls)) for calls in self._calls]
         return replace(
@@ -156,11 +156,11 @@ class SimulatedFeedback(Feedback):
         if reports and not new:
             self._fly_leg(flight, leg, leg.goals)
         self._is_unfinished = bool(new)
-        flown = flight.flown()
+        flown = flight.log()
         new += self._not_yet_reported(self._fallen(flown))
         while new and flown.times[-1] <= max(report.at_s for report in new) + TOGETHER_S:
             self._fly_leg(flight, leg, {})
-            flown = flight.flown()
+            flown = flight.log()
             new += self._not_yet_reported(self._fallen(flown))
         self._waiting.extend(new)
         self._publish(flown, new)
@@ -176,9 +176,9 @@ class SimulatedFeedback(Feedback):
 
     def _fallen(self, flown: FlightLog) -> list[Report]:
         """Return reports for drones that have fallen without a report."""
-        known = {report.drone for report in self._known if isinstance(report, OutOfOrder)}
+        known = {report.drone for report in self._known if isinstance(report, OutOfOrderReport)}
         lost = [flown.names[number] for number in np.flatnonzero(np.isnan(flown.errors_m))]
-        return [OutOfOrder(name, "has fallen", float(flown.times[-1])) for name in lost if name not in known]
+        return [OutOfOrderReport(name, "has fallen", float(flown.times[-1])) for name in lost if name not in known]
 
     def _not_yet_reported(self, reports: Sequence[Report]) -> list[Report]:
         """Return the new reports, in the order of their times."""

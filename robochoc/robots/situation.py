@@ -16,7 +16,7 @@ from typing import assert_never
 from robochoc.flight.crafts import Craft, crafts_of
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
 
@@ -83,15 +83,15 @@ class Situation:
         if drone is None or drone.robot not in team:
             return ()
         match report:
-            case Blocked(place=place):
+            case BlockedReport(place=place):
                 return self._blocked(team, _in_units(place, self._scale))
-            case Cleared(place=place):
+            case ClearedReport(place=place):
                 return self._cleared(team, _in_units(place, self._scale))
-            case OutOfOrder():
+            case OutOfOrderReport():
                 return (RemoveAgent(drone.robot),)
-            case Battery(level=level):
+            case BatteryReport(level=level):
                 return (RemoveAgent(drone.robot),) if 0 <= level < self._battery else ()
-            case Pose():
+            case PoseReport():
                 return (RemoveAgent(drone.robot),) if self._is_down(drone, report) else ()
             case never:
                 assert_never(never)
@@ -174,7 +174,7 @@ class Situation:
 
     # Poses
 
-    def _is_down(self, drone: Drone, pose: Pose) -> bool:
+    def _is_down(self, drone: Drone, pose: PoseReport) -> bool:
         """Return whether the drone has fallen; see `Situation`."""
         seen = self._seen.setdefault(drone.name, _PoseHistory())
         height = (pose.place[2] - drone.home[2]) / self._scale

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone, Leg
-from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.mission_publisher import MissionPublisher, nanoseconds
 from robochoc.robots.sink import Fields, Sink, Waypoint
@@ -115,16 +115,16 @@ class Publisher:
         """Publish a drone's report. Raises `KeyError` if no drone has that name."""
         number, header = self._numbers[report.drone], self._header(at_ns)
         match report:
-            case Battery():
+            case BatteryReport():
                 measured = {**_NOT_MEASURED, "percentage": report.level, "present": True}
                 self._report(number, "battery", {"header": header, **measured}, at_ns)
-            case Pose():
+            case PoseReport():
                 self._report(number, "pose", {"header": header, "pose": _pose(report.place, {"w": 1.0})}, at_ns)
-            case Blocked():
+            case BlockedReport():
                 self._report(number, "blocked", {"header": header, "point": point(report.place)}, at_ns)
-            case Cleared():
+            case ClearedReport():
                 self._report(number, "cleared", {"header": header, "point": point(report.place)}, at_ns)
-            case OutOfOrder():
+            case OutOfOrderReport():
                 self._report(number, "out_of_order", {"data": report.why}, at_ns)
             case _:
                 assert_never(report)

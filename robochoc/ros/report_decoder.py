@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.source import REPORTS, ReceivedMessage
 from robochoc.ros.names import TopicNames
@@ -54,16 +54,16 @@ class ReportDecoder:
         match token:
             case "battery":
                 level = _number(received.fields, "percentage")
-                return None if level is None else Battery(drone, level, at_s)
+                return None if level is None else BatteryReport(drone, level, at_s)
             case "out_of_order":
                 why = received.fields.get("data")
-                return OutOfOrder(drone, on_one_line(why[:REASON_MAX]) if isinstance(why, str) else "", at_s)
+                return OutOfOrderReport(drone, on_one_line(why[:REASON_MAX]) if isinstance(why, str) else "", at_s)
             case "pose":
                 place = self._place(received, "pose", "position")
-                return None if place is None else Pose(drone, place, at_s)
+                return None if place is None else PoseReport(drone, place, at_s)
             case "blocked" | "cleared":
                 place = self._place(received, "point")
-                kind = Cleared if received.topic.endswith("/cleared") else Blocked
+                kind = ClearedReport if received.topic.endswith("/cleared") else BlockedReport
                 return None if place is None else kind(drone, place, at_s)
             case _:
                 return None

@@ -15,7 +15,7 @@ from typing import Any
 import msgspec
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts
-from robochoc.flight.layout import Layout, Point, layout_of
+from robochoc.flight.layout import MissionLayout, Point, layout_of
 from robochoc.formats import InvalidInputError, robot_in
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import Assignment, Robot
@@ -62,7 +62,7 @@ class TraceScene:
         order = sorted(range(len(crew)), key=lambda place: (natural_key(crew[place][1].name), crew[place][1].name))
         self._owners = [crew[place][0] for place in order]
         crafts = [crew[place][1] for place in order]
-        self._field: Layout = layout_of(crafts, self._others())
+        self._field: MissionLayout = layout_of(crafts, self._others())
         self._drones: dict[str, list[int]] = {}
         for number, owner in enumerate(self._owners):
             self._drones.setdefault(owner, []).append(number)

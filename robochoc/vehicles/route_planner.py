@@ -18,7 +18,7 @@ import numpy as np
 
 from robochoc.flight.coordination.move_order import NoRouteError
 from robochoc.flight.coordination.moves import moves_between
-from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.paths import OutdoorSpace
 from robochoc.flight.coordination.spacing import TooCloseError, check_spacing
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import SLACK_M, Array, norms, squashed
@@ -216,10 +216,10 @@ class RoutePlanner:
         rows = np.array(points, dtype=float).reshape(-1, 3)
         return squashed(rows, self._downwash)
 
-    def _space(self, points: Sequence[Point]) -> Space:
+    def _space(self, points: Sequence[Point]) -> OutdoorSpace:
         ground = self._fence.low[2] / self._downwash
         heights = [*self._flat(points)[:, 2].tolist(), ground]
-        return Space(self._distance_m, ground, max(heights) + 2 * self._distance_m, rises=True)
+        return OutdoorSpace(self._distance_m, ground, max(heights) + 2 * self._distance_m, rises=True)
 
 
 _BY = "the only route found passes"

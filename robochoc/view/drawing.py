@@ -13,7 +13,7 @@ from typing import NamedTuple, assert_never
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.layout import Axis, Point
+from robochoc.flight.layout import BoxAxis, Point
 from robochoc.system.plain_text import printable
 from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
 from robochoc.view.meshcat_commands import MeshcatCommands, Track
@@ -135,7 +135,7 @@ def _extent_and_radius(scene: Scene) -> tuple[_Corners, float]:
     return extent, float(np.linalg.norm(extent[1] - extent[0])) / 2
 
 
-def _box(axes: Sequence[Axis]) -> _Corners:
+def _box(axes: Sequence[BoxAxis]) -> _Corners:
     return np.array([[axis.low - 0.5 for axis in axes], [axis.high + 0.5 for axis in axes]])
 
 
@@ -180,7 +180,7 @@ def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> No
         meshcat.place("ground/pads", (0, 0, -0.01))
 
 
-def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
+def _draw_box(meshcat: MeshcatCommands, axes: Sequence[BoxAxis]) -> None:
     """Draw the edges, the back and bottom sides with their grid, and every cell very faintly."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
@@ -195,7 +195,7 @@ def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
         meshcat.segments(f"box/{name}", _lattice(lines), _LINE, opacity)
 
 
-def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
+def _label_axes(meshcat: MeshcatCommands, axes: Sequence[BoxAxis], height: float) -> None:
     """Draw the name and the numbers of each named axis, beside the edge of the box nearest to the viewer."""
     for number, axis, origin, name_at in _axis_lines(axes, height):
         for at, text in axis.ticks:
@@ -205,7 +205,7 @@ def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -
         _draw_text(meshcat, f"axes/{axis.name}", axis.title, name_at, 1.2 * height)
 
 
-def _axis_lines(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
+def _axis_lines(axes: Sequence[BoxAxis], height: float) -> Iterator[tuple[int, BoxAxis, _Corner, _Corner]]:
     """Yield the named axes: number, axis, the middle of the line of its numbers, the point of its name."""
     low, high = _box(axes)
     middle = (low + high) / 2

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robochoc.flight.layout import Axis, Point
+from robochoc.flight.layout import BoxAxis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission, in_cells
 from robochoc.formats.headline import describe_outcome
@@ -64,7 +64,7 @@ class Scene:
     title: str
     facts: tuple[tuple[str, str], ...]
     drones: tuple[DrawnDrone, ...]
-    axes: tuple[Axis, Axis, Axis]
+    axes: tuple[BoxAxis, BoxAxis, BoxAxis]
     playback: Playback | None = None
     blocks: tuple[DrawnBlock, ...] = ()
     walls: DrawnWalls | None = None

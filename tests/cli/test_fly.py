@@ -238,27 +238,31 @@ def test_what_cannot_be_flown_is_one_clear_line(two: Path) -> None:
             (
                 ("--distance", 9),
                 1,
-                "the homes of V1.1 and V1.2 are 1.00 m apart, and 9 m are to be kept: ask for a smaller",
+                "the homes of V1.1 and V1.2 are 1.00 m apart, and 9 m are to be kept: use a smaller",
             ),
             (
                 ("--distance", 1),
                 1,
-                "are 1.00 m apart, and 1 m are to be kept, which takes 1.1 m: ask for a smaller distance",
+                "are 1.00 m apart, and 1 m are to be kept, which requires 1.1 m: use a smaller distance",
             ),
             (
                 ("--scale", 1e-6),
                 1,
-                "the homes of V1.1 and V1.2 are 1e-06 m apart, and 0.01 m are to be kept: ask for a l",
+                "the homes of V1.1 and V1.2 are 1e-06 m apart, and 0.01 m are to be kept: use a l",
             ),
             (("--scale", 1e9), 2, "--scale"),
-            (("--scale", 1e5), 1, "m is the most: ask for a smaller scale"),
-            (("--scale", 1e5), 1, "V1.2 would have 200,000 m to fly, and 2,000 m is the most: ask for a smaller scale"),
-            (("--distance", 1e-9), 2, "positive number of metres, 0.01 at least"),
+            (("--scale", 1e5), 1, "m: use a smaller scale"),
+            (
+                ("--scale", 1e5),
+                1,
+                "V1.2 would have to fly 200,000 m, more than the maximum of 2,000 m: use a smaller scale",
+            ),
+            (("--distance", 1e-9), 2, "the distance is 1e-09; it must be finite, and at least 0.01 m"),
             (("--distance", "nan"), 2, "nan"),
-            (("--downwash", 2, "--fail", "V1.1"), 2, "with downwash neither motors can fail"),
-            (("--downwash", 1000), 2, "downwash has to be a number from 1 to 100"),
+            (("--downwash", 2, "--fail", "V1.1"), 2, "downwash cannot be combined with motor failures"),
+            (("--downwash", 1000), 2, "downwash is 1000.0; it must be a number from 1 to 100"),
             (("--wind", 500), 2, "faster than 200 m/s"),
-            (("--gusts", 1e9), 2, "gusts have to be"),
+            (("--gusts", 1e9), 2, "gusts is 1000000000.0; it must be"),
             (("--fail", "nobody"), 2, "there is no drone 'nobody' to fail: choose V1.1, V1.2"),
             (("--fail", "V1.1@-1"), 2, "is not of the form ROBOT or ROBOT@SECONDS"),
             (("--ros", "mcap:run.mcap"), 2, "give their folder with --team"),
@@ -275,13 +279,13 @@ def test_vast_numbers_are_told_soon(tmp_path: Path) -> None:
         result = ran("fly", saved(tmp_path, {"V1.1": 1, "V1.2": far}))
         assert result.exit_code == 1
         assert "the homes of V1.1 and V1.2 are" in result.stderr
-        assert "ask for a larger scale" in result.stderr
+        assert "use a larger scale" in result.stderr
 
 
 def test_too_many_drones_are_told_soon(tmp_path: Path) -> None:
     result = ran("fly", saved(tmp_path, {f"V{number}": 1 for number in range(1001)}))
     assert result.exit_code == 1
-    assert "1,001 drones are more than can be flown at a time (1,000)" in result.stderr
+    assert "1,001 drones, more than the maximum of 1,000" in result.stderr
 
 
 def test_a_map_says_where_it_begins(tmp_path: Path) -> None:

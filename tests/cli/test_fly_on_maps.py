@@ -104,7 +104,7 @@ def test_solve_flies_and_publishes_in_the_scale_of_the_map(team: Path, tmp_path:
     for more in (("--situation", "flight"), ("--ros", f"mcap:{bag}")):
         refused = ran("solve", team, *simulator, *more, "--scale", "2")
         assert refused.exit_code == 2
-        assert "--scale: the map has walls, and a unit is 0.5 m on it, not 2 m" in refused.stderr
+        assert "--scale: the scale is 2 m, but a map with walls has the scale 0.5 m: omit it" in refused.stderr
 
 
 def test_a_scenario_of_a_team_keeps_its_map(team: Path, tmp_path: Path) -> None:
@@ -136,7 +136,7 @@ def test_what_is_wrong_with_a_map_is_said_with_its_file(team: Path, result: Path
     ground.write_text(json.dumps({**whole, "walls": {**whole["walls"], "radius": 0.3}}))
     refused = ran("fly", result, "--team", team)
     assert refused.exit_code == 1
-    assert "has no way around the walls from (1.00, " in refused.stderr
+    assert "has no route around the walls from (1.00, " in refused.stderr
 
 
 # `robochoc solve` says where on the map of a team its values are

@@ -256,7 +256,7 @@ def test_a_recording_that_is_read_is_not_written(recording: Path, monkeypatch: p
 def test_a_flight_that_would_never_end_is_not_begun(tmp_path: Path) -> None:
     result = solved(HANGAR, "--situation", "flight", "--scale", "1e6", "--ros", f"mcap:{tmp_path / 'run.mcap'}")
     assert (result.exit_code, len(result.stderr.splitlines())) == (1, 1)
-    assert "ask for a smaller scale" in result.stderr
+    assert "use a smaller scale" in result.stderr
     assert not list(tmp_path.iterdir())
 
 

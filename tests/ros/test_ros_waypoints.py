@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from robochoc.flight.mission import Drone, Goal, Leg
-from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Topic
 from robochoc.robots.sink import Fields, Waypoint
@@ -129,12 +129,12 @@ def test_poses_of_all_drones() -> None:
 @looped(
     ("report", "topic", "part", "value"),
     [
-        (Battery("drone1.2", 0.25), "battery", "percentage", 0.25),
-        (Blocked("drone1.2", (1.0, 2.0, 3.0)), "blocked", "point", {"x": 1.0, "y": 2.0, "z": 3.0}),
-        (Cleared("drone1.2", (1.0, 2.0, 3.0)), "cleared", "point", {"x": 1.0, "y": 2.0, "z": 3.0}),
-        (OutOfOrder("drone1.2", "a motor stopped"), "out_of_order", "data", "a motor stopped"),
+        (BatteryReport("drone1.2", 0.25), "battery", "percentage", 0.25),
+        (BlockedReport("drone1.2", (1.0, 2.0, 3.0)), "blocked", "point", {"x": 1.0, "y": 2.0, "z": 3.0}),
+        (ClearedReport("drone1.2", (1.0, 2.0, 3.0)), "cleared", "point", {"x": 1.0, "y": 2.0, "z": 3.0}),
+        (OutOfOrderReport("drone1.2", "a motor stopped"), "out_of_order", "data", "a motor stopped"),
         (
-            Pose("drone1.2", (1.0, 2.0, 3.0)),
+            PoseReport("drone1.2", (1.0, 2.0, 3.0)),
             "pose",
             "pose",
             {"position": {"x": 1.0, "y": 2.0, "z": 3.0}, "orientation": {"w": 1.0}},
@@ -154,7 +154,7 @@ def test_reports(report: Report, topic: str, part: str, value: object) -> None:
 
 def test_what_a_battery_does_not_measure_is_not_zero() -> None:
     heap = KeptSink()
-    Publisher("team", DRONES, [heap]).report(Battery("drone1.1", 1.0), NOW)
+    Publisher("team", DRONES, [heap]).report(BatteryReport("drone1.1", 1.0), NOW)
     assert math.isnan(heap.said[0][2]["voltage"])
 
 

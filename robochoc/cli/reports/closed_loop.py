@@ -54,5 +54,5 @@ def _simulated_flight(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
     """Return the mission and the log of the simulated flight; None if nothing was flown."""
     from robochoc.robots.simulated_feedback import SimulatedFeedback
 
-    flown = loop.feedback.flown() if isinstance(loop.feedback, SimulatedFeedback) else None
+    flown = loop.feedback.log() if isinstance(loop.feedback, SimulatedFeedback) else None
     return (loop.mission, flown) if loop.mission and flown else None

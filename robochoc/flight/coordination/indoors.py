@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.coordination.move_order import Move, MoveOrder, NoRouteError
+from robochoc.flight.coordination.move_order import DroneMove, MoveOrder, NoRouteError
 from robochoc.flight.coordination.spacing import Spacing
 from robochoc.maps.routes.distances import Array, Flags, norms, squashed
 from robochoc.maps.routes.voxel_plan import Resting, VoxelPlan
@@ -32,7 +32,7 @@ _SPOTS = 2_000
 
 
 @dataclass(frozen=True)
-class Indoors(Spacing):
+class IndoorSpace(Spacing):
     """The space between the walls of a `plan`. Heights of all points are divided by `downwash`, those of it are not."""
 
     plan: VoxelPlan
@@ -40,7 +40,7 @@ class Indoors(Spacing):
 
     def way(self, start: Array, goal: Array, points: Array) -> Array | None:
         """Return a short path that keeps from walls and from `points`; None if none is found."""
-        found = self.plan.way_among(self._tall(start), self._tall(goal), self._resting(points))
+        found = self.plan.way_among(self._unsquashed(start), self._unsquashed(goal), self._resting(points))
         if found is None:
             return None
         path = np.vstack((start, squashed(found[1:-1], self.downwash), goal))
@@ -53,51 +53,57 @@ class Indoors(Spacing):
 
     def spots(self, start: Array, points: Array, most: float) -> Array:
         """Return points (K, 3) to which paths lead from `start`, clear of others, the nearest first."""
-        found = self.plan.reached(self._tall(start), self._resting(points), most)
+        found = self.plan.reached(self._unsquashed(start), self._resting(points), most)
         return squashed(found, self.downwash)
 
     def _resting(self, points: Array) -> Resting:
-        return Resting(self._tall(points), self.distance, self.downwash)
+        return Resting(self._unsquashed(points), self.distance, self.downwash)
 
-    def _tall(self, points: Array) -> Array:
+    def _unsquashed(self, points: Array) -> Array:
         return squashed(points, 1 / self.downwash)
 
 
-def moves_indoors(starts: Array, goals: Array, standing: Array, space: Indoors, delays: Array) -> list[Move]:
+def moves_indoors(starts: Array, goals: Array, standing: Array, space: IndoorSpace, delays: Array) -> list[DroneMove]:
     """Return moves, one after the other, that bring all drones from `starts` to `goals`. Raises `NoRouteError`."""
     refused: NoRouteError | None = None
     for number in range(_ORDERS):
         turns = np.random.default_rng(number).permutation(len(starts)) if number else np.arange(len(starts))
         try:
-            return _Order(starts, goals, standing, space, delays, turns).all_moves()
+            return _IndoorMoves(starts, goals, standing, space, delays, turns).all_moves()
         except NoRouteError as error:
             refused = refused or error
     raise refused or NoRouteError([])
 
 
-class _Order(MoveOrder[Indoors]):
+class _IndoorMoves(MoveOrder[IndoorSpace]):
     """Moves in one order of precedence: of drones that are alike else, the one with the least of `turns` goes first."""
 
     def __init__(
-        self, starts: Array, goals: Array, standing: Array, space: Indoors, delays: Array, turns: npt.NDArray[np.int64]
+        self,
+        starts: Array,
+        goals: Array,
+        standing: Array,
+        space: IndoorSpace,
+        delays: Array,
+        turns: npt.NDArray[np.int64],
     ) -> None:
         super().__init__(starts, goals, standing, space, delays)
         self._turns = turns
         self._standing = self.points[self.count :]
         self._ways: dict[tuple[int, bytes], Array] = {}
-        self._let_through = 2 * self.count + 2
+        self._attempts_left = 2 * self.count + 2
         self.away = {int(drone) for drone in np.flatnonzero((starts != goals).any(axis=1))}
 
-    def all_moves(self) -> list[Move]:
+    def all_moves(self) -> list[DroneMove]:
         """Return the moves. Raises `NoRouteError`."""
         while self.away:
-            if not (self._goes() or self._lets_through()):
+            if not (self._move_one_to_goal() or self._let_one_through()):
                 raise NoRouteError(sorted(self.away), indoors=True)
         return self.moves
 
-    def go(self, drone: int, path: Array) -> None:
+    def move(self, drone: int, path: Array) -> None:
         """Move a drone, and note whether it is at its goal."""
-        super().go(drone, path)
+        super().move(drone, path)
         if (self.rests[drone] == self.goals[drone]).all():
             self.away.discard(drone)
         else:
@@ -113,48 +119,48 @@ class _Order(MoveOrder[Indoors]):
             self._ways[key] = found
         return self._ways[key]
 
-    def _on(self, drone: int, points: Array) -> Flags:
+    def _is_on_path(self, drone: int, points: Array) -> Flags:
         """Return which of `points` (P, 3) are on the way of a drone."""
         way = self._way(drone)
         return np.asarray(self.space.near(way[:-1], way[1:], points).any(axis=0))
 
-    def _ranks(self) -> list[int]:
+    def _by_precedence(self) -> list[int]:
         """Return the drones not at their goals, in the order of delay, and of others in whose way their goals are."""
         away = sorted(self.away)
         hinders = np.zeros(self.count)
         for drone in away:
-            hinders += self._on(drone, self.goals)
+            hinders += self._is_on_path(drone, self.goals)
         return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], self._turns[drone]))
 
-    def _goes(self) -> bool:
+    def _move_one_to_goal(self) -> bool:
         """Move a drone to its goal; return whether one moved."""
-        ranks = [drone for drone in self._ranks() if self.goal_is_free(drone)]
+        ranks = [drone for drone in self._by_precedence() if self.goal_is_free(drone)]
         for drone in ranks:
             if self.space.is_clear(self._way(drone), self.others(drone)):
-                self.go(drone, self._way(drone))
+                self.move(drone, self._way(drone))
                 return True
-        return any(self._goes_round(drone) for drone in ranks)
+        return any(self._move_around(drone) for drone in ranks)
 
-    def _goes_round(self, drone: int) -> bool:
+    def _move_around(self, drone: int) -> bool:
         path = self.space.way(self.rests[drone], self.goals[drone], self.others(drone))
         if path is not None:
-            self.go(drone, path)
+            self.move(drone, path)
         return path is not None
 
-    def _lets_through(self) -> bool:
+    def _let_one_through(self) -> bool:
         """Move all drones that are on the way of one out of it, and then that one; return whether that was possible."""
-        self._let_through -= 1
-        if self._let_through < 0:
+        self._attempts_left -= 1
+        if self._attempts_left < 0:
             return False
-        for drone in self._ranks():
+        for drone in self._by_precedence():
             count, points, away = len(self.moves), self.points.copy(), set(self.away)
             way = self._way(drone)
-            others = [other for other in np.flatnonzero(self._on(drone, self.rests)).tolist() if other != drone]
+            others = [other for other in np.flatnonzero(self._is_on_path(drone, self.rests)).tolist() if other != drone]
             nearest = sorted(others, key=lambda other: (norms(way - self.rests[other]).argmin(), other))
             if (
-                all(self._makes_room(other, drone) for other in nearest)
+                all(self._make_room(other, drone) for other in nearest)
                 and self.goal_is_free(drone)
-                and self._goes_round(drone)
+                and self._move_around(drone)
             ):
                 return True
             del self.moves[count:]
@@ -162,18 +168,18 @@ class _Order(MoveOrder[Indoors]):
             self.away = away
         return False
 
-    def _makes_room(self, other: int, drone: int) -> bool:
+    def _make_room(self, other: int, drone: int) -> bool:
         """Move `other` off the way of a drone, if it is still on it; return whether it is."""
-        if not self._on(drone, self.rests[other][None])[0]:
+        if not self._is_on_path(drone, self.rests[other][None])[0]:
             return True
         others = self.others(other)
         for most in _AWAY_M:
             spots = self.space.spots(self.rests[other], others, most)
-            spots = spots[~self._on(drone, spots)][:_SPOTS]
+            spots = spots[~self._is_on_path(drone, spots)][:_SPOTS]
             if len(spots):
                 path = self.space.way(self.rests[other], self._best(spots, {other, drone}), others)
                 if path is not None:
-                    self.go(other, path)
+                    self.move(other, path)
                     return True
         return False
 
@@ -182,5 +188,5 @@ class _Order(MoveOrder[Indoors]):
         rest = [drone for drone in range(self.count) if drone not in without]
         hindered = (norms(spots[:, None] - self.goals[rest][None]) < self.space.distance).sum(axis=1)
         for drone in self.away - without:
-            hindered = hindered + self._on(drone, spots)
+            hindered = hindered + self._is_on_path(drone, spots)
         return np.asarray(spots[hindered.argmin()])

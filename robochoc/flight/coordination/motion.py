@@ -73,7 +73,7 @@ class Route:
         durations = self._durations[piece]
         share = np.clip((times - self._ends[piece] + durations) / durations, 0, 1)
         origin = self.path[piece]
-        points: Array = origin + (self.path[piece + 1] - origin) * _way(share)[:, None]
+        points: Array = origin + (self.path[piece + 1] - origin) * _progress(share)[:, None]
         return points
 
     def pieces(self, begins_s: float) -> tuple[Array, Array, Array, Array, Array]:
@@ -84,7 +84,7 @@ class Route:
 
 
 @dataclass(frozen=True)
-class _Window:
+class _MotionWindow:
     """A time in which no drone begins or ends a piece: the pieces in motion, and where the other drones rest."""
 
     begins_s: float
@@ -132,12 +132,12 @@ class RoutePlan:
             both = share * rest
             rate = 30 * both * both / window.durations
             bend = 60 * both * (rest - share) / (window.durations * window.durations)
-            position[drones] = window.origins + window.along * _way(share)[:, None]
+            position[drones] = window.origins + window.along * _progress(share)[:, None]
             velocity[drones] = window.along * rate[:, None]
             acceleration[drones] = window.along * bend[:, None]
         return Motion(position, velocity, acceleration)
 
-    def _window_at(self, s: float) -> _Window:
+    def _window_at(self, s: float) -> _MotionWindow:
         place = bisect_right(self._bounds, s)
         begins = self._bounds[place - 1] if place else -math.inf
         ends = self._bounds[place] if place < len(self._bounds) else math.inf
@@ -147,7 +147,7 @@ class RoutePlan:
         resting[self._drones[done]] = self._goals[done]
         now = (self._begins <= begins) & ~done
         origins = self._origins[now]
-        return _Window(
+        return _MotionWindow(
             begins,
             ends,
             resting,
@@ -162,7 +162,7 @@ class RoutePlan:
 _NONE = [np.empty(0), np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3))]
 
 
-def _way(share: Array) -> Array:
+def _progress(share: Array) -> Array:
     """Return the share of the length that is done after a `share` of the time."""
     way: Array = share * share * share * (10 + share * (6 * share - 15))
     return way

@@ -30,7 +30,7 @@ class NoRouteError(RobochocError, ValueError):
 
 
 @dataclass(frozen=True)
-class Move:
+class DroneMove:
     """A drone's move along a path (K + 1, 3), from rest to rest."""
 
     drone: int
@@ -50,15 +50,15 @@ class MoveOrder(Generic[_Space]):
         self.points = np.vstack((starts, standing))
         """Positions of drones, and standing points after them."""
         self.rests = self.points[: self.count]
-        self.moves: list[Move] = []
+        self.moves: list[DroneMove] = []
 
     def others(self, drone: int) -> Array:
         """Return where all others rest, and all standing points."""
         return np.delete(self.points, drone, axis=0)
 
-    def go(self, drone: int, path: Array) -> None:
+    def move(self, drone: int, path: Array) -> None:
         """Move a drone."""
-        self.moves.append(Move(drone, path, self.others(drone)))
+        self.moves.append(DroneMove(drone, path, self.others(drone)))
         self.points[drone] = path[-1]
 
     def goal_is_free(self, drone: int) -> bool:

@@ -4,7 +4,7 @@ A drone goes to its goal when that is free and a path leads there (`paths.py`). 
 each other (they swap places, say), one of them makes room, near its place if that helps, else in the sky.
 
 This always ends: a drone makes room near its place once and in the sky once, and then goes to its goal. If no drone can
-do even that, all begin anew with `_Emptied`: every drone, those that stay too, goes up, each to a place in the sky
+do even that, all begin anew with `_MovesBySky`: every drone, those that stay too, goes up, each to a place in the sky
 whose column is no other's, and then down to its goal. Each drone that can go up does, so that fewer are in the way of
 others: if it gets stuck, any other order does too. They go down in the reverse of an order in which they could leave
 the goals.
@@ -23,40 +23,40 @@ from itertools import count, product, takewhile
 
 import numpy as np
 
-from robochoc.flight.coordination.move_order import Move, MoveOrder, NoRouteError
-from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.move_order import DroneMove, MoveOrder, NoRouteError
+from robochoc.flight.coordination.paths import OutdoorSpace
 from robochoc.maps.routes.distances import Array, Flags, norms
 
 _RINGS = 20
 """The most rings of a distance away at which a drone waits in the sky where there are walls."""
-_Way = Callable[[Array, Array, Array], Array | None]
+_PathFinder = Callable[[Array, Array, Array], Array | None]
 
 
-def moves_between(starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> list[Move]:
+def moves_between(starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> list[DroneMove]:
     """Return moves, one after the other, that bring all drones from `starts` to `goals`. Raises `NoRouteError`.
 
     `space.sky` is two distances or more above all of them. Drones that wait less, or block fewer others, come first.
     """
-    found = _Direct(starts, goals, standing, space, delays)
-    if not found.is_done():
-        found.moves = _Emptied(starts, goals, standing, space, delays).all_moves()
+    found = _DirectMoves(starts, goals, standing, space, delays)
+    if not found.solve():
+        found.moves = _MovesBySky(starts, goals, standing, space, delays).all_moves()
     return found.moves
 
 
-class _UnderTheSky(MoveOrder[Space]):
+class _MovesUnderSky(MoveOrder[OutdoorSpace]):
     """Moves where nothing is above all drones, so that they can wait there."""
 
-    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> None:
         super().__init__(starts, goals, standing, space, delays)
         self.waiting: set[int] = set()
         """The drones in the sky."""
 
-    def go(self, drone: int, path: Array) -> None:
+    def move(self, drone: int, path: Array) -> None:
         """Move a drone, which then does not wait in the sky."""
-        super().go(drone, path)
+        super().move(drone, path)
         self.waiting.discard(drone)
 
-    def to_goal(self, drone: int, ways: Iterable[_Way], *, low: bool = True) -> bool:
+    def to_goal(self, drone: int, ways: Iterable[_PathFinder], *, low: bool = True) -> bool:
         """Move to the goal if one of `ways` leads there; along the ground only if `low`. Return whether it moved."""
         if not self.goal_is_free(drone):
             return False
@@ -64,14 +64,14 @@ class _UnderTheSky(MoveOrder[Space]):
         for way in ways:
             path = way(self.rests[drone], self.goals[drone], others)
             if path is not None and (low or not self.space.slides(path[:-1], path[1:]).any()):
-                self.go(drone, path)
+                self.move(drone, path)
                 return True
         return False
 
     def to_sky(self, drone: int) -> bool:
         """Move up to wait there, a distance above the height at which drones cross. Return whether it moved."""
         others = self.others(drone)
-        up = self.space.up(self.rests[drone], others)
+        up = self.space.path_up(self.rests[drone], others)
         if up is None:
             return False
         spot = self._spot(self.rests[drone], up[-1])
@@ -83,7 +83,7 @@ class _UnderTheSky(MoveOrder[Space]):
             path = np.vstack((up, [*spot[:2], self.space.sky], spot))
         if not self.space.is_clear(path, others):
             return False
-        self.go(drone, path)
+        self.move(drone, path)
         self.waiting.add(drone)
         return True
 
@@ -100,44 +100,44 @@ class _UnderTheSky(MoveOrder[Space]):
         return None if free is None else np.array([*free, self.space.sky + self.space.distance])
 
 
-class _Direct(_UnderTheSky):
+class _DirectMoves(_MovesUnderSky):
     """Drones go to their goals as soon as they can; drones that block others make room."""
 
-    def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> None:
         super().__init__(starts, goals, standing, space, delays)
         self.away = {int(drone) for drone in np.flatnonzero((starts != goals).any(axis=1))}
-        self._aside: set[int] = set()
-        self._next_look = [0] * self.count
+        self._moved_aside: set[int] = set()
+        self._next_search = [0] * self.count
         self._top = space.sky - space.distance
         active = [*self.away]
         self._blocked = np.zeros((self.count, len(self.points)), dtype=bool)
         """Element [i, j]: the straight way of drone i is blocked by drone j, which is at rest."""
-        self._would = np.zeros((self.count, self.count), dtype=bool)
+        self._blocked_by_goal = np.zeros((self.count, self.count), dtype=bool)
         """Element [i, j]: the straight way of drone i would be blocked by drone j at its goal."""
         self._lengths = norms(goals - starts)
         self._blocked[active] = space.near(starts[active], goals[active], self.points)
-        self._would[active] = space.near(starts[active], goals[active], goals)
-        self._blocked[active, active] = self._would[active, active] = False
+        self._blocked_by_goal[active] = space.near(starts[active], goals[active], goals)
+        self._blocked[active, active] = self._blocked_by_goal[active, active] = False
         self._blocked[self._barred(starts, goals), :] = True
 
-    def is_done(self) -> bool:
+    def solve(self) -> bool:
         """Move all drones to their goals; return whether that was possible."""
         while self.away:
             if not (
-                self._straight()
-                or self._by_lane()
-                or self._by_detour(self._unhindered())
-                or self._steps_aside()
-                or self._by_detour(self._ranks())
-                or self._goes_up()
-                or self._by_detour(self._ranks(), again=True)
+                self._move_straight()
+                or self._move_by_lane()
+                or self._move_by_detour(self._unhindered())
+                or self._move_aside()
+                or self._move_by_detour(self._by_precedence())
+                or self._move_up()
+                or self._move_by_detour(self._by_precedence(), again=True)
             ):
                 return False
         return True
 
-    def go(self, drone: int, path: Array) -> None:
-        """Move, and update which ways that blocks or clears."""
-        super().go(drone, path)
+    def move(self, drone: int, path: Array) -> None:
+        """DroneMove, and update which ways that blocks or clears."""
+        super().move(drone, path)
         here, goal = self.rests[drone], self.goals[drone]
         self._blocked[:, drone] = False
         others = [other for other in self.away if other != drone]
@@ -148,7 +148,7 @@ class _Direct(_UnderTheSky):
         if (here == goal).all():
             self.away.discard(drone)
         else:
-            for matrix, points in ((self._blocked, self.points), (self._would, self.goals)):
+            for matrix, points in ((self._blocked, self.points), (self._blocked_by_goal, self.goals)):
                 matrix[drone] = self.space.near(here[None], goal[None], points)[0]
                 matrix[drone, drone] = False
             if self._barred(here[None], goal[None])[0]:
@@ -159,53 +159,53 @@ class _Direct(_UnderTheSky):
         """Return which straight ways (K,) are none: they lead along the ground, or through walls."""
         return self.space.slides(starts, goals) | self.space.is_walled(starts, goals)
 
-    def _ranks(self) -> list[int]:
+    def _by_precedence(self) -> list[int]:
         """Return the drones not at their goals, in the order of delay, of drones that they would block, of distance."""
         away = sorted(self.away)
-        hinders = self._would[away].sum(axis=0)
+        hinders = self._blocked_by_goal[away].sum(axis=0)
         return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], -self._lengths[drone], drone))
 
-    def _straight(self) -> bool:
+    def _move_straight(self) -> bool:
         before = len(self.moves)
-        for drone in self._ranks():
+        for drone in self._by_precedence():
             if not self._blocked[drone].any():
-                self.go(drone, np.array([self.rests[drone], self.goals[drone]]))
+                self.move(drone, np.array([self.rests[drone], self.goals[drone]]))
         return len(self.moves) > before
 
-    def _by_lane(self) -> bool:
-        return any(self.to_goal(drone, (self.space.by_lane,)) for drone in self._ranks())
+    def _move_by_lane(self) -> bool:
+        return any(self.to_goal(drone, (self.space.by_lane,)) for drone in self._by_precedence())
 
     def _unhindered(self) -> list[int]:
         """Return the drones whose straight way is blocked only by drones that stay there."""
-        return [drone for drone in self._ranks() if not self._blocked[drone, [*self.away]].any()]
+        return [drone for drone in self._by_precedence() if not self._blocked[drone, [*self.away]].any()]
 
-    def _by_detour(self, drones: Iterable[int], *, again: bool = False) -> bool:
+    def _move_by_detour(self, drones: Iterable[int], *, again: bool = False) -> bool:
         """Move one of `drones` by a detour, and return whether one moved.
 
         A drone that found no way searches `again` only when others have moved, as a search takes long. If nothing else
         is possible all search, and move along the ground where they have to.
         """
         for drone in drones:
-            if (again or len(self.moves) >= self._next_look[drone]) and self.goal_is_free(drone):
-                if self.to_goal(drone, (self.space.round, self.space.over), low=again):
+            if (again or len(self.moves) >= self._next_search[drone]) and self.goal_is_free(drone):
+                if self.to_goal(drone, (self.space.around, self.space.over_all), low=again):
                     return True
-                self._next_look[drone] = len(self.moves) + 1 + len(self.away)
+                self._next_search[drone] = len(self.moves) + 1 + len(self.away)
         return False
 
-    def _steps_aside(self) -> bool:
+    def _move_aside(self) -> bool:
         """Move a drone that blocks most others a little way from its place."""
         away = sorted(self.away)
         blocks = self._blocked[away].sum(axis=0)
-        ranks = sorted(self.away - self._aside, key=lambda drone: (-blocks[drone], -self.rests[drone][2], drone))
+        ranks = sorted(self.away - self._moved_aside, key=lambda drone: (-blocks[drone], -self.rests[drone][2], drone))
         for drone in ranks:
-            self._aside.add(drone)
-            path = self._way_aside(drone)
+            self._moved_aside.add(drone)
+            path = self._path_aside(drone)
             if path is not None:
-                self.go(drone, path)
+                self.move(drone, path)
                 return True
         return False
 
-    def _way_aside(self, drone: int) -> Array | None:
+    def _path_aside(self, drone: int) -> Array | None:
         """Return a path to the nearest free point of those that block fewest drones."""
         here, others = self.rests[drone], self.others(drone)
         spots = here + _AROUND * self.space.distance
@@ -223,23 +223,23 @@ class _Direct(_UnderTheSky):
         blocked = self.space.near(self.rests[rest], self.goals[rest], spots).sum(axis=0)
         return np.array([here, spots[blocked.argmin()]])
 
-    def _goes_up(self) -> bool:
+    def _move_up(self) -> bool:
         ranks = sorted(self.away - self.waiting, key=lambda drone: (-self.rests[drone][2], drone))
         been = {move.drone for move in self.moves if move.path[-1][2] > self.space.sky}
         return any(self.to_sky(drone) for drone in ranks if drone not in been)
 
 
-class _Emptied(_UnderTheSky):
+class _MovesBySky(_MovesUnderSky):
     """All drones go up, and down to their goals in the reverse of an order in which they could leave the goals."""
 
-    def all_moves(self) -> list[Move]:
+    def all_moves(self) -> list[DroneMove]:
         """Return the moves. Raises `NoRouteError`."""
         standing = self.points[self.count :]
-        left = _Emptied(self.goals, self.goals, standing, self.space, self.delays)
+        left = _MovesBySky(self.goals, self.goals, standing, self.space, self.delays)
         left.empty()
         self.empty()
         for move in reversed(left.moves):
-            if not self.to_goal(move.drone, (self.space.by_lane, self.space.over)):
+            if not self.to_goal(move.drone, (self.space.by_lane, self.space.over_all)):
                 raise NoRouteError([move.drone])
         return self.moves
 

@@ -5,7 +5,7 @@ Candidates, in order of preference:
 1. `straight`;
 2. `by_lane`: up or down to a lane's height, across, and up or down. The lane with the shortest detour is taken, and of
    equal ones the lowest;
-3. `round`: the same by way of a column beside the start or the goal, for drones with another one right above;
+3. `around`: the same by way of a column beside the start or the goal, for drones with another one right above;
 4. over everything: from the start up to the `sky`, by way of a column beside it where that is needed, across, and
    down in the same manner. The sky is a height that is clear of all points at rest.
 
@@ -39,7 +39,7 @@ _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
 
 
 @dataclass(frozen=True)
-class Space(Spacing):
+class OutdoorSpace(Spacing):
     """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points.
 
     With `rises`, drones leave the ground, and land, straight up and down where they can. No path leads through walls of
@@ -52,13 +52,13 @@ class Space(Spacing):
     floor_plan: FloorPlan | None = None
 
     @property
-    def off(self) -> float:
+    def off_ground(self) -> float:
         """The height from which on a drone is off the ground."""
         return self.ground + self.distance / 4
 
     def slides(self, starts: Array, goals: Array) -> Flags:
         """Return which straight lines (K,) lead along the ground; or, with `rises`, aslant from it or to it."""
-        low = (np.minimum if self.rises else np.maximum)(starts[:, 2], goals[:, 2]) < self.off
+        low = (np.minimum if self.rises else np.maximum)(starts[:, 2], goals[:, 2]) < self.off_ground
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
 
@@ -117,7 +117,7 @@ class Space(Spacing):
                     taken.append(height)
                     yield path
 
-    def round(self, start: Array, goal: Array, points: Array) -> Array | None:
+    def around(self, start: Array, goal: Array, points: Array) -> Array | None:
         """Return the path by way of the best column beside the start or the goal; None if there is none."""
         best, path = math.inf, None
         reach, limits = self._reach(start, points), self._reach(goal, points)
@@ -135,9 +135,9 @@ class Space(Spacing):
                         best, path = length, tried
         return path
 
-    def over(self, start: Array, goal: Array, points: Array) -> Array | None:
+    def over_all(self, start: Array, goal: Array, points: Array) -> Array | None:
         """Return the path by way of the sky; None if the sky is not clear between the columns."""
-        up, down = self.up(start, points), self.up(goal, points)
+        up, down = self.path_up(start, points), self.path_up(goal, points)
         if up is None or down is None:
             return None
         columns = self.across(start, goal, up[-1, :2], down[-1, :2])
@@ -147,7 +147,7 @@ class Space(Spacing):
         path = _joined(np.vstack((up, between, down[::-1])))
         return path if self.is_clear(path, points) else None
 
-    def up(self, start: Array, points: Array) -> Array | None:
+    def path_up(self, start: Array, points: Array) -> Array | None:
         """Return the path from `start` to the sky, straight up if possible."""
         path = _path(start, (start[:2], self.sky))
         if self.is_clear(path, points):
@@ -188,8 +188,8 @@ class Space(Spacing):
         Heights along the ground count only if there are no others.
         """
         low, high = max(reach[0], min(self.ground, float(start[2]))), min(reach[1], self.sky)
-        found = _outside(self._spans(columns, points), low, high, (start[2], self.off))
-        return [height for height in found if height >= self.off] or found
+        found = _outside(self._spans(columns, points), low, high, (start[2], self.off_ground))
+        return [height for height in found if height >= self.off_ground] or found
 
     def _reach(self, start: Array, points: Array) -> tuple[float, float]:
         """Return the lowest and the highest height that can be reached straight from `start`."""

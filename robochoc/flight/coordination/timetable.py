@@ -23,11 +23,11 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.coordination.indoors import Indoors, moves_indoors
+from robochoc.flight.coordination.indoors import IndoorSpace, moves_indoors
 from robochoc.flight.coordination.motion import MotionLimits, Route, RoutePlan
-from robochoc.flight.coordination.move_order import Move
+from robochoc.flight.coordination.move_order import DroneMove
 from robochoc.flight.coordination.moves import moves_between
-from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.paths import OutdoorSpace
 from robochoc.flight.coordination.spacing import check_spacing
 from robochoc.maps.routes.distances import Array, Flags, closest_approach, norms, squashed
 from robochoc.maps.routes.voxel_plan import VoxelPlan
@@ -97,13 +97,13 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     _check_counts(starts, goals, delays)
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
-    space: Indoors | Space
+    space: IndoorSpace | OutdoorSpace
     if isinstance(floor_plan, VoxelPlan):
-        space = Indoors(distance, floor_plan, downwash)
+        space = IndoorSpace(distance, floor_plan, downwash)
         moves = moves_indoors(starts, goals, standing, space, delays)
     else:
         heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
-        space = Space(distance, ground, float(heights.max()) + 2 * distance, rises, floor_plan)
+        space = OutdoorSpace(distance, ground, float(heights.max()) + 2 * distance, rises, floor_plan)
         moves = moves_between(starts, goals, standing, space, delays)
     table = _Timetable(starts, space, limits or MotionLimits(), delays, downwash)
     for move in moves:
@@ -129,7 +129,7 @@ def _points(rows: Array, name: str) -> Array:
 
 
 @dataclass(frozen=True)
-class _Entry:
+class _ScheduledMove:
     """A move in the timetable: its positions at each step (S + 1, 3), from the step at which it begins."""
 
     flight: Route
@@ -158,16 +158,16 @@ class _Timetable:
     """The scheduled moves, and where all drones rest in between."""
 
     def __init__(
-        self, starts: Array, space: Space | Indoors, limits: MotionLimits, delays: Array, downwash: float
+        self, starts: Array, space: OutdoorSpace | IndoorSpace, limits: MotionLimits, delays: Array, downwash: float
     ) -> None:
         self._starts = starts
         self._downwash = downwash
         self._space = space
         self._limits = limits
         self._step = min(_STEP_S, math.sqrt(4 * _BULGE * space.distance / limits.acceleration))
-        self._enough = space.distance + limits.acceleration * self._step**2 / 4
+        self._least_m = space.distance + limits.acceleration * self._step**2 / 4
         self._first: list[int] = np.ceil(np.maximum(delays, 0) / self._step).astype(int).tolist()
-        self._entries: list[_Entry] = []
+        self._entries: list[_ScheduledMove] = []
         self._drones = np.empty(0, dtype=np.int64)
         self._latest = 0
         self._corners = np.empty((2, 0, 3))
@@ -179,7 +179,7 @@ class _Timetable:
         self._to = np.full(len(starts), _FOREVER)
         self._last_rest = [*range(len(starts))]
 
-    def add(self, move: Move) -> None:
+    def add(self, move: DroneMove) -> None:
         """Schedule `move` at the first step at which it is safe, by another lane if that is much sooner."""
         earliest = max(self._first[move.drone], int(self._from[self._last_rest[move.drone]]))
         entry = self._entry(move.drone, move.path, earliest)
@@ -189,18 +189,18 @@ class _Timetable:
                 other = self._entry(move.drone, path, earliest)
                 if other.ends + patience < entry.ends:
                     entry = other
-        self._enter(entry)
+        self._schedule(entry)
 
     def plan(self) -> RoutePlan:
         """Return all scheduled moves, in seconds."""
         flights = [(entry.flight, entry.begins * self._step) for entry in self._entries]
         return RoutePlan(self._starts, flights, self._downwash)
 
-    def _entry(self, drone: int, path: Array, earliest: int) -> _Entry:
+    def _entry(self, drone: int, path: Array, earliest: int) -> _ScheduledMove:
         """Return the move along `path`, as early as possible."""
         flight = Route(drone, path, self._limits, self._downwash)
         steps = max(1, math.ceil(flight.duration_s / self._step))
-        entry = _Entry(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
+        entry = _ScheduledMove(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
         if earliest >= self._latest:
             return entry
         taken = np.zeros(self._latest + 1, dtype=bool)
@@ -209,7 +209,7 @@ class _Timetable:
         self._mark_moves(taken, entry)
         return replace(entry, begins=earliest + int(taken[earliest:].argmin()))
 
-    def _enter(self, entry: _Entry) -> None:
+    def _schedule(self, entry: _ScheduledMove) -> None:
         drone, path = entry.flight.drone, entry.flight.path
         self._entries.append(entry)
         self._drones = np.append(self._drones, drone)
@@ -222,32 +222,32 @@ class _Timetable:
         self._from = np.append(self._from, entry.ends)
         self._to = np.append(self._to, _FOREVER)
 
-    def _mark_rests(self, taken: Flags, entry: _Entry) -> None:
+    def _mark_rests(self, taken: Flags, entry: _ScheduledMove) -> None:
         """Mark the steps at which it would come too near to a drone at rest, on its way or at its end."""
         path, samples = entry.flight.path, entry.samples
         near = self._space.near(path[:-1], path[1:], self._places).any(axis=0) & (self._resting != entry.flight.drone)
         for rest in np.flatnonzero(near):
             begins, ends = int(self._from[rest]), int(self._to[rest])
             apart = samples - self._places[rest]
-            steps = np.flatnonzero(closest_approach(apart[:-1], apart[1:]) < self._enough)
+            steps = np.flatnonzero(closest_approach(apart[:-1], apart[1:]) < self._least_m)
             for run in np.split(steps, np.flatnonzero(np.diff(steps) > 1) + 1):
                 if len(run):
                     taken[max(0, begins - int(run[-1])) : max(0, ends - int(run[0]))] = True
             if norms(apart[-1]) < self._space.least:
                 taken[: max(0, ends - entry.steps)] = True
 
-    def _mark_goal(self, taken: Flags, entry: _Entry) -> None:
+    def _mark_goal(self, taken: Flags, entry: _ScheduledMove) -> None:
         """Mark the steps at which it would be at its goal before another drone has passed there."""
         goal = entry.flight.path[-1:]
         for other in self._near(entry.flight.drone, goal):
             path = other.flight.path
             if self._space.near(path[:-1], path[1:], goal).any():
                 apart = other.samples - goal
-                near = np.flatnonzero(closest_approach(apart[:-1], apart[1:]) < self._enough)
+                near = np.flatnonzero(closest_approach(apart[:-1], apart[1:]) < self._least_m)
                 if len(near):
                     taken[: max(0, other.begins + int(near[-1]) + 1 - entry.steps)] = True
 
-    def _mark_moves(self, taken: Flags, entry: _Entry) -> None:
+    def _mark_moves(self, taken: Flags, entry: _ScheduledMove) -> None:
         """Mark the steps at which it would come too near to a drone that moves at the same time."""
         others = self._near(entry.flight.drone, entry.flight.path)
         if not others:
@@ -255,14 +255,14 @@ class _Timetable:
         mine, theirs = entry.chunks, np.concatenate([other.chunks for other in others])
         begins = np.concatenate([other.begins + _CHUNK * np.arange(len(other.chunks)) for other in others])
         apart = _box_gaps(_boxes(mine), _boxes(theirs))
-        for pairs in _portions(np.argwhere(apart < self._enough)):
+        for pairs in _portions(np.argwhere(apart < self._least_m)):
             a, b = mine[pairs[:, 0]], theirs[pairs[:, 1]]
             gap = closest_approach(a[:, :-1, None] - b[:, None, :-1], a[:, 1:, None] - b[:, None, 1:])
-            pair, my, their = np.nonzero(gap < self._enough)
+            pair, my, their = np.nonzero(gap < self._least_m)
             steps = begins[pairs[pair, 1]] + their - pairs[pair, 0] * _CHUNK - my
             taken[steps[steps >= 0]] = True
 
-    def _near(self, drone: int, path: Array) -> list[_Entry]:
+    def _near(self, drone: int, path: Array) -> list[_ScheduledMove]:
         """Return the other drones' moves that the boxes around the paths do not keep apart."""
         box = np.array([[path.min(axis=0)], [path.max(axis=0)]])
         near = (_box_gaps(box, self._corners)[0] < self._space.least) & (self._drones != drone)

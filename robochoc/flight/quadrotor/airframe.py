@@ -1,8 +1,8 @@
 """The airframe of the simulated quadrotor: its parameters, and their sources.
 
-The airframe is an AscTec Hummingbird as RotorS has it: Furrer, Burri, Achtelik, Siegwart, "RotorS - A Modular Gazebo
-MAV Simulator Framework", 2016, and its `hummingbird.xacro`. Its arms lie along the body's x and y axes; z is up. From
-tip to tip of its rotors it measures 0.54 m.
+The airframe is an AscTec Hummingbird as modelled in RotorS: Furrer, Burri, Achtelik, Siegwart, "RotorS - A Modular
+Gazebo MAV Simulator Framework", 2016, and its `hummingbird.xacro`. Its arms lie along the body's x and y axes; z is up.
+From tip to tip of its rotors it measures 0.54 m.
 
 From RotorS: the masses of body and rotors, the arm, the inertia of the body, thrust and moment per rotor speed, the
 highest speed, the time constants, the drag coefficient. Ours: the rotors' masses are points at the ends of the arms;

@@ -10,10 +10,10 @@ from robochoc.flight.layout import Point
 from robochoc.flight.quadrotor.airframe import ROTORS
 
 WIND_MAX_M_S = 200.0
-"""No wind on the ground is faster."""
+"""The largest wind speed: no wind near the ground is faster."""
 DOWNWASH_MAX = 100.0
 DISTANCE_MIN_M = 0.01
-"""The planner's time steps are short enough for this distance."""
+"""The smallest distance for which the planner's time steps are short enough."""
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,10 @@ class FlightConditions:
     """The conditions of a whole flight. The same conditions give the same flight.
 
     Attributes:
-        distance: Metres between drones' centres that all routes keep; None: 0.5, or less where homes or goals are
-            nearer to each other.
-        downwash: How many distances drones keep right above each other: for routes they are ellipsoids so much taller
-            than wide. Above 1 nothing else may be in the way: neither obstacles nor drones that fall.
+        distance: The distance between drones' centres that all routes keep, in metres; None: 0.5, or less if homes or
+            goals are nearer to each other.
+        downwash: The vertical distance of drones, as a multiple of `distance`: for routes, drones are ellipsoids taller
+            than wide by this factor. Above 1, obstacles and motor failures are not possible.
         wind: The mean velocity of the wind, in m/s.
         gusts: The standard deviation of each component of the wind, in m/s.
         seed: The seed of the gusts.
@@ -55,32 +55,31 @@ class FlightConditions:
     def __post_init__(self) -> None:
         self._check_distances()
         if not 0 <= self.gusts <= WIND_MAX_M_S:
-            raise ValueError(f"gusts have to be a number from 0 to {WIND_MAX_M_S:g} m/s, not {self.gusts}")
+            raise ValueError(f"gusts is {self.gusts}; it must be a number from 0 to {WIND_MAX_M_S:g} m/s")
         if max(map(abs, self.wind), default=0) > WIND_MAX_M_S:
             speed = ", ".join(f"{part:g}" for part in self.wind)
             raise ValueError(f"a wind of ({speed}) is faster than {WIND_MAX_M_S:g} m/s")
         if self.seed < 0:
-            raise ValueError(f"a seed has to be a number from 0 on, not {self.seed}")
+            raise ValueError(f"the seed is {self.seed}; it must be at least 0")
         for what, point in (("wind", self.wind), *(("obstacle", place) for place in self.obstacles)):
             if not all(map(math.isfinite, point)):
-                raise ValueError(f"the {what} has to be three finite numbers, x, y and z, not {point}")
+                raise ValueError(f"the {what} is {point}; it must be three finite numbers, x, y and z")
         for failure in self.failures:
             if failure.motor not in range(ROTORS):
-                raise ValueError(f"drone {failure.drone} has motors 0 to {ROTORS - 1}, no motor {failure.motor}")
+                raise ValueError(f"drone {failure.drone} has no motor {failure.motor}; motors are 0 to {ROTORS - 1}")
             if not 0 <= failure.at_s < math.inf:
-                raise ValueError(f"a motor can stop from second 0 on, not at {failure.at_s}")
+                raise ValueError(f"a motor stops at second {failure.at_s}; it must be at least 0, and finite")
 
     def _check_distances(self) -> None:
         if self.distance is not None and not DISTANCE_MIN_M <= self.distance < math.inf:
-            wanted = f"a positive number of metres, {DISTANCE_MIN_M:g} at least, not {self.distance}"
-            raise ValueError(f"the distance between drones has to be {wanted}")
+            raise ValueError(f"the distance is {self.distance}; it must be finite, and at least {DISTANCE_MIN_M:g} m")
         if not 1 <= self.downwash <= DOWNWASH_MAX:
-            raise ValueError(f"downwash has to be a number from 1 to {DOWNWASH_MAX:g}, not {self.downwash}")
+            raise ValueError(f"downwash is {self.downwash}; it must be a number from 1 to {DOWNWASH_MAX:g}")
         if self.downwash > 1 and (self.failures or self.obstacles):
-            raise ValueError("with downwash neither motors can fail nor obstacles be in the way")
+            raise ValueError("downwash cannot be combined with motor failures or obstacles")
 
     def check(self, names: Collection[str]) -> None:
         """Raise `ValueError` if a drone of `failures` is not among `names`."""
         for failure in self.failures:
             if failure.drone not in names:
-                raise ValueError(f"no drone is called {failure.drone!r}; there are: {', '.join(names)}")
+                raise ValueError(f"no drone is called {failure.drone!r}; the drones are {', '.join(names)}")

@@ -1,7 +1,7 @@
 """The geometric tracking controller on SE(3), for all drones at once.
 
-Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, with z up and all drones
-looking along x. The integral of position errors is that of Goodarzi, Lee, Lee, "Geometric nonlinear PID control of a
+Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, with z up and the front of
+all drones along x. The integral of position errors is that of Goodarzi, Lee, Lee, "Geometric nonlinear PID control of a
 quadrotor UAV on SE(3)", ECC 2013: a constant wind leaves no error. The drag of the planned velocity is fed forward. The
 controller does not know the wind.
 
@@ -25,12 +25,12 @@ _ATTITUDE = np.array([[280.0], [280.0], [40.0]])
 _RATES = np.array([[28.0], [28.0], [12.0]])
 """Gains per inertia: 1/s^2, 1/s. Turning about z is slow: the rotors' drag torques are small."""
 _INTEGRAL_MAX = 1.2
-"""m/s: bounds the integral. By `_INTEGRAL` it then compensates a wind of 35 m/s."""
+"""m/s: the bound of the integral. With the gain `_INTEGRAL` it compensates a wind of up to 35 m/s."""
 _SIDEWAYS_MAX = 9.0
 _UP_MIN, _UP_MAX = 0.4 * GRAVITY, 2.0 * GRAVITY
 """m/s^2, with gravity compensated: drones neither turn over nor fall freely."""
 _THRUST_MIN = 0.2
-"""Of the weight: without thrust a drone could not be turned, not even one that is upside down."""
+"""The least thrust, in weights: without thrust a drone cannot be turned, for example if it is upside down."""
 _TURN_MAX = 8.0
 """rad/s"""
 
@@ -46,7 +46,7 @@ class Controller:
         self._thrust_max = airframe.thrust_max
         self._least = _THRUST_MIN * airframe.mass * GRAVITY
         self._dt = dt
-        # Rows: errors of position and velocity, the integral, acceleration and velocity that are wanted.
+        # Rows: errors of position and velocity, the integral, desired acceleration and velocity.
         self._inputs = np.zeros((15, number))
         self._integral = self._inputs[6:9]
         one = np.eye(3)
@@ -55,7 +55,7 @@ class Controller:
         self._summing = np.hstack([_ERRORS_PER_VELOCITY * one, one]) * dt
         self._desired = np.zeros((5, 3, number))
         self._wrench = np.zeros((4, number))
-        # Vectors with their first two components once more behind the third: see `RigidBodies`.
+        # Vectors with their first two components repeated behind the third: see `RigidBodies`.
         self._up = np.zeros((5, number))
         self._up[2] = 1
         self._turn = np.zeros((5, number))
@@ -92,8 +92,8 @@ class Controller:
         np.copyto(thrusts, 0.0, where=idle)
         return np.asarray(thrusts)
 
-    def forget(self, drone: int) -> None:
-        """Forget the past of `drone`, whose state made no sense."""
+    def reset(self, drone: int) -> None:
+        """Reset the controller of `drone`, whose state was invalid."""
         self._inputs[:, drone] = 0
         self._up[:, drone] = [0, 0, 1, 0, 0]
 
@@ -125,6 +125,6 @@ class Controller:
 
 
 def _bound(values: Array, least: float, most: float) -> None:
-    """Clip in place: `np.clip` is slower on small arrays."""
+    """Clip in place; `np.clip` is slower on small arrays."""
     np.maximum(values, least, out=values)
     np.minimum(values, most, out=values)

@@ -1,4 +1,4 @@
-"""Points among others: how near any two are, and which are free."""
+"""Distances between points, and free points among others."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.maps.routes.wall_plan import WallPlan
 
 _STEPS = 8
-"""The number of steps, of half a distance each, in which free points are searched for in each direction."""
+"""The number of steps, of half a distance each, of the search for free points in each direction."""
 
 
 def nearest_two(points: Array) -> float:
@@ -29,9 +29,9 @@ def nearest_distances(points: Array, others: Array) -> Array:
 def free_point(
     wish: Array, taken: Array, radii: Array, ground: float, *, low: bool, floor_plan: WallPlan | None = None
 ) -> Array:
-    """Return `wish`, or the nearest point to it on a grid, that is `radii` (M,) away from `taken` (M, 3).
+    """Return the point nearest to `wish`, on a grid around it, that is `radii` (M,) away from `taken` (M, 3).
 
-    It is on the ground if `low`, else not much lower than `wish`. No wall of the `floor_plan` is between the two.
+    It is on the ground if `low`, else not much lower than `wish`. No wall of the `floor_plan` is between it and `wish`.
 
     Raises:
         ValueError: Walls leave no such point.
@@ -52,8 +52,8 @@ def free_point(
     if free.any():
         return np.asarray(spots[free.argmax()])
     if floor_plan is not None:
-        raise ValueError(f"there is no free place around ({wish[0]:.2f}, {wish[1]:.2f}), between the walls")
-    # No free point around: take one beyond all others, beside or above.
+        raise ValueError(f"there is no free place between the walls around ({wish[0]:.2f}, {wish[1]:.2f})")
+    # No free point on the grid: use a point beyond all others, beside or above.
     beyond = np.array([wish[0], wish[1], ground if low else wish[2]])
     side = 0 if low else 2
     beyond[side] = taken[:, side].max() + 2.001 * step

@@ -1,4 +1,4 @@
-"""The goals of a leg: the points that were asked for, or free points near them where an obstacle is in the way."""
+"""The goals of a leg: the given points, or free points near them if an obstacle is in the way."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ from robochoc.maps.routes.distances import SLACK_M, squashed
 from robochoc.maps.routes.wall_plan import WallPlan
 
 MARGIN_M = 0.1
-"""The margin that routes keep beyond the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone
-takes off into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`). Two drones may use it up towards each other.
+"""The margin of routes beyond the distance. Tracking errors use 1 cm of it in calm air, and 6 cm when a drone takes off
+into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`). Errors of two drones may add up.
 """
-_ALL_BUT = 0.999
-"""Of the distance between starts or goals: rounding must not make a route impossible."""
+_SHARE = 0.999
+"""The used share of the distance between starts or goals: rounding must not make a route impossible."""
 _STAGGER_S = 2.0
-"""The time between the first row's start and the last one's, at most."""
+"""The longest time between the starts of the first and the last row."""
 _ROW_S = 0.25
 _LOW_M = 1e-6
 
@@ -37,15 +37,15 @@ class Hazards:
     points: Array
     radii: Array
 
-    def meet(self, place: Array) -> bool:
-        """Return whether `place` is too near to one of them."""
+    def hits(self, place: Array) -> bool:
+        """Return whether `place` is too near to one of the points."""
         return bool((np.sqrt(np.square(self.points - place).sum(1)) < self.radii).any())
 
 
 class LegGoals:
-    """The `places` (N, 3) to fly to: the `goals`, or the `starts` of drones without a goal. Failed drones do not count.
+    """The destinations `places` (N, 3): the `goals`, or the `starts` of drones without a goal, except failed drones.
 
-    All distances are those of heights that are divided by `downwash`.
+    Heights are divided by `downwash` for all distances.
 
     Raises:
         ValueError: Two goals are nearer to each other than `distance`.
@@ -69,21 +69,21 @@ class LegGoals:
         self._distance = distance
         check_separation("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance, downwash)
 
-    def planned(self, starts: Array, hazards: Hazards | None = None) -> float:
-        """Return the distance that routes from `starts` (N, 3) keep: with the margin, or what places leave of it."""
+    def planned_distance(self, starts: Array, hazards: Hazards | None = None) -> float:
+        """Return the distance that routes from `starts` (N, 3) keep: with the margin, as far as places allow it."""
         leave = min(nearest_two(self._flat(starts[self.who])), nearest_two(self._flat(self.places[self.who])))
         if hazards is not None:
             apart = nearest_distances(self._flat(hazards.points), self._ends(starts))
             leave = min(leave, float(apart[apart >= self._distance].min(initial=np.inf)))
-        return max(self._distance, min(self._distance + MARGIN_M, _ALL_BUT * leave))
+        return max(self._distance, min(self._distance + MARGIN_M, _SHARE * leave))
 
     def give_way(
         self, hazards: Hazards, preferred: Array, ground: float, floor_plan: WallPlan | None = None
     ) -> list[tuple[int, str]]:
-        """Replace places that are not free; return which drones are moved, and what each does instead, in words.
+        """Replace places that are not free; return the affected drones, each with a description of the change.
 
-        Goals give way to hazards. Drones that only stay where they are give way to others' goals. Each gets the free
-        point that is nearest to its `preferred` one (N, 3), with no wall of the `floor_plan` in between.
+        Goals are moved away from hazards. Drones that stay in place are moved away from others' goals. Each gets the
+        free point nearest to its `preferred` point (N, 3), with no wall of the `floor_plan` in between.
 
         Raises:
             ValueError: Walls leave no free point.
@@ -93,14 +93,14 @@ class LegGoals:
         for number in self.who.tolist():
             goal, place = self.goals.get(number), self.places[number].copy()
             others = self.places[self.who[self.who != number]]
-            if goal is not None and hazards.meet(place):
+            if goal is not None and hazards.hits(place):
                 why = "something is there"
             elif (
                 goal is None
                 and nearest_distances(self._flat(place[None]), self._flat(self.places[going]))[0]
-                < needed(self._distance) - SLACK_M
+                < needed_distance(self._distance) - SLACK_M
             ):
-                why = "another one flies to where it is"
+                why = "another drone flies to its place"
             else:
                 continue
             low = place[2] <= ground + _LOW_M
@@ -124,8 +124,8 @@ class LegGoals:
         return squashed(points, self._downwash)
 
 
-def needed(distance: float) -> float:
-    """Return how far apart places must be so that drones keep `distance`: tracking is not exact."""
+def needed_distance(distance: float) -> float:
+    """Return the distance of places that lets drones keep `distance`, since tracking is not exact."""
     return distance + min(MARGIN_M, distance / 4)
 
 
@@ -133,7 +133,7 @@ def check_separation(
     what: str, names: Sequence[str], places: Mapping[int, Point], distance: float, downwash: float = 1.0
 ) -> None:
     """Raise `ValueError` if two of `places`, by drones' numbers, are too near to keep `distance`."""
-    least = needed(distance) - SLACK_M
+    least = needed_distance(distance) - SLACK_M
     if nearest_two(squashed(np.array([*places.values()]).reshape(-1, 3), downwash)) >= least:
         return
     places = {number: (x, y, z / downwash) for number, (x, y, z) in places.items()}
@@ -143,20 +143,16 @@ def check_separation(
         if gap < least:
             apart = f"{gap:.2f}" if gap >= DISTANCE_MIN_M else f"{gap:.1g}"
             asked = f"{distance:g} m are to be kept" + (
-                f", which takes {needed(distance):g} m" if gap >= distance - SLACK_M else ""
+                f", which requires {needed_distance(distance):g} m" if gap >= distance - SLACK_M else ""
             )
-            step = (
-                "ask for a smaller distance, or for a larger scale"
-                if distance > DISTANCE_MIN_M
-                else "ask for a larger scale"
-            )
+            step = "use a smaller distance, or a larger scale" if distance > DISTANCE_MIN_M else "use a larger scale"
             raise ValueError(
                 f"the {what} of {names[first]} and {names[second]} are {apart} m apart{heights}, and {asked}: {step}"
             )
 
 
 def start_delays(goals: Mapping[int, Goal], homes: Array) -> Array:
-    """Return delays (N,) in seconds: drones that land start first, then row by row, by the x of their homes."""
+    """Return delays (N,) in seconds: landing drones start first, then row by row, by the x of their homes."""
     lands = np.array([number in goals and goals[number].lands for number in range(len(homes))])
     _, rows = np.unique(homes[:, 0], return_inverse=True)
     turns = np.where(lands, 0, rows.reshape(-1) + bool(lands.any()))

@@ -1,7 +1,7 @@
 """Rigid bodies: all drones in one step, component by component, so that numpy works along the drones.
 
-The integrator is of second order: motors exactly (their commands are constant within a step), body rates by the
-midpoint rule, rotations by the Cayley map, which keeps them orthonormal up to rounding (Hairer, Lubich, Wanner,
+The integrator is of second order. It computes motors exactly (their commands are constant within a step), body rates by
+the midpoint rule, rotations by the Cayley map, which keeps them orthonormal up to rounding (Hairer, Lubich, Wanner,
 "Geometric Numerical Integration", 2006, Section IV.8), positions with the mean thrust of the step, and drag implicitly.
 """
 
@@ -17,10 +17,10 @@ from robochoc.flight.quadrotor.airframe import GRAVITY, Airframe, Array
 Mask = npt.NDArray[np.bool_]
 
 IMPACT_MAX_M_S = 2.0
-"""A drone that touches the ground faster, or tilted by more than `TILT_MAX_COSINE` says, does not fly again."""
+"""A drone that touches the ground at a higher speed, or with a tilt beyond `TILT_MAX_COSINE`, does not fly again."""
 TILT_MAX_COSINE = math.cos(math.radians(45))
 _LEVELLING_S = 0.1
-"""The time constant with which its feet level a drone that stands."""
+"""The time constant with which a standing drone becomes level."""
 
 
 class RigidBodies:
@@ -31,8 +31,8 @@ class RigidBodies:
         axes: (3, 3, N): `axes[k]` is the body's axis k in the world.
         rates: (3, N), rad/s, about the body's axes.
         thrusts: (4, N), N, of the rotors.
-        stands: (N,): held by the ground.
-        fallen: (N,): crashed; these are held by the ground for good.
+        stands: (N,): on the ground.
+        fallen: (N,): crashed; these stay on the ground permanently.
         grounds: (N,): the height of the ground below each.
     """
 
@@ -40,7 +40,7 @@ class RigidBodies:
         number = len(homes)
         self.state = np.zeros((6, number))
         self.state[:3] = homes.T
-        # The first two axes once more behind the third: a cross product is then two products of slices.
+        # The first two axes are repeated behind the third: a cross product is then two products of slices.
         self._axes = np.zeros((5, 3, number))
         self._axes[[0, 1, 2, 3, 4], [0, 1, 2, 0, 1]] = 1
         self.axes = self._axes[:3]
@@ -67,7 +67,7 @@ class RigidBodies:
 
     @property
     def wrapped_axes(self) -> Array:
-        """(5, 3, N): the axes, the first two once more behind the third."""
+        """(5, 3, N): the axes, with the first two repeated behind the third."""
         return self._axes
 
     def step(self, command: Array, air: Array) -> None:
@@ -84,7 +84,7 @@ class RigidBodies:
             self._touch(low, before, axes_before)
 
     def stop_motor(self, drone: int, motor: int) -> None:
-        """Stop a motor: it gives no thrust from now on. A drone on the ground does not fly again."""
+        """Stop a motor, which then has no thrust. A drone on the ground does not fly again."""
         self.motors_running[motor, drone] = 0
         self.fallen[drone] |= self.stands[drone]
 
@@ -111,7 +111,7 @@ class RigidBodies:
         return np.asarray(mean)
 
     def _turn(self, torque: Array) -> None:
-        """Advance by Euler's equation with the midpoint rule, then turn by the rates in the middle of the step."""
+        """Advance by Euler's equation with the midpoint rule, then rotate by the rates in the middle of the step."""
         dt, spin = self._dt, self._turning
         push = torque * self._per_inertia
         spin[:3] = self.rates
@@ -145,7 +145,7 @@ class RigidBodies:
         velocity += push
 
     def _touch(self, low: Mask, before: Array | None, axes_before: Array | None) -> None:
-        """Hold on the ground all drones that are too low."""
+        """Keep drones that are too low on the ground."""
         hit = low & ~self.stands & ~self.fallen
         if hit.any():
             self.fallen |= hit & (

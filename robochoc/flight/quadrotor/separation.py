@@ -1,9 +1,9 @@
-"""The smallest distance that two drones ever have, measured at every step of a simulation.
+"""The smallest distance between any two drones, measured at every step of a simulation.
 
-Pairs are listed as Verlet does ("Computer 'experiments' on classical fluids", 1967): a pair is on the list if it is at
+Pairs are listed as by Verlet ("Computer 'experiments' on classical fluids", 1967): a pair is on the list if it is at
 most `_REACH_M` further apart than the nearest pair so far. Until one of the drones has moved by half of that, no other
-pair can have come nearer; then the list is made anew. So most steps measure a few pairs only, and the result is still
-the minimum over all pairs and steps.
+pair can be nearer; then the list is computed again. So most steps measure few pairs only, and the result is still the
+minimum over all pairs and steps.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from robochoc.maps.routes.distances import squashed
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6
-"""More than the rounding of the list's distances, which are computed by scalar products."""
+"""A bound of the rounding errors of the list's distances, which are computed by scalar products."""
 
 
 class SeparationMonitor:
-    """Measures all drones' distances at every step. Pairs with a drone that falls, or has fallen, count separately.
+    """Measures all drones' distances at every step. Pairs with a falling or fallen drone are counted separately.
 
-    Heights are divided by `downwash` before.
+    Heights are divided by `downwash` for distances.
     """
 
     def __init__(self, number: int, downwash: float = 1.0) -> None:
@@ -62,7 +62,7 @@ class SeparationMonitor:
 
     @staticmethod
     def _moved(places: Array, anchor: Array) -> bool:
-        """Return whether pairs that are not on the list may count by now."""
+        """Return whether pairs that are not on the list may be nearest now."""
         way = places - anchor
         way *= way
         return bool((way[0] + way[1] + way[2]).max() >= (_REACH_M / 2) ** 2)

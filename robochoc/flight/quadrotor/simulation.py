@@ -1,8 +1,8 @@
-"""The simulation's loop: setpoints, the rotors' commands, the bodies' motion, the log.
+"""The simulation's loop: setpoints, the rotors' commands, the bodies' motion, wind, the log.
 
-The step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from one with
-ten times as many steps between the same commands, and a body that tumbles freely at one turn a second for 10 s keeps
-the energy of its spin to 3e-5 (`tests/unit/flight/test_rigid_bodies.py`). Half the step takes twice the time.
+The step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from a flight
+with ten times as many steps between the same commands, and a body that tumbles freely at one turn a second for 10 s
+keeps the energy of its rotation to 3e-5 (`tests/unit/flight/test_rigid_bodies.py`). Half the step takes twice the time.
 """
 
 from __future__ import annotations
@@ -22,22 +22,20 @@ from robochoc.flight.quadrotor.separation import SeparationMonitor
 from robochoc.flight.quadrotor.trajectory import Trajectory
 
 _CORRELATION_S = 1.5
-
-
 STEPS_PER_SAMPLE = 4
 DT = 1 / (SAMPLE_RATE_HZ * STEPS_PER_SAMPLE)
 _CUT_OFF = math.cos(math.radians(60))
-"""A drone whose motor has stopped has the others switched off once it is tilted further."""
+"""The tilt from which on the other motors of a drone with a stopped motor are switched off."""
 _PRESS_M = 0.05
-"""The setpoint of a drone right above its landing point is so far below the ground, so that it touches it."""
+"""The depth below the ground of the setpoint of a landing drone, so that it touches the ground."""
 _ABOVE_M = 0.003
 _HOP_M = (0.01, 0.08)
-"""A drone with setpoints along the ground flies so far above it, at least and at most."""
+"""The least and the greatest height of a drone with setpoints along the ground."""
 _HOP = 0.8
-"""The share of the routes' spare distance that this may take: another drone may be right above."""
+"""The share of the routes' spare distance for this height: another drone may be directly above."""
 _TOUCH_M = 1e-6
 _BOUNDS = 1e6
-"""m and m/s: a state beyond is none."""
+"""m and m/s: the bound of valid states."""
 
 
 class QuadrotorSimulation:
@@ -45,11 +43,10 @@ class QuadrotorSimulation:
 
     Args:
         names: The drones' names.
-        homes: Where they are in the beginning.
+        homes: Their places in the beginning.
         ground: The height of the ground.
         conditions: Wind and failures.
-        floor: The height of the floor below a place, on which drones fall that cannot fly any more. None: it is not
-            known there.
+        floor: Returns the height of the floor below a place, onto which failed drones fall; None if it is not known.
     """
 
     def __init__(
@@ -82,7 +79,7 @@ class QuadrotorSimulation:
         self._steps = 0
         self._places: list[Array] = []
         self._axes: list[Array] = []
-        self._note()
+        self._sample()
         self.separation.observe(self._bodies.state[:3], 0.0)
 
     @property
@@ -97,16 +94,16 @@ class QuadrotorSimulation:
 
     @property
     def is_sampled(self) -> bool:
-        """Return whether the present state has just been logged."""
+        """Whether the present state has just been logged."""
         return self._steps % STEPS_PER_SAMPLE == 0
 
     @property
     def falling(self) -> Mask:
-        """The drones on their way down."""
+        """The drones that are falling."""
         return self.failed & ~self._bodies.fallen
 
     def settled(self, near: float, slow: float) -> bool:
-        """Return whether no drone falls, and all others are so near to their setpoints and so slow."""
+        """Return whether no drone is falling, and all others are within `near` of their setpoints and below `slow`."""
         gaps = np.square(self.setpoints[:3] - self._bodies.state[:3]).sum(0)
         speeds = np.square(self._bodies.state[3:]).sum(0)
         low = self.setpoints[2] <= self._ground + _TOUCH_M
@@ -119,11 +116,11 @@ class QuadrotorSimulation:
         return np.where(self.failed, 0.0, gaps)
 
     def advance(self, trajectory: Trajectory | None = None, *, late: bool = False) -> None:
-        """Advance by one step along `trajectory`. If `late`, drones that are to land do so where they are."""
+        """Advance by one step along `trajectory`. If `late`, landing drones land in place."""
         while self._due and self._due[-1].at_s <= self.now_s:
             self._fail(self._due.pop())
         if trajectory is not None:
-            trajectory.refer()
+            trajectory.update_setpoints()
             trajectory.advance(DT)
         bodies = self._bodies
         low = self.setpoints[2] <= self._ground + _TOUCH_M
@@ -131,19 +128,19 @@ class QuadrotorSimulation:
         idle = low & bodies.stands & ~moving
         low &= ~idle
         idle |= self._off
-        wanted = self._lowest(low, moving, late=late) if low.any() else self.setpoints
+        wanted = self._adjusted_setpoints(low, moving, late=late) if low.any() else self.setpoints
         bodies.step(self._controller.command(bodies, wanted, idle), self._wind.air())
         self._steps += 1
         if not bool(np.abs(bodies.state).max() < _BOUNDS):  # true of nan as well
-            self._rescue()
+            self._ground_invalid()
         if self.failures or bodies.fallen.any():
-            self._look_after_the_lost()
+            self._update_failed()
         self.separation.observe(bodies.state[:3], self.now_s)
         if self.is_sampled:
-            self._note()
+            self._sample()
 
     def set_spare_distance(self, spare: float) -> None:
-        """Set how many metres routes keep besides the distance, from now on."""
+        """Set the margin of routes beyond the distance, in metres."""
         self.hop_m = min(max(_HOP * spare, _HOP_M[0]), _HOP_M[1])
 
     def log_event(self, drone: int, what: str) -> None:
@@ -156,12 +153,12 @@ class QuadrotorSimulation:
         positions = np.ascontiguousarray(np.stack(self._places).transpose(0, 2, 1))
         return times, positions, quaternions(np.stack(self._axes).transpose(0, 3, 1, 2))
 
-    def _note(self) -> None:
+    def _sample(self) -> None:
         self._places.append(self._bodies.state[:3].copy())
         self._axes.append(self._bodies.axes.copy())
 
-    def _lowest(self, low: Mask, moving: Mask, *, late: bool) -> Array:
-        """Return the setpoints, with those of the `low` drones moved off the ground, or below it to land."""
+    def _adjusted_setpoints(self, low: Mask, moving: Mask, *, late: bool) -> Array:
+        """Return the setpoints, with those of the `low` drones moved above the ground, or below it for landing."""
         off = np.square(self.setpoints[:2] - self._bodies.state[:2]).sum(0)
         lands = low & ~moving & (late | (off < _ABOVE_M**2))
         wanted = self.setpoints.copy()
@@ -172,17 +169,17 @@ class QuadrotorSimulation:
         drone = self._names.index(failure.drone)
         self._bodies.stop_motor(drone, failure.motor)
         if not self.failed[drone]:
-            self._lose(drone, f"motor {failure.motor} has stopped")
+            self._mark_failed(drone, f"motor {failure.motor} has stopped")
             self._down[drone] = self._bodies.fallen[drone]
 
-    def _lose(self, drone: int, why: str) -> None:
+    def _mark_failed(self, drone: int, why: str) -> None:
         self.failed[drone] = True
         self._off |= self._bodies.fallen
         self.separation.exclude(self.failed)
         self.failures.append((drone, why, self.now_s))
         self.log_event(drone, why)
 
-    def _look_after_the_lost(self) -> None:
+    def _update_failed(self) -> None:
         bodies = self._bodies
         self._off |= self.failed & (bodies.axes[2, 2] < _CUT_OFF)
         for drone in np.flatnonzero(self.failed & ~self._down).tolist():
@@ -193,21 +190,26 @@ class QuadrotorSimulation:
             if self.failed[drone]:
                 self.log_event(drone, "hits the ground")
             else:
-                self._lose(drone, "has hit the ground")
+                self._mark_failed(drone, "has hit the ground")
 
-    def _rescue(self) -> None:
-        """Put drones whose state is beyond all bounds on the ground, below their last logged position."""
+    def _ground_invalid(self) -> None:
+        """Put drones with an invalid state on the ground, below their last logged position."""
         bodies = self._bodies
         for drone in np.flatnonzero(~(np.abs(bodies.state) < _BOUNDS).all(0)).tolist():
             bodies.lay(drone, self._places[-1][:, drone])
-            self._controller.forget(drone)
+            self._controller.reset(drone)
             self._down[drone] = self._off[drone] = True
             if not self.failed[drone]:
-                self._lose(drone, "has got out of all bounds")
+                self._mark_failed(drone, "has left the bounds of the simulation")
 
 
 class Wind:
-    """The velocity of the air around each of `number` drones: `mean` and gusts of standard deviation `gusts`, m/s."""
+    """The velocity of the air around each of `number` drones: `mean` and gusts of standard deviation `gusts`, m/s.
+
+    Gusts are first-order Gauss-Markov processes, like the longitudinal gusts of the Dryden model (MIL-F-8785C, Section
+    3.7.1.2). Ours: all three directions have such gusts, with one correlation time, and each drone has its own. Real
+    air is more alike over a metre or two; independent gusts are the harder case for the distances between drones.
+    """
 
     def __init__(self, mean: Point, gusts: float, seed: int, number: int, dt: float) -> None:
         self._mean = np.array(mean, dtype=np.float64)[:, None]
@@ -228,7 +230,7 @@ class Wind:
 def quaternions(axes: Array) -> Array:
     """Return unit quaternions x, y, z, w (..., 4) of rotations (..., 3, 3); `[..., k, :]` is the turned axis k.
 
-    After Shepperd, "Quaternion from rotation matrix", 1978: of four ways, the one without cancellation.
+    After Shepperd, "Quaternion from rotation matrix", 1978: of four formulas, the one without cancellation.
     """
     xx, yy, zz = axes[..., 0, 0], axes[..., 1, 1], axes[..., 2, 2]
     squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)

@@ -1,9 +1,9 @@
 """A trajectory: routes on a clock that can be slowed to a stop.
 
-All drones share one clock, so the distances of the routes hold however it runs. It stops smoothly: over `STOP_S` its
-rate goes from 1 to 0 by a cubic, whose slope is at most 1.5 / `STOP_S`. At the planned 2 m/s this takes 3.75 m/s^2
-besides a quarter of the planned acceleration, well within what a drone can do, and no more way than that of
-`STOP_S` / 2 at that speed.
+All drones share one clock, so the distances of the routes are kept for any rate of the clock. It stops smoothly: over
+`STOP_S` its rate falls from 1 to 0 by a cubic, whose slope is at most 1.5 / `STOP_S`. At the planned 2 m/s this
+requires 3.75 m/s^2 besides a quarter of the planned acceleration, well within the limits of a drone, and a length of at
+most `STOP_S` / 2 at that speed.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy.typing as npt
 from robochoc.flight.coordination.motion import RoutePlan
 from robochoc.flight.quadrotor.airframe import Array
 
-_LOOK_S = 0.05
-"""The step at which trajectories are sampled: at 2 m/s a drone flies 0.1 m meanwhile."""
+_SAMPLE_S = 0.05
+"""The time between samples of a trajectory: at 2 m/s a drone flies 0.1 m in a step."""
 _LOOK_M = 0.1
 
 
@@ -33,7 +33,7 @@ class Trajectory:
         self.stopping = False
         self._setpoints = setpoints
         self._s = 0.0
-        self._begun = 0.0
+        self._stop_begins_s = 0.0
         self._slow = 0.0
         self._rests = False
         self._everybody = len(who) == setpoints.shape[1]
@@ -44,15 +44,15 @@ class Trajectory:
         return self._s
 
     @property
-    def over(self) -> bool:
-        """Return whether no setpoint moves any more: the end is reached, or the clock has stopped."""
+    def has_ended(self) -> bool:
+        """Whether no setpoint moves any more: the end is reached, or the clock has stopped."""
         return self._s >= self.plan.duration_s or self._slow >= STOP_S
 
     def stop(self) -> None:
         """Begin to slow the clock."""
         if not self.stopping:
             self.stopping = True
-            self._begun = self._s
+            self._stop_begins_s = self._s
 
     def advance(self, dt: float) -> None:
         """Advance by `dt` seconds of real time."""
@@ -62,13 +62,13 @@ class Trajectory:
             self._slow = min(self._slow + dt, STOP_S)
             share = self._slow / STOP_S
             way = share - share**3 + share**4 / 2
-            self._s = min(self._begun + STOP_S * way, self.plan.duration_s)
+            self._s = min(self._stop_begins_s + STOP_S * way, self.plan.duration_s)
 
-    def refer(self) -> Array:
-        """Return the setpoints (9, N) of now: positions, velocities and accelerations."""
+    def update_setpoints(self) -> Array:
+        """Update and return the present setpoints (9, N): positions, velocities and accelerations."""
         if self._rests:
             return self._setpoints
-        self._rests = self.over
+        self._rests = self.has_ended
         share = self._slow / STOP_S
         rate = 1 - share * share * (3 - 2 * share)
         motion = self.plan.at(self._s)
@@ -92,7 +92,7 @@ class Trajectory:
 
 
 class ObstacleEncounter(NamedTuple):
-    """A drone's trajectory is nearer than `keep` to an obstacle, last at second `until` of the trajectory."""
+    """A drone's trajectory passes an obstacle nearer than `keep`, for the last time at second `until`."""
 
     obstacle: int
     drone: int
@@ -101,10 +101,10 @@ class ObstacleEncounter(NamedTuple):
 
 
 def encounters(trajectory: Trajectory, obstacles: dict[int, Array], keep: float) -> list[ObstacleEncounter]:
-    """Return all encounters with `obstacles`, which are given by their numbers."""
+    """Return all encounters with `obstacles`, given by number, which the planner does not know."""
     if not obstacles:
         return []
-    times = np.append(np.arange(0.0, trajectory.plan.duration_s, _LOOK_S), trajectory.plan.duration_s)
+    times = np.append(np.arange(0.0, trajectory.plan.duration_s, _SAMPLE_S), trajectory.plan.duration_s)
     places = np.stack([trajectory.plan.at(float(s)).position for s in times])
     found = []
     for number, obstacle in obstacles.items():

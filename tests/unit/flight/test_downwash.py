@@ -100,7 +100,7 @@ def test_a_drone_flies_right_over_another_one_only_without_it(downwash: float, *
     flight = Flight(["a", "b"], homes, FlightConditions(distance=0.5, downwash=downwash))
     flight.fly("up", {0: Goal((0.0, 0.0, 2.7)), 1: Goal((1.0, 0.0, 2.0))})
     flight.fly("over", {0: Goal((2.0, 0.0, 2.7))})
-    flown = flight.flown()
+    flown = flight.log()
     assert flown.nearest is not None
     assert flown.nearest.distance_m >= 0.5
     assert (apart(flown.positions, 2.0) < 0.5) == over
@@ -115,16 +115,16 @@ def test_goals_too_near_above_each_other_are_refused() -> None:
 
 @looped("downwash", [0.5, float("nan"), float("inf"), 101])
 def test_a_factor_makes_a_drone_taller_not_flatter(downwash: float) -> None:
-    with pytest.raises(ValueError, match="downwash has to be a number from 1 to 100"):
+    with pytest.raises(ValueError, match="it must be a number from 1 to 100"):
         FlightConditions(downwash=downwash)
 
 
 def test_nothing_else_may_be_in_the_way() -> None:
     tall = FlightConditions(downwash=2.0)
-    with pytest.raises(ValueError, match="neither motors can fail nor obstacles be in the way"):
+    with pytest.raises(ValueError, match="downwash cannot be combined with motor failures or obstacles"):
         replace(tall, obstacles=((1.0, 1.0, 1.0),))
-    with pytest.raises(ValueError, match="neither motors can fail nor obstacles be in the way"):
+    with pytest.raises(ValueError, match="downwash cannot be combined with motor failures or obstacles"):
         replace(tall, failures=(MotorFailure("a", 1.0),))
     flight = Flight(["a"], np.zeros((1, 3)), tall)
-    with pytest.raises(ValueError, match="nothing may be in the way"):
+    with pytest.raises(ValueError, match="downwash cannot be combined with obstacles"):
         flight.fly("", {0: Goal((0.0, 0.0, 2.0))}, blocks=[(1.0, 1.0, 1.0)])

@@ -18,7 +18,7 @@ from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import GRAVITY
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
-from robochoc.flight.reports import Blocked, OutOfOrder
+from robochoc.flight.reports import BlockedReport, OutOfOrderReport
 from tests.support.cases import looped
 from tests.support.flights import planar
 
@@ -122,7 +122,7 @@ def test_wind_and_gusts_are_withstood(four: Mission) -> None:
 def test_a_storm_ends_and_is_told(wind: float) -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions(wind=(wind, 0.0, 0.0), gusts=wind))
     assert flight.fly("storm", UP) == ()
-    flown = flight.flown()
+    flown = flight.log()
     assert np.isfinite(flown.positions).all()
     assert np.isfinite(flown.attitudes).all()
     assert flown.events
@@ -136,10 +136,10 @@ def test_who_is_out_of_all_bounds_is_given_up() -> None:
     flight.fly("up", UP)
     simulation._bodies.rates[:, 0] = math.nan  # noqa: SLF001
     (report,) = flight.fly("and on", {1: Goal((2.0, 0.0, 1.0))}, stop_on_report=True)
-    assert isinstance(report, OutOfOrder)
-    assert (report.drone, report.why) == ("a", "has got out of all bounds")
+    assert isinstance(report, OutOfOrderReport)
+    assert (report.drone, report.why) == ("a", "has left the bounds of the simulation")
     flight.fly("at last", {1: Goal((2.0, 0.0, 1.0))})
-    flown = flight.flown()
+    flown = flight.log()
     assert np.isfinite(flown.positions).all()
     assert flown.errors_m[1] < 0.01
     assert math.isnan(flown.errors_m[0])
@@ -176,16 +176,16 @@ def test_a_failure_is_reported_and_the_next_leg_keeps_away() -> None:
         ["a", "b", "c"], homes, FlightConditions(failures=(MotorFailure("b", 2.0, 3), MotorFailure("c", 900.0)))
     )
     (report,) = flight.fly("up", goals, stop_on_report=True)
-    assert isinstance(report, OutOfOrder)
+    assert isinstance(report, OutOfOrderReport)
     assert (report.drone, report.why) == ("b", "motor 3 has stopped")
     assert report.at_s == pytest.approx(2, abs=DT)
-    stopped = flight.flown()
+    stopped = flight.log()
     assert 0.1 < stopped.errors_m[0] < 1.9
     assert stopped.times[-1] < 6
     lies = stopped.positions[-1, 1]
     spot = (float(lies[0]), float(lies[1]) + 0.1, 0.0)
     assert flight.fly("down", {0: Goal(spot, lands=True), 1: Goal((1.0, 0.0, 3.0))}, stop_on_report=True) == ()
-    flown = flight.flown()
+    flown = flight.log()
     assert math.isnan(flown.errors_m[1])
     assert 0.3 < flown.errors_m[0] < 2
     assert flown.positions[-1, 0, 2] == 0
@@ -210,7 +210,7 @@ def test_nobody_slides_along_the_ground() -> None:
 def test_a_motor_that_stops_on_the_ground_keeps_its_drone_there() -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions(failures=(MotorFailure("a", 0.5),)))
     flight.fly("up", UP)
-    flown = flight.flown()
+    flown = flight.log()
     assert (flown.positions[:, 0] == PAIR[0]).all()
     assert whats(flown) == [(0, "motor 0 has stopped")]
     assert flown.errors_m[1] < 0.01
@@ -225,12 +225,12 @@ def test_an_obstacle_is_seen_reported_and_kept_away_from(obstacle: Point, start:
     goals = {0: Goal((0.0, 0.0, 3.0)), 1: Goal((2.0, 0.0, 3.0))}
     flight = Flight(["a", "b"], homes, FlightConditions(obstacles=(obstacle,)))
     (report,) = flight.fly("up", goals, stop_on_report=True)
-    assert isinstance(report, Blocked)
+    assert isinstance(report, BlockedReport)
     assert (report.drone, report.place) == ("a", obstacle)
-    stopped = flight.flown()
+    stopped = flight.log()
     assert stopped.errors_m[0] > 0.1
     assert flight.fly("again", goals, stop_on_report=True) == ()
-    flown = flight.flown()
+    flown = flight.log()
     assert np.linalg.norm(flown.positions - obstacle, axis=2).min() >= 0.5
     assert flown.errors_m[1] < 0.01
     assert flown.errors_m[0] < 1.1
@@ -243,7 +243,7 @@ def test_without_heed_a_blocked_drone_hovers_where_it_stopped_and_the_others_go_
     for blocked in (True, False):
         flight = Flight(["a", "b"], PAIR, FlightConditions(obstacles=obstacles[not blocked :]))
         assert flight.fly("up", {0: Goal((0.0, 0.0, 3.0)), 1: Goal((0.0, 0.0, 1.5))}) == ()
-        flown_by[blocked] = flight.flown()
+        flown_by[blocked] = flight.log()
     flown = flown_by[True]
     assert [what.split()[0] for _, what in whats(flown)] == ["sees", "hovers"]
     assert flown.errors_m[0] > 0.5
@@ -261,14 +261,14 @@ def test_without_heed_a_blocked_drone_hovers_where_it_stopped_and_the_others_go_
 def test_legs_follow_each_other_and_who_has_no_goal_stays() -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions())
     flight.fly("one", {0: Goal((0.0, 0.0, 2.0))})
-    middle = flight.flown()
+    middle = flight.log()
     assert middle.errors_m.tolist() == [pytest.approx(0, abs=0.01), 0]
     assert (middle.positions[:, 1] == PAIR[1]).all()
-    again = flight.flown()
+    again = flight.log()
     assert same(middle, again)
     flight.fly("two", {1: Goal((0.0, 0.0, 3.0)), 0: Goal((2.0, 0.0, 0.0), lands=True)})
     flight.fly("three", {0: Goal((2.0, 0.0, 1.0))})
-    flown = flight.flown()
+    flown = flight.log()
     assert flown.errors_m.max() < 0.01
     assert least(flown) >= 0.5
     ends = [leg.ends_s for leg in flown.legs]
@@ -280,7 +280,7 @@ def test_the_distance_is_less_where_places_are_nearer() -> None:
     homes = np.array([[0.0, 0, 0], [0.4, 0, 0]])
     flight = Flight(["a", "b"], homes, FlightConditions())
     flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.3, 0.0, 1.0))})
-    flown = flight.flown()
+    flown = flight.log()
     assert flown.distance == pytest.approx(0.24)
     assert flown.errors_m.max() < 0.01
     assert least(flown) >= flown.distance
@@ -292,11 +292,11 @@ def test_goals_that_are_too_near_are_refused() -> None:
         flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.5, 0.0, 1.0))})
     with pytest.raises(ValueError, match=r"the homes of a and b are 2\.00 m apart"):
         Flight(["a", "b"], PAIR, FlightConditions(distance=2.5))
-    with pytest.raises(ValueError, match="no number 2"):
+    with pytest.raises(ValueError, match="there is no drone with the number 2"):
         flight.fly("up", {2: Goal((0.0, 0.0, 1.0))})
     with pytest.raises(ValueError, match="no drones"):
         Flight([], np.zeros((0, 3)), FlightConditions())
-    with pytest.raises(ValueError, match="no drone is called 'c'; there are: a, b"):
+    with pytest.raises(ValueError, match="no drone is called 'c'; the drones are a, b"):
         Flight(["a", "b"], PAIR, FlightConditions(failures=(MotorFailure("c", 1.0),)))
 
 
@@ -304,7 +304,7 @@ def test_who_has_no_goal_gives_way_to_goals_that_leave_no_room() -> None:
     flight = Flight(["a", "b"], np.array([[0.0, 0, 0], [2, 0, 0]]), FlightConditions())
     flight.fly("up", {0: Goal((0.0, 0.0, 2.0))})
     flight.fly("beside", {1: Goal((0.5, 0.0, 2.0))})
-    flown = flight.flown()
+    flown = flight.log()
     assert [what.split()[0] for _, what in whats(flown)] == ["hovers"]
     assert least(flown) >= flown.distance == 0.5
 
@@ -322,16 +322,16 @@ def test_refusals_of_the_plan_name_drones() -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions())
     everybody = np.arange(2)
     assert flight._refusal(TooCloseError(1, 2, 0.1234, "goal"), everybody) == (  # noqa: SLF001 - places are checked before
-        "b and something that is in the way are to end only 0.123 m from each other"
+        "b and an obstacle are to end only 0.123 m from each other"
     )
-    assert flight._refusal(NoRouteError([0, 1]), everybody).startswith("there is no way for a, b: ")  # noqa: SLF001
+    assert flight._refusal(NoRouteError([0, 1]), everybody).startswith("there is no route for a, b: ")  # noqa: SLF001
     for drones, past in (([0], "a gets past the others"), ([0, 1], "a, b get past each other")):
         refusal = flight._refusal(NoRouteError(drones, indoors=True), everybody)  # noqa: SLF001
         assert refusal.startswith(f"no order of flying was found in which {past} between the walls: ")
 
 
 def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
-    with pytest.raises(ValueError, match=r"1,001 drones are more than can be flown at a time \(1,000\)"):
+    with pytest.raises(ValueError, match=r"1,001 drones, more than the maximum of 1,000"):
         Flight(["a"] * 1001, np.zeros((1001, 3)), FlightConditions())
     with pytest.raises(ValueError, match=r"the homes of a and b are 1e-11 m apart, and 0\.01 m .* a larger scale$"):
         Flight(["a", "b"], PAIR * 5e-12, FlightConditions())
@@ -340,12 +340,12 @@ def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
     with pytest.raises(ValueError, match="an obstacle: the place"):
         Flight(["a", "b"], PAIR, FlightConditions(obstacles=((0.0, 0.0, 1e200),)))
     flight = Flight(["a", "b"], PAIR, FlightConditions())
-    with pytest.raises(ValueError, match=r"b would have 5,000 m to fly, and 2,000 m is the most"):
+    with pytest.raises(ValueError, match=r"b would have to fly 5,000 m, more than the maximum of 2,000 m"):
         flight.fly("up", {1: Goal((2.0, 0.0, 5000.0))})
-    with pytest.raises(ValueError, match=r"of 1,000 drones 100 s are the most"):
+    with pytest.raises(ValueError, match=r"the limit for 1,000 drones is 100 s"):
         check_length(1000, 101.0)
     flight.fly("up", UP)
-    assert flight.flown().errors_m.max() < 0.01
+    assert flight.log().errors_m.max() < 0.01
 
 
 def test_far_from_the_origin_drones_fly_as_near_it() -> None:
@@ -354,23 +354,23 @@ def test_far_from_the_origin_drones_fly_as_near_it() -> None:
     near.fly("up", UP)
     places = [(number, goal.at) for number, goal in UP.items()]
     far.fly("up", {number: Goal((x + 4e5, y + 5.5e6, z + 100)) for number, (x, y, z) in places})
-    assert far.flown().positions - away == pytest.approx(near.flown().positions, abs=1e-6)
-    assert far.flown().errors_m == pytest.approx(near.flown().errors_m, abs=1e-6)
+    assert far.log().positions - away == pytest.approx(near.log().positions, abs=1e-6)
+    assert far.log().errors_m == pytest.approx(near.log().errors_m, abs=1e-6)
 
 
 @looped(
     ("wrong", "why"),
     [
-        ({"distance": 0.0}, "positive"),
-        ({"distance": math.nan}, "positive"),
-        ({"distance": 1e-9}, "0.01 at least"),
+        ({"distance": 0.0}, "it must be finite, and at least"),
+        ({"distance": math.nan}, "it must be finite, and at least"),
+        ({"distance": 1e-9}, "at least 0.01 m"),
         ({"gusts": -1.0}, "gusts"),
         ({"gusts": math.inf}, "gusts"),
         ({"wind": (0.0, math.nan, 0.0)}, "finite"),
         ({"wind": (1e9, 0.0, 0.0)}, "faster"),
         ({"obstacles": ((0.0, 0.0, math.inf),)}, "finite"),
         ({"seed": -1}, "seed"),
-        ({"failures": (MotorFailure("a", -1.0),)}, "second 0"),
+        ({"failures": (MotorFailure("a", -1.0),)}, "a motor stops at second -1"),
         ({"failures": (MotorFailure("a", 1.0, 4),)}, "no motor 4"),
     ],
 )

@@ -139,12 +139,14 @@ def test_who_fails_falls_to_the_floor_below_and_is_flown_around(tmp_path: Path) 
 def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
     shut = {at: kind for at, kind in FLOORS.items() if at[2] != 2 or at[:2] == (7, 3)}
     team, ground = floors(tmp_path, shut, radius=0.3, at="1,1,0.5 2,1,0.5")
-    with pytest.raises(ValueError, match=r"no way around the walls from \(1.00, 1.00, 0.50\) to \(1.00, 1.00, 2.00\)"):
+    with pytest.raises(
+        ValueError, match=r"no route around the walls from \(1.00, 1.00, 0.50\) to \(1.00, 1.00, 2.00\)"
+    ):
         fly(sent(team, ground, (1, 1, 2), (2, 1, 0.5)))
     team, ground = floors(tmp_path)
-    with pytest.raises(ValueError, match=r"Robot2 is to be at \(1.50, 0.50, 1.00\), in a wall"):
+    with pytest.raises(ValueError, match=r"the place of Robot2, \(1.50, 0.50, 1.00\), is in a wall"):
         fly(sent(team, ground, (3.5, 0.5, 0.5), (1.5, 0.5, 1)))
-    with pytest.raises(ValueError, match=r"0.5 m on it, not 2 m"):
+    with pytest.raises(ValueError, match=r"a map with walls has the scale 0.5 m"):
         mission_of(
             Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
             team,

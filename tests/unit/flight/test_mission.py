@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.flight.crafts import Craft, crafts_of
-from robochoc.flight.layout import Axis, layout_of
+from robochoc.flight.layout import BoxAxis, layout_of
 from robochoc.flight.mission import VAST_M, Mission, mission_of
 from robochoc.model.expression import Apply, Constant, Name
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
@@ -144,26 +144,26 @@ def test_a_place_that_is_not_defined_is_known_by_the_name() -> None:
 
 @given(st.lists(st.integers(-5000, 5000), min_size=1), st.integers(2, 40), st.integers(2, 40), st.floats(-9, 9))
 def test_an_axis_goes_both_ways(values: list[int], most: int, scaled: int, cell: float) -> None:
-    axis = Axis.over("x", values, most=most, scaled=scaled)
+    axis = BoxAxis.spanning("x", values, most=most, scaled=scaled)
     assert axis.at(axis.value(cell)) == pytest.approx(cell)
     assert [axis.at(axis.first), axis.at(axis.last)] == [axis.low, axis.high]
 
 
 def test_an_axis_of_a_map_is_labelled_in_metres() -> None:
-    axis = replace(Axis.over("x", [-2, 18], most=40, scaled=40), unit_m=0.75)  # from -1.5 m to 13.5 m
+    axis = replace(BoxAxis.spanning("x", [-2, 18], most=40, scaled=40), unit_m=0.75)  # from -1.5 m to 13.5 m
     assert axis.title == "x (m)"
     assert [text for _, text in axis.ticks] == ["0", "2", "4", "6", "8", "10", "12"]
     assert all(axis.value(at) * 0.75 == pytest.approx(float(text)) for at, text in axis.ticks)
-    small = replace(Axis.over("y", [0, 3], most=40, scaled=40), unit_m=0.05)
+    small = replace(BoxAxis.spanning("y", [0, 3], most=40, scaled=40), unit_m=0.05)
     assert [text for _, text in small.ticks][:3] == ["0", "0.02", "0.04"]
     at, text = small.ticks[-1]
     assert (round(at, 9), text) == (2.8, "0.14")
-    assert replace(Axis.over("z", [1], most=6, scaled=6), unit_m=0.75).ticks == [(1, "0.75")]
+    assert replace(BoxAxis.spanning("z", [1], most=6, scaled=6), unit_m=0.75).ticks == [(1, "0.75")]
 
 
 def test_axes_without_a_map_are_labelled_in_their_own_values() -> None:
-    assert Axis.over("x", [3, 5], most=40, scaled=40).ticks == [(3, "3"), (4, "4"), (5, "5")]
-    assert Axis.over("level", [0, 10**18], most=6, scaled=6).ticks[-1] == (6, str(10**18))
+    assert BoxAxis.spanning("x", [3, 5], most=40, scaled=40).ticks == [(3, "3"), (4, "4"), (5, "5")]
+    assert BoxAxis.spanning("level", [0, 10**18], most=6, scaled=6).ticks[-1] == (6, str(10**18))
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 2)), min_size=1, max_size=30))

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from robochoc.flight.coordination.motion import Motion, MotionLimits, RoutePlan
 from robochoc.flight.coordination.move_order import NoRouteError
-from robochoc.flight.coordination.paths import Space
+from robochoc.flight.coordination.paths import OutdoorSpace
 from robochoc.flight.coordination.spacing import TooCloseError
 from robochoc.flight.coordination.timetable import plan_routes
 from robochoc.maps.routes.distances import Array, norms, segment_distances
@@ -262,7 +262,7 @@ def test_lanes_are_best_first_and_clear(seed: int) -> None:
     chance = np.random.default_rng(seed)
     points = apart(chance, 12, NOBODY, 0.5)
     start, goal = apart(chance, 2, points, 0.5)
-    space = Space(0.5, 0.0, 4.0)
+    space = OutdoorSpace(0.5, 0.0, 4.0)
     paths = [*space.lanes(start, goal, points)]
     lengths = [float(norms(np.diff(path, axis=0)).sum()) for path in paths]
     assert np.diff(lengths).min(initial=0) >= -1e-8

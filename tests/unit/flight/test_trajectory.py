@@ -112,9 +112,9 @@ def test_goals_give_way_to_what_lies_there_and_who_stays_gives_way_to_goals() ->
     assert [number for number, _ in told] == [1, 2]
     assert told[0][1].startswith("lands ")
     assert leg_goals.places[1, 2] == 0
-    assert not hazards.meet(leg_goals.places[1])
+    assert not hazards.hits(leg_goals.places[1])
     assert np.linalg.norm(leg_goals.places[2] - leg_goals.places[0]) >= 0.5
-    assert leg_goals.planned(starts) == pytest.approx(0.6)
+    assert leg_goals.planned_distance(starts) == pytest.approx(0.6)
     assert (
         leg_goals.standing(hazards, starts, 0.6).shape == (0, 3)
         or nearest_distances(hazards.points, leg_goals.places)[0] >= 0.6
@@ -139,13 +139,13 @@ def test_the_clock_stops_smoothly_and_within_limits() -> None:
     for step in range(round(4 / DT)):
         if step * DT >= 2.5:
             trajectory.stop()
-        rows.append(trajectory.refer()[:, 0].copy())
+        rows.append(trajectory.update_setpoints()[:, 0].copy())
         trajectory.advance(DT)
     x, speed, push = (np.array(rows)[:, row] for row in (0, 3, 6))
     assert np.abs(np.gradient(x, DT) - speed)[2:-2].max() < 0.02
     assert np.abs(np.gradient(speed, DT) - push)[2:-2].max() < 0.1
     assert np.abs(push).max() < 1.5 / STOP_S * MotionLimits().speed + MotionLimits().acceleration
-    assert trajectory.over
+    assert trajectory.has_ended
     assert not speed[-1]
     stopping = x[-1] - x[round(2.5 / DT)]
     assert 0.5 < stopping <= MotionLimits().speed * STOP_S / 2 + 0.02

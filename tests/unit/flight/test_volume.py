@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from robochoc.flight.flight import fly
-from robochoc.flight.mission import Block, mission_of
+from robochoc.flight.mission import MissionBlock, mission_of
 from robochoc.flight.preview import preview_of
 from robochoc.maps.ground_map import GroundMap, Volume, ground_map_json, read_ground_map
 from robochoc.model.expression import Constant, Name
@@ -48,7 +48,7 @@ def test_drones_are_in_the_air_in_the_beginning_where_the_map_says() -> None:
     assert {number: goal.at for number, goal in mission.legs[0].goals.items()} == {0: (1, 1, 1), 1: (2, 1, -1)}
     assert [(axis.first, axis.last) for axis in mission.axes] == [(1, 6), (1, 4), (-3, 2)]
     assert mission.ground == -2
-    assert mission.blocks[0] == Block((0.5, 0.5, -1.5), is_cube=True)
+    assert mission.blocks[0] == MissionBlock((0.5, 0.5, -1.5), is_cube=True)
     # Who is not among those of the map stands on the ground, as always.
     some = GroundMap(6, 4, {"A": (1, 1)}, volume=Volume(6, -3, {"A": 2}))
     assert [drone.home[2] for drone in mission_of(outcome(2, -2), TEAM, ground=some).drones] == [-2, -4]

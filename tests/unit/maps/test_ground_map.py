@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robochoc.flight.flight import fly
-from robochoc.flight.mission import Block, mission_of
+from robochoc.flight.mission import MissionBlock, mission_of
 from robochoc.flight.preview import preview_of
 from robochoc.maps.ground_map import MAX_BYTES, BlockedCell, GroundMap, ground_map_json, read_ground_map
 from robochoc.model.expression import Constant, Name
@@ -81,7 +81,7 @@ def test_the_second_epoch_begins_where_the_first_one_ended_and_brings_its_blocks
     ground = GroundMap(6, 4, GROUND.starts, (*WALL, BlockedCell(6, 2, 1)))
     run = outcome((5, 6), (5, 4))
     mission = mission_of(run, TEAM, ground=ground)
-    assert mission.blocks[-1] == Block(pytest.approx((6, 2, 0.6)), 1)  # type: ignore[arg-type]
+    assert mission.blocks[-1] == MissionBlock(pytest.approx((6, 2, 0.6)), 1)  # type: ignore[arg-type]
     flown = fly(mission)
     second = flown.legs[1].begins_s
     there = flown.positions[int(np.searchsorted(flown.times, second)), 1]

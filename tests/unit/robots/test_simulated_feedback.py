@@ -40,7 +40,7 @@ def looped(surroundings: FlightSettings, options: Options = SIMULATED, *, scale:
     flying = SimulatedFeedback(surroundings)
     loop = ClosedLoop(hangar(), (), flying, scale=scale)
     outcome = solve(hangar(), options, environment=loop)
-    flown = flying.flown()
+    flown = flying.log()
     assert flown is not None
     assert loop.mission is not None
     return Looped(outcome, loop, flown, loop.mission)

@@ -14,7 +14,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
+from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.model.change import apply_changes
 from robochoc.model.expression import Expression, Type, parse
 from robochoc.model.problem import (
@@ -67,69 +67,74 @@ def after(team: Team, *reports: Report, scale: float = 1.0) -> tuple[Change, ...
 
 
 def test_an_obstacle_takes_the_value_that_leads_there_and_nothing_else() -> None:
-    assert after(pair(), Blocked("B", (1, 1, 3))) == (RemoveValue("a", 3),)
-    assert after(pair(), Blocked("A", (2.2, 0.9, 1.3))) == (RemoveValue("b", 1),)
+    assert after(pair(), BlockedReport("B", (1, 1, 3))) == (RemoveValue("a", 3),)
+    assert after(pair(), BlockedReport("A", (2.2, 0.9, 1.3))) == (RemoveValue("b", 1),)
 
 
 def test_places_are_in_metres_and_the_problem_in_units() -> None:
-    assert after(pair(), Blocked("A", (0.5, 0.5, 1.5)), scale=0.5) == (RemoveValue("a", 3),)
+    assert after(pair(), BlockedReport("A", (0.5, 0.5, 1.5)), scale=0.5) == (RemoveValue("a", 3),)
 
 
 def test_between_two_places_an_obstacle_takes_both() -> None:
-    assert after(pair(), Blocked("A", (1, 1, 2.5))) == (RemoveValue("a", 2), RemoveValue("a", 3))
-    assert after(pair(), Blocked("A", (1.5, 1, 2))) == (RemoveValue("a", 2), RemoveValue("b", 2))
+    assert after(pair(), BlockedReport("A", (1, 1, 2.5))) == (RemoveValue("a", 2), RemoveValue("a", 3))
+    assert after(pair(), BlockedReport("A", (1.5, 1, 2))) == (RemoveValue("a", 2), RemoveValue("b", 2))
 
 
 def test_an_obstacle_beside_everything_is_told_of() -> None:
     sees = situation(pair())
-    assert sees.changes(pair(), Blocked("A", (9, 9, 9))) == ()
+    assert sees.changes(pair(), BlockedReport("A", (9, 9, 9))) == ()
     assert "it changes nothing" in "".join(sees.notes)
 
 
 def test_not_all_that_changes_nothing_is_told_of() -> None:
     sees = situation(pair())
     for number in range(100):
-        sees.changes(pair(), Blocked("A", (9, 9, number)))
+        sees.changes(pair(), BlockedReport("A", (9, 9, number)))
     assert len(sees.notes) == 20
 
 
 def test_the_same_obstacle_takes_nothing_twice() -> None:
-    assert after(pair(), Blocked("A", (1, 1, 3)), Blocked("B", (1, 1, 3))) == ()
+    assert after(pair(), BlockedReport("A", (1, 1, 3)), BlockedReport("B", (1, 1, 3))) == ()
 
 
 def test_what_is_clear_again_gives_back_what_was_taken() -> None:
-    assert after(pair(), Blocked("A", (1, 1, 3)), Cleared("B", (1.2, 1, 3))) == (AddValue("a", 3),)
-    assert after(pair(), Cleared("B", (1, 1, 3))) == ()
+    assert after(pair(), BlockedReport("A", (1, 1, 3)), ClearedReport("B", (1.2, 1, 3))) == (AddValue("a", 3),)
+    assert after(pair(), ClearedReport("B", (1, 1, 3))) == ()
 
 
 def test_what_the_files_never_had_is_not_given_back() -> None:
-    assert after(pair(), Blocked("A", (1, 1, 9)), Cleared("A", (1, 1, 9))) == ()
+    assert after(pair(), BlockedReport("A", (1, 1, 9)), ClearedReport("A", (1, 1, 9))) == ()
 
 
 def test_another_obstacle_keeps_what_one_gives_back() -> None:
-    reports = (Blocked("A", (1, 1, 2.5)), Blocked("A", (1, 1, 3.4)), Cleared("A", (1, 1, 2.3)))
+    reports = (BlockedReport("A", (1, 1, 2.5)), BlockedReport("A", (1, 1, 3.4)), ClearedReport("A", (1, 1, 2.3)))
     assert after(pair(), *reports) == (AddValue("a", 2),)
 
 
 def test_out_of_order_takes_the_robot_once() -> None:
-    assert after(pair(), OutOfOrder("B", "motor 2")) == (RemoveAgent("B"),)
-    assert after(pair(), OutOfOrder("B"), OutOfOrder("B"), Blocked("B", (1, 1, 1))) == ()
+    assert after(pair(), OutOfOrderReport("B", "motor 2")) == (RemoveAgent("B"),)
+    assert after(pair(), OutOfOrderReport("B"), OutOfOrderReport("B"), BlockedReport("B", (1, 1, 1))) == ()
 
 
 @looped(("level", "leaves"), [(0.19, True), (0.0, True), (0.2, False), (1.0, False), (-1.0, False)])
 def test_an_empty_battery_takes_the_robot(level: float, leaves: bool) -> None:  # noqa: FBT001 - a table
-    assert after(pair(), Battery("A", level)) == ((RemoveAgent("A"),) if leaves else ())
+    assert after(pair(), BatteryReport("A", level)) == ((RemoveAgent("A"),) if leaves else ())
 
 
 def test_strangers_change_nothing() -> None:
-    for report in (Blocked("X", (1, 1, 3)), OutOfOrder("X"), Battery("X", 0), Pose("X", (0, 0, 0))):
+    for report in (
+        BlockedReport("X", (1, 1, 3)),
+        OutOfOrderReport("X"),
+        BatteryReport("X", 0),
+        PoseReport("X", (0, 0, 0)),
+    ):
         assert after(pair(), report) == ()
 
 
-def flight(*heights: float, step_s: float = 0.5) -> tuple[Pose, ...]:
+def flight(*heights: float, step_s: float = 0.5) -> tuple[PoseReport, ...]:
     """Poses of A, above where it stood (which is one unit below the lowest level)."""
     ground = drones_of(pair())[0].home[2]
-    return tuple(Pose("A", (1, 1, ground + height), number * step_s) for number, height in enumerate(heights))
+    return tuple(PoseReport("A", (1, 1, ground + height), number * step_s) for number, height in enumerate(heights))
 
 
 def test_a_drone_that_has_flown_and_lies_on_the_ground_is_out_of_order() -> None:
@@ -146,7 +151,7 @@ def test_a_drone_that_has_flown_and_lies_on_the_ground_is_out_of_order() -> None
         flight(0, 2, *[1.0] * 50),  # it hovers far from its goal while the team decides
     ],
 )
-def test_a_drone_that_may_be_well_stays(poses: tuple[Pose, ...]) -> None:
+def test_a_drone_that_may_be_well_stays(poses: tuple[PoseReport, ...]) -> None:
     assert LIES_TIMES == 3
     sees, team = situation(pair()), pair()
     assert not any(sees.changes(team, pose) for pose in poses)
@@ -154,29 +159,29 @@ def test_a_drone_that_may_be_well_stays(poses: tuple[Pose, ...]) -> None:
 
 def test_a_large_domain_is_not_looked_through() -> None:
     team = Team("vast", (robot("A", "a", "3", "1", a=HUGE),))
-    assert after(team, Blocked("A", (123_456_789, 3, 1))) == (RemoveValue("a", 123_456_789),)
-    assert after(team, Blocked("A", (123_456_789, 5, 1))) == ()
+    assert after(team, BlockedReport("A", (123_456_789, 3, 1))) == (RemoveValue("a", 123_456_789),)
+    assert after(team, BlockedReport("A", (123_456_789, 5, 1))) == ()
 
 
 def test_what_cannot_be_looked_through_is_told() -> None:
     team = Team("vast", (robot("A", "mod(a,10)", "3", "1", a=HUGE),))
     sees = situation(team)
-    assert sees.changes(team, Blocked("A", (4, 3, 1))) == ()
+    assert sees.changes(team, BlockedReport("A", (4, 3, 1))) == ()
     assert "a has too many values" in "".join(sees.notes)
 
 
 def test_a_value_that_leads_there_by_reckoning() -> None:
     team = Team("slots", (robot("A", "mod(a,3)", "div(a,3)", "1", a=Domain("slots", (range(9),))),))
-    assert after(team, Blocked("A", (1, 2, 1))) == (RemoveValue("a", 7),)
+    assert after(team, BlockedReport("A", (1, 2, 1))) == (RemoveValue("a", 7),)
 
 
 @pytest.mark.parametrize(("x", "z", "why"), [("a", "b", "depends on a and b"), ("1", "2", "depends on no variable")])
 def test_where_no_variable_alone_decides_nothing_is_taken(x: str, z: str, why: str) -> None:
     team = Team("joint", (robot("A", x, "1", z, a=LEVELS, b=LEVELS),))
     sees = situation(team)
-    assert sees.changes(team, Blocked("A", (1, 1, 2))) == ()
+    assert sees.changes(team, BlockedReport("A", (1, 1, 2))) == ()
     assert why in "".join(sees.notes)
-    assert sees.changes(team, Blocked("A", (1, 9, 2))) == ()
+    assert sees.changes(team, BlockedReport("A", (1, 9, 2))) == ()
     assert why not in [*sees.notes][-1], "it is nowhere near"
 
 
@@ -184,14 +189,14 @@ def test_drones_without_topics_fly_above_where_they_stood() -> None:
     team = team_of(dict.fromkeys("AB", range(1, 5)), [])
     sees = Situation(drones_of(team), 1.0)
     x, y, _ = drones_of(team)[1].home
-    assert sees.changes(team, Blocked("RA", (x, y, 2))) == (RemoveValue("B", 2),)
+    assert sees.changes(team, BlockedReport("RA", (x, y, 2))) == (RemoveValue("B", 2),)
 
 
 def test_rows_of_drones_with_a_variable_each() -> None:
     topics = tuple(Topic(f"/d{n}/waypoint", x=said("1"), y=said(str(n)), z=said(f"v{n}", f"v{n}")) for n in (1, 2))
     row = Robot("Row", (Variable("v1", LEVELS), Variable("v2", LEVELS)), topics=topics)
-    assert after(Team("row", (row,)), Blocked("d1", (1, 2, 4))) == (RemoveValue("v2", 4),)
-    assert after(Team("row", (row,)), OutOfOrder("d2")) == (RemoveAgent("Row"),)
+    assert after(Team("row", (row,)), BlockedReport("d1", (1, 2, 4))) == (RemoveValue("v2", 4),)
+    assert after(Team("row", (row,)), OutOfOrderReport("d2")) == (RemoveAgent("Row"),)
 
 
 def test_thousands_of_obstacles_cost_no_more_each_than_a_few() -> None:
@@ -200,13 +205,13 @@ def test_thousands_of_obstacles_cost_no_more_each_than_a_few() -> None:
     def steps(obstacles: int) -> int:
         team, sees = pair(), situation(pair())
         for number in range(obstacles):
-            assert sees.changes(team, Blocked("A", (1.0, 50.0 + number, 1.0))) == ()
+            assert sees.changes(team, BlockedReport("A", (1.0, 50.0 + number, 1.0))) == ()
         for number in range(obstacles):
-            assert sees.changes(team, Cleared("A", (1.0, 50.0 + number, 5.0))) == ()
+            assert sees.changes(team, ClearedReport("A", (1.0, 50.0 + number, 5.0))) == ()
         last = 49.0 + obstacles
         with counted_steps() as count:
-            assert sees.changes(team, Blocked("A", (1.0, last, 1.0))) == ()
-            assert sees.changes(team, Cleared("A", (9.0, last, 1.0))) == ()
+            assert sees.changes(team, BlockedReport("A", (1.0, last, 1.0))) == ()
+            assert sees.changes(team, ClearedReport("A", (9.0, last, 1.0))) == ()
         return count[0]
 
     assert 0 < steps(4_000) < 2 * steps(20)
@@ -253,10 +258,10 @@ def test_what_is_near_is_found_as_if_all_were_looked_at(
 
 coordinates = st.floats(-1, 6) | st.sampled_from([1.0, 2.0, 1.5, 2.5])
 reports = st.one_of(
-    st.builds(Blocked, st.sampled_from("ABX"), st.tuples(coordinates, st.just(1.0), coordinates)),
-    st.builds(Cleared, st.sampled_from("ABX"), st.tuples(coordinates, st.just(1.0), coordinates)),
-    st.builds(Battery, st.sampled_from("ABX"), st.floats(0, 1)),
-    st.builds(OutOfOrder, st.sampled_from("ABX")),
+    st.builds(BlockedReport, st.sampled_from("ABX"), st.tuples(coordinates, st.just(1.0), coordinates)),
+    st.builds(ClearedReport, st.sampled_from("ABX"), st.tuples(coordinates, st.just(1.0), coordinates)),
+    st.builds(BatteryReport, st.sampled_from("ABX"), st.floats(0, 1)),
+    st.builds(OutOfOrderReport, st.sampled_from("ABX")),
 )
 
 
@@ -267,9 +272,9 @@ def test_the_team_can_always_take_it_and_what_is_blocked_is_nobodys(heard: list[
     for report in heard:
         there = report.drone in team
         team = apply_changes(team, sees.changes(team, report))  # raises `ChangeError` for what it cannot take
-        if isinstance(report, Blocked) and there:
+        if isinstance(report, BlockedReport) and there:
             obstacles.append(report.place)
-        elif isinstance(report, Cleared) and there:
+        elif isinstance(report, ClearedReport) and there:
             obstacles = [place for place in obstacles if math.dist(place, report.place) > 0.5 + 1e-6]
         for x, name in ((1, "A"), (2, "B")):
             if name in team:
@@ -294,11 +299,11 @@ PLACE = {"x": 1, "y": 2.0, "z": 3.0}
 
 def test_messages_become_reports() -> None:
     header = {"stamp": 7, "frame_id": "map"}
-    assert read("/A/battery", {"header": header, "percentage": 0.5}) == Battery("A", 0.5, 2.5)
-    assert read("/A/pose", {"header": header, "pose": {"position": PLACE}}) == Pose("A", (1, 2, 3), 2.5)
-    assert read("/B/blocked", {"header": header, "point": PLACE}) == Blocked("B", (1, 2, 3), 2.5)
-    assert read("/B/cleared", {"point": PLACE}) == Cleared("B", (1, 2, 3), 2.5)
-    assert read("/B/out_of_order", {"data": "no\nmotor"}) == OutOfOrder("B", "no\\nmotor", 2.5)
+    assert read("/A/battery", {"header": header, "percentage": 0.5}) == BatteryReport("A", 0.5, 2.5)
+    assert read("/A/pose", {"header": header, "pose": {"position": PLACE}}) == PoseReport("A", (1, 2, 3), 2.5)
+    assert read("/B/blocked", {"header": header, "point": PLACE}) == BlockedReport("B", (1, 2, 3), 2.5)
+    assert read("/B/cleared", {"point": PLACE}) == ClearedReport("B", (1, 2, 3), 2.5)
+    assert read("/B/out_of_order", {"data": "no\nmotor"}) == OutOfOrderReport("B", "no\\nmotor", 2.5)
 
 
 @looped("value", [math.nan, math.inf, -math.inf, "1", None, True, [1], {"x": 1}, 10**400, 1e300])
@@ -332,4 +337,4 @@ def test_all_that_drones_may_report_is_listened_to() -> None:
 def test_two_drones_of_one_name_cannot_be_told_apart() -> None:
     one, other = drones_of(pair())
     sees = Situation([one, replace(other, name=one.name)], 1.0)
-    assert sees.changes(pair(), OutOfOrder(one.name)) == ()
+    assert sees.changes(pair(), OutOfOrderReport(one.name)) == ()

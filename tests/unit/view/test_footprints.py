@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from robochoc.flight.layout import Axis
+from robochoc.flight.layout import BoxAxis
 from robochoc.flight.mission import Mission
 from robochoc.maps.walls import VoxelFrame, Walls
 from robochoc.view.meshes import prisms
@@ -89,7 +89,7 @@ def test_an_occupied_voxel_has_a_face_towards_each_free_one() -> None:
 
 def mission_with(occupied: Flags, free: Flags) -> Mission:
     """Return a mission in a box of cells of a metre, whose map has voxels of half a metre from (1, 2, 3) on."""
-    axes = tuple(Axis(name, 1, 4, 1, 4) for name in "xyz")
+    axes = tuple(BoxAxis(name, 1, 4, 1, 4) for name in "xyz")
     walls = Walls(~free, occupied, VoxelFrame(0.5, (1.0, 2.0, 3.0)), 0.1, 0.5)
     return Mission("team", (), (), (axes[0], axes[1], axes[2]), 1.0, has_volume=True, walls=walls)
 
