@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING, Any
 from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.dialects.dialect import NameMap
-from robochoc.formats.dialects.xcsp3.objective import split
+from robochoc.formats.dialects.xcsp3.expressions import INVERSE, TRUE, Xcsp3Condition, disjunction
+from robochoc.formats.dialects.xcsp3.objective import split_sum
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.scheduling import ScheduledTask, post_tasks
-from robochoc.formats.dialects.xcsp3.tables import choose
-from robochoc.formats.dialects.xcsp3.terms import INVERSE, TRUE, Xcsp3Condition, disjunction
+from robochoc.formats.dialects.xcsp3.tables import post_element
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
@@ -250,7 +250,7 @@ def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: A
     if not _is_element(left):
         return False
     indexes, cells = translation.cells(left.args)
-    choose(translation.posting, indexes, cells, Xcsp3Condition(operator, translation.integer(right)))
+    post_element(translation.posting, indexes, cells, Xcsp3Condition(operator, translation.integer(right)))
     return True
 
 
@@ -284,7 +284,7 @@ def _post_objective(objective: Any, translation: Translation) -> None:  # noqa: 
     for condition in conditions:
         translation.posting.post(condition)
     _post_definitions(translation)
-    for term in split(expression):
+    for term in split_sum(expression):
         translation.posting.post_cost(term)
 
 

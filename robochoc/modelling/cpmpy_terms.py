@@ -15,9 +15,8 @@ from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.formats.dialects.xcsp3.constraints import distinct
-from robochoc.formats.dialects.xcsp3.posting import Posting
-from robochoc.formats.dialects.xcsp3.terms import (
+from robochoc.formats.dialects.xcsp3.constraints import number_of_values
+from robochoc.formats.dialects.xcsp3.expressions import (
     FALSE,
     TRUE,
     as_boolean,
@@ -30,6 +29,7 @@ from robochoc.formats.dialects.xcsp3.terms import (
     times,
     total,
 )
+from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.model.expression import Apply, Constant, Expression, Name, names
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.modelling.translation import may_be_undefined
@@ -296,7 +296,7 @@ _INTEGERS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
     "element": lambda t, args: t.element(args),
     "nd_element": lambda t, args: t.element(args),
     "count": lambda t, args: total([as_integer(compare("eq", one, t.integer(args[1]))) for one in t.integers(args[0])]),
-    "nvalue": lambda t, args: distinct(t.integers(args)),
+    "nvalue": lambda t, args: number_of_values(t.integers(args)),
 }
 
 _BOOLEANS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {

@@ -27,7 +27,7 @@ from robochoc.formats.dialects.dialect import (
 from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable
 from robochoc.formats.dialects.tabulation import decimal, is_maximised
 from robochoc.formats.dialects.toulbar2.network import CostFunction, CostFunctionNetwork, TeamCosts, team_costs, to_team
-from robochoc.formats.dialects.toulbar2.text import WordReader, Words, has_suffix, read_file, read_words
+from robochoc.formats.dialects.toulbar2.word_reader import WordReader, Words, has_suffix, read_file, read_words
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import Team
 from robochoc.system.plain_text import counted

@@ -22,9 +22,9 @@ from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.formats.dialects.tabulation import (
     TabulatedConstraint,
     amounts,
-    held_constraints,
+    finite_cost_bound,
     is_maximised,
-    magnitude,
+    owned_constraints,
     tabulate,
 )
 from robochoc.formats.dialects.xdiscsp import FORMAT
@@ -54,7 +54,7 @@ def _write(team: Team, options: ExportOptions) -> ExportResult:
         raise UnsupportedError(
             f"{TITLE} requires integer costs of 0 or more: use --format frodo or --format pydcop for other costs"
         )
-    bound = magnitude(tables, constant)
+    bound = finite_cost_bound(tables, constant)
     by_pair = _by_pair(team, tables)
     if bound * len(by_pair) >= LIMIT:
         raise UnsupportedError(
@@ -184,7 +184,7 @@ def _notes(team: Team) -> Iterator[ConversionNote]:
     if renamed := [name for name in team.variables if _is_renamed(team, name)]:
         text = f"the values of {len(renamed)} variables are numbered from 1; comments in the file name the originals"
         yield ConversionNote("values", text)
-    if any(one.private_part for one in held_constraints(team)):
+    if any(one.private_part for one in owned_constraints(team)):
         yield ConversionNote(
             "known to more", "both agents of a constraint know it: DCOPSolver does not support partial knowledge (PKC)"
         )

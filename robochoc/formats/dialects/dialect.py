@@ -131,7 +131,7 @@ class NameMap:
         return self._given[original]
 
     @property
-    def changed(self) -> dict[str, str]:
+    def originals(self) -> dict[str, str]:
         """The original names by their valid names, where the two differ."""
         return {name: original for name, original in self._taken.items() if name != original}
 

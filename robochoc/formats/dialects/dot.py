@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
+from robochoc.formats.dialects.constraint_graph import pseudo_tree, shared_constraints
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, ExportResult, ImportOptions, ImportResult
-from robochoc.formats.dialects.graph import pseudo_tree, shared_constraints
 from robochoc.model.problem import Team
 from robochoc.solver.errors import UnsupportedError
 

@@ -57,11 +57,11 @@ class Scale:
         """Return `amount` as an integer number of units. Raises `MistakeError` if the number is too large."""
         if amount == INFINITE:
             return INFINITE
-        whole: int = round(Fraction(amount) * 10**self.places)
-        if not -BEYOND < whole < BEYOND:
+        units: int = round(Fraction(amount) * 10**self.places)
+        if not -BEYOND < units < BEYOND:
             what = f"the cost {shortened(str(int(amount)))} is too large with {self.places} decimal places"
             raise MistakeError(what, "use costs of at most 18 digits, decimal places included")
-        return whole
+        return units
 
 
 def decimal_places(number: Fraction) -> int | None:

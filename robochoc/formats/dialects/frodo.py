@@ -28,12 +28,12 @@ from robochoc.formats.dialects.dialect import (
 )
 from robochoc.formats.dialects.exact_costs import Amount, Scale
 from robochoc.formats.dialects.tabulation import (
-    HeldConstraint,
+    OwnedConstraint,
     TabulatedConstraint,
     amounts,
     constant_table,
     decimal,
-    magnitude,
+    finite_cost_bound,
 )
 from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, in_xcsp21_operators
 from robochoc.formats.dialects.xcsp21.instance import (
@@ -58,7 +58,7 @@ from robochoc.system.plain_text import counted
 NAME = "frodo"
 FORMAT = "XCSP 2.1_FRODO"
 TITLE = "FRODO's XCSP 2.1"
-KEEPS_FORMULAS = "--intension keeps predicates and functions, for FRODO's JaCoP parser"
+KEEPS_FORMULAS = "--intension writes it as a predicate or function, for FRODO's JaCoP parser"
 LIMIT = 2**31 - 1
 """The integer that counts as infinity in FRODO's 32 bits."""
 
@@ -210,16 +210,16 @@ class _FrodoWriter:
     def __init__(self, flat: FlatTeam, *, intension: bool) -> None:
         self._flat = flat
         hint = "" if intension else f" ({KEEPS_FORMULAS})"
-        self._contents = [(intension and self._in_intension(one)) or flat.table(one, hint) for one in flat.held]
+        self._contents = [(intension and self._in_intension(one)) or flat.table(one, hint) for one in flat.owned]
         tables = [content for content in self._contents if isinstance(content, TabulatedConstraint)]
         if flat.constant:
             tables.append(constant_table(flat.team, flat.constant))
         self._places = Scale(amounts(tables)).places
-        self._check_sizes(magnitude(tables, Fraction(0)) * 10**self._places)
+        self._check_sizes(finite_cost_bound(tables, Fraction(0)) * 10**self._places)
         self._forbidden = "-infinity" if flat.maximize else "infinity"
         presentation = {
             "name": flat.team.name,
-            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),
+            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.owned), default=1)),
             "maximize": "true" if flat.maximize else "false",
             "format": FORMAT,
         }
@@ -235,7 +235,7 @@ class _FrodoWriter:
             for variable in robot.variables:
                 domain = flat.domain_of[variable.name]
                 etree.SubElement(document.variables, "variable", name=variable.name, domain=domain, agent=robot.name)
-        for one, content in zip(flat.held, self._contents, strict=True):
+        for one, content in zip(flat.owned, self._contents, strict=True):
             if isinstance(content, TabulatedConstraint):
                 self._add(content)
             else:
@@ -250,11 +250,11 @@ class _FrodoWriter:
             yield ConversionNote(
                 "scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits"
             )
-        if any(one.private_part for one in self._flat.held):
+        if any(one.private_part for one in self._flat.owned):
             text = "all agents of a constraint know it: FRODO does not support partially known constraints (PKC)"
             yield ConversionNote("known to more", text)
-        if kept := sum(not isinstance(content, TabulatedConstraint) for content in self._contents):
-            text = f"{counted(kept, 'constraint')} in intension, which only FRODO's JaCoP parser reads"
+        if in_intension := sum(not isinstance(content, TabulatedConstraint) for content in self._contents):
+            text = f"{counted(in_intension, 'constraint')} in intension, which only FRODO's JaCoP parser reads"
             yield ConversionNote("intension", text)
 
     @property
@@ -272,7 +272,7 @@ class _FrodoWriter:
                 what = f"the value {far:,} of {name} is too large: FRODO's integers are below {LIMIT:,}"
                 raise UnsupportedError(f"{TITLE}: {what}")
 
-    def _in_intension(self, one: HeldConstraint) -> Predicate | Function | None:
+    def _in_intension(self, one: OwnedConstraint) -> Predicate | Function | None:
         """Return the definition of a constraint in FRODO's operators. None: write the constraint as a relation."""
         definition, cost = one.constraint.definition, one.constraint.cost
         if isinstance(definition, Relation):
@@ -286,7 +286,7 @@ class _FrodoWriter:
             return Predicate(definition.name, definition.parameters, body)
         return self._as_function(one, definition, body)
 
-    def _as_function(self, one: HeldConstraint, definition: Predicate | Function, body: Expression) -> Function | None:
+    def _as_function(self, one: OwnedConstraint, definition: Predicate | Function, body: Expression) -> Function | None:
         """Return a definition whose costs are finite as a function. None: write the constraint as a relation."""
         if any(robot.costs.places for robot in self._flat.team.robots):  # the costs of a function have no unit
             return None
@@ -296,7 +296,7 @@ class _FrodoWriter:
             body = Apply("if", (body, Constant(0), Constant(int(one.constraint.cost))))
         return Function(definition.name, definition.parameters, body)
 
-    def _add_formula(self, one: HeldConstraint, definition: Predicate | Function) -> None:
+    def _add_formula(self, one: OwnedConstraint, definition: Predicate | Function) -> None:
         constraint = one.constraint
         if isinstance(definition, GlobalPredicate):
             element = self._document.constraint(constraint.name, constraint.variables, definition.name)

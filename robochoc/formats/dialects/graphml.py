@@ -7,8 +7,8 @@ from pathlib import Path
 
 from lxml import etree
 
+from robochoc.formats.dialects.constraint_graph import shared_constraints
 from robochoc.formats.dialects.dialect import Dialect, ExportOptions, ExportResult, ImportOptions, ImportResult
-from robochoc.formats.dialects.graph import shared_constraints
 from robochoc.model.problem import Team
 from robochoc.solver.errors import UnsupportedError
 

@@ -28,7 +28,7 @@ CONSTANT = "constant"
 """The name of the constraint that has the constant cost."""
 
 
-class HeldConstraint(NamedTuple):
+class OwnedConstraint(NamedTuple):
     """A constraint, the robot whose file contains it, and whether only this robot knows it."""
 
     constraint: Constraint
@@ -51,14 +51,14 @@ class TabulatedConstraint:
     table: ExactCostTable
 
 
-def held_constraints(team: Team) -> Iterator[HeldConstraint]:
+def owned_constraints(team: Team) -> Iterator[OwnedConstraint]:
     """Yield the constraints of `team`; a partially known constraint (PKC) yields each of its parts."""
     for robot in team.robots:
         for constraint in (*robot.private, *robot.shared):
-            yield HeldConstraint(constraint, robot, constraint.model == ConstraintModel.PKC)
+            yield OwnedConstraint(constraint, robot, constraint.model == ConstraintModel.PKC)
         for child in robot.children:
             for constraint in child.constraints:
-                yield HeldConstraint(constraint, robot, private_part=True)
+                yield OwnedConstraint(constraint, robot, private_part=True)
 
 
 class Tabulator:
@@ -68,7 +68,7 @@ class Tabulator:
         self._domains = {name: variable.domain for name, variable in team.variables.items()}
         self._known: dict[object, ExactCostTable] = {}
 
-    def table(self, one: HeldConstraint, name: str = "", most: int = MAX_TUPLES) -> TabulatedConstraint | None:
+    def table(self, one: OwnedConstraint, name: str = "", most: int = MAX_TUPLES) -> TabulatedConstraint | None:
         """Return a constraint as a table. None: the table would have more than `most` tuples."""
         constraint = one.constraint
         scope, definition = constraint.variables, constraint.definition
@@ -97,15 +97,15 @@ def tabulate(team: Team) -> tuple[list[TabulatedConstraint], Fraction]:
     tabulator = Tabulator(team)
     taken = {*team.variables, CONSTANT}  # in pyDCOP, variables and constraints share one set of names
     found = []
-    for one in held_constraints(team):
-        table = tabulator.table(one, free_name(one.constraint.name, taken))
+    for one in owned_constraints(team):
+        table = tabulator.table(one, unique_name(one.constraint.name, taken))
         if table is None:
-            raise UnsupportedError(too_large(team, one.constraint))
+            raise UnsupportedError(too_large_message(team, one.constraint))
         found.append(table)
-    return found, constant_of(team)
+    return found, constant_cost(team)
 
 
-def free_name(name: str, taken: set[str]) -> str:
+def unique_name(name: str, taken: set[str]) -> str:
     """Return `name`, with a number appended if it is in `taken`, and add the result to `taken`."""
     free, number = name, 1
     while free in taken:
@@ -115,7 +115,7 @@ def free_name(name: str, taken: set[str]) -> str:
     return free
 
 
-def constant_of(team: Team) -> Fraction:
+def constant_cost(team: Team) -> Fraction:
     """Return the constant cost of a team that has not been normalised."""
     return sum((Fraction(one.costs.constant, 10**one.costs.places) for one in team.robots), Fraction(0))
 
@@ -126,7 +126,7 @@ def constant_table(team: Team, constant: Fraction) -> TabulatedConstraint:
     return TabulatedConstraint(CONSTANT, (variable.name,), ExactCostTable(CONSTANT, {}, constant, len(variable.domain)))
 
 
-def too_large(team: Team, constraint: Constraint) -> str:
+def too_large_message(team: Team, constraint: Constraint) -> str:
     """Return the error message for a constraint that is too large for a table."""
     size = math.prod(len(team.variables[name].domain) for name in constraint.variables)
     what = f"the constraint {constraint.name} over {' '.join(constraint.variables)} has {size:,} combinations of values"
@@ -138,7 +138,7 @@ def is_maximised(team: Team) -> bool:
     return any(robot.costs.maximize for robot in team.robots)
 
 
-def magnitude(tables: Sequence[TabulatedConstraint], constant: Fraction) -> int:
+def finite_cost_bound(tables: Sequence[TabulatedConstraint], constant: Fraction) -> int:
     """Return an integer that is greater than the absolute value of every sum of finite costs."""
     distinct = {id(one.table): one.table for one in tables}
     most = {
@@ -157,12 +157,12 @@ def decimal(amount: Amount, places: int | None = None) -> str:
     """Return a finite cost as a decimal without an exponent, with `places` decimal places if given."""
     if isinstance(amount, int) and not places:
         return str(amount)
-    whole = Fraction(amount)
+    exact = Fraction(amount)
     width = places or 0
-    while places is None and (whole * 10**width).denominator != 1:
+    while places is None and (exact * 10**width).denominator != 1:
         width += 1
-    digits = str(abs(round(whole * 10**width))).rjust(width + 1, "0")
-    sign = "-" if whole < 0 else ""
+    digits = str(abs(round(exact * 10**width))).rjust(width + 1, "0")
+    sign = "-" if exact < 0 else ""
     return f"{sign}{digits[:-width]}.{digits[-width:]}" if width else f"{sign}{digits}"
 
 

@@ -26,7 +26,7 @@ from robochoc.formats.dialects.dialect import (
     ImportResult,
 )
 from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable
-from robochoc.formats.dialects.tabulation import HeldConstraint, TabulatedConstraint
+from robochoc.formats.dialects.tabulation import OwnedConstraint, TabulatedConstraint
 from robochoc.formats.dialects.xcsp21.document import Document, FlatTeam, cost_text, in_xcsp21_operators
 from robochoc.formats.dialects.xcsp21.instance import ForeignConstraint, ForeignTable, Formula, Instance, refuse
 from robochoc.formats.dialects.xcsp21.reader import FileHead, read_instance
@@ -107,16 +107,16 @@ class _XdiscspWriter:
         self._flat = flat
         if flat.maximize:
             raise UnsupportedError(f"{FORMAT} does not support utilities: costs are minimised")
-        self._asymmetric = flat.is_weighted and any(one.private_part for one in flat.held)
+        self._asymmetric = flat.is_weighted and any(one.private_part for one in flat.owned)
         kind = "ADCOP" if self._asymmetric else "DCOP" if flat.is_weighted else "DisCSP"
-        partly = any(one.private_part for one in flat.held)
+        partly = any(one.private_part for one in flat.owned)
         presentation = {
             "name": flat.team.name,
             "type": kind,
             "benchmark": "RandomDCOP",  # DCOPSolver requires a name here, and accepts this one for any problem
             "model": "Complex" if any(len(robot.variables) > 1 for robot in flat.team.robots) else "Simple",
             "constraintModel": "PKC" if partly else "TKC",
-            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),
+            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.owned), default=1)),
             "format": FORMAT,
         }
         self._document = Document(flat, presentation)
@@ -131,7 +131,7 @@ class _XdiscspWriter:
                 domain = flat.domain_of[variable.name]
                 element = etree.SubElement(document.variables, "variable", agent=robot.name, name=variable.name)
                 element.attrib.update({"id": str(place), "domain": domain, "description": variable.name})
-        for one in flat.held:
+        for one in flat.owned:
             if not self._is_side(one):
                 self._add(one)
         if self._asymmetric:
@@ -141,7 +141,7 @@ class _XdiscspWriter:
             document.constraints.set("initialCost", constant)
         return document.content()
 
-    def _add(self, one: HeldConstraint) -> None:
+    def _add(self, one: OwnedConstraint) -> None:
         constraint, definition = one.constraint, one.constraint.definition
         model = {"model": "TKC"}
         if one.private_part:
@@ -156,7 +156,7 @@ class _XdiscspWriter:
         table = self._flat.table(one)
         self._document.constraint(constraint.name, table.scope, self._relation(table, one), **model)
 
-    def _relation(self, tabulated: TabulatedConstraint, one: HeldConstraint) -> str:
+    def _relation(self, tabulated: TabulatedConstraint, one: OwnedConstraint) -> str:
         table, name = tabulated.table, one.constraint.name
         listed = {" ".join(map(str, values)): cost for values, cost in table.rows.items()}
         if not self._flat.is_weighted:
@@ -166,7 +166,7 @@ class _XdiscspWriter:
         tuples = "|".join(f"{self._cost(cost, name)}:{values}" for values, cost in listed.items())
         return self._document.relation(tabulated, attributes, tuples)
 
-    def _is_side(self, one: HeldConstraint) -> bool:
+    def _is_side(self, one: OwnedConstraint) -> bool:
         """Return whether a constraint becomes one side of an asymmetric constraint. Raises `UnsupportedError`."""
         scope = one.constraint.variables
         if not self._asymmetric or not one.private_part or len({self._flat.team.owner[name] for name in scope}) == 1:
@@ -179,7 +179,7 @@ class _XdiscspWriter:
     def _add_sides(self) -> None:
         """Write both sides of each pair of variables as one relation with two costs a tuple."""
         sides: dict[tuple[str, ...], dict[str, list[TabulatedConstraint]]] = defaultdict(lambda: defaultdict(list))
-        for one in self._flat.held:
+        for one in self._flat.owned:
             if self._is_side(one):
                 table = self._flat.table(one)
                 sides[tuple(sorted(table.scope))][one.robot.name].append(table)

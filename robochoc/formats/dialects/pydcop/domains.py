@@ -59,7 +59,7 @@ class Domains:
     @property
     def renamed(self) -> Iterable[tuple[str, str]]:
         """Return the symbols with new names, each with its original."""
-        return self._symbols.changed.items()
+        return self._symbols.originals.items()
 
     def _label(self, value: Scalar) -> str:
         return self._symbols.allowed(shown(value))

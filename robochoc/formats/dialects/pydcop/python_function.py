@@ -331,10 +331,10 @@ class _Compiler:
 
         def compare(names: _Names) -> Value:
             before = first(names)
-            for says, other in rest:
+            for holds, other in rest:
                 after = other(names)
                 self.step(size_of(before) + size_of(after))
-                if not says(before, after):
+                if not holds(before, after):
                     return False
                 before = after
             return True

@@ -127,8 +127,8 @@ def power(base: Fraction | float, exponent: Fraction | float) -> Value:
     size = max(Fraction(base).numerator.bit_length(), Fraction(base).denominator.bit_length())
     if abs(exponent) > MAX_BITS or size * abs(exponent) > 2 * MAX_BITS:
         raise NoValueError("a power is too large")
-    whole = int(exponent)
-    return base**whole if whole >= 0 else Fraction(base) ** whole
+    integer = int(exponent)
+    return base**integer if integer >= 0 else Fraction(base) ** integer
 
 
 ARITHMETIC: dict[type[ast.operator], Callable[..., Value]] = {

@@ -16,7 +16,7 @@ from robochoc.formats.dialects.exact_costs import ExactCostTable, Scale, definit
 from robochoc.formats.dialects.pydcop.constraints import ConstraintReader, ParsedConstraint
 from robochoc.formats.dialects.pydcop.domains import Domains, DomainValues
 from robochoc.formats.dialects.pydcop.files import ProblemFiles, SourceText, read_files
-from robochoc.formats.dialects.pydcop.hosting import VariableOwners, agent_names, name_text
+from robochoc.formats.dialects.pydcop.owners import VariableOwners, agent_names, name_text
 from robochoc.formats.dialects.pydcop.scenario import read_scenario
 from robochoc.formats.dialects.pydcop.translation import ViolationCost
 from robochoc.formats.yaml_tree import Node, Scalar, shown
@@ -93,7 +93,7 @@ class _PydcopReader:
         robots = self._robots(list(values))
         team = self._team(values, costs, robots, maximize=maximize)
         team = replace(team, scenario=self._scenario(team))
-        changed = {**self._variable_names.changed, **self._robot_names.changed}
+        changed = {**self._variable_names.originals, **self._robot_names.originals}
         self._notes += notes_on_names(list(changed.items()))
         return ImportResult(team, "pydcop", changed, tuple(self._notes))
 

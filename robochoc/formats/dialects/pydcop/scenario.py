@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import ConversionNote, NameMap
-from robochoc.formats.dialects.pydcop.hosting import name_text
+from robochoc.formats.dialects.pydcop.owners import name_text
 from robochoc.formats.yaml_tree import Node
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.system.plain_text import counted
@@ -60,10 +60,10 @@ def _notes(events: int, delays: int, left_out: int) -> Iterator[ConversionNote]:
         yield ConversionNote("scenario", text)
     if delays:
         yield ConversionNote(
-            "scenario", f"{counted(delays, 'delay')} in seconds: events happen once what was before is solved"
+            "scenario", f"{counted(delays, 'delay')} in seconds: an event follows the solution of the problem before it"
         )
     if left_out:
-        yield ConversionNote("dropped", f"{left_out} actions that remove no agent, which pyDCOP passes over, too")
+        yield ConversionNote("dropped", f"{left_out} actions other than remove_agent, which pyDCOP ignores, too")
 
 
 def _actions(event: Node, *, is_delay: bool) -> list[Node]:

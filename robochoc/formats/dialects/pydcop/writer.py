@@ -21,8 +21,8 @@ from robochoc.formats.dialects.tabulation import (
     amounts,
     constant_table,
     decimal,
+    finite_cost_bound,
     is_maximised,
-    magnitude,
     tabulate,
 )
 from robochoc.model.constraint import INFINITE, Domain
@@ -60,7 +60,7 @@ def write(team: Team, options: ExportOptions) -> ExportResult:
 def _problem(team: Team) -> Iterator[str]:
     tables, constant = tabulate(team)
     maximize = is_maximised(team)
-    most, forbids = magnitude(tables, constant), INFINITE in amounts(tables)
+    most, forbids = finite_cost_bound(tables, constant), INFINITE in amounts(tables)
     infinity = max(LEAST_INFINITY, 10 * most)
     if (infinity if forbids else most) >= LIMIT:
         more = ", and forbidden tuples cost ten times as much" if forbids else ""

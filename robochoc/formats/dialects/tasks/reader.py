@@ -193,13 +193,13 @@ class _TeamBuilder:
         if not variables:
             raise MistakeError("no robot can do any of the tasks", "check skills, needs, loads and deadlines")
         _check_names(variables)
-        kept = list(itertools.islice(constraints, MAX_CONSTRAINTS + 1))
-        if len(kept) > MAX_CONSTRAINTS:
+        listed = list(itertools.islice(constraints, MAX_CONSTRAINTS + 1))
+        if len(listed) > MAX_CONSTRAINTS:
             what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} constraints"
             raise MistakeError(what, "write fewer robots, or fewer tasks")
         name = re.sub(r"[^A-Za-z0-9_.-]+", "_", options.name or read.name)[:100].strip("._-") or "team"
         units = CostUnits(maximize=True, places=self._scale.places)
-        team: Team = assemble(name, variables, kept, kind=ProblemKind.DISWCSP, costs=units)
+        team: Team = assemble(name, variables, listed, kind=ProblemKind.DISWCSP, costs=units)
         changed = self._originals(workers)
         return ImportResult(team, "tasks", changed, (*self._notes, *notes_on_names(list(changed.items()))))
 
@@ -247,7 +247,7 @@ class _TeamBuilder:
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
         """Return the names in the file, by the names in the team where the two differ."""
         tasks = list(self._read.tasks)
-        found = dict(self._robot_names.changed)
+        found = dict(self._robot_names.originals)
         for name, one in zip(self._read.robots, workers, strict=True):
             if self._read.model == TasksModel.ASSIGNMENT:
                 found[one.variable] = f"{name}.{_ONLY}"

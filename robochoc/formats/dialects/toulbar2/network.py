@@ -18,7 +18,7 @@ from robochoc.formats.dialects.dialect import (
     owners_by,
 )
 from robochoc.formats.dialects.exact_costs import Amount, ExactCostTable, Scale, apply_infinity, relation, xml_name
-from robochoc.formats.dialects.tabulation import TabulatedConstraint, amounts, decimal, magnitude, tabulate
+from robochoc.formats.dialects.tabulation import TabulatedConstraint, amounts, decimal, finite_cost_bound, tabulate
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
@@ -82,7 +82,7 @@ def to_team(network: CostFunctionNetwork, options: ImportOptions, dialect: str) 
             constraints.append(Constraint(name, made, scope, scope, ConstraintModel.TKC, line=one.line))
     reaches = _reaches_the_bound(network, functions)
     notes = [*network.notes, *_notes(network, scale, reaches=reaches)]
-    notes += notes_on_names([*names.changed.items(), *symbols.changed.items()])
+    notes += notes_on_names([*names.originals.items(), *symbols.originals.items()])
     if options.owner is None:
         notes.append(ConversionNote("owner", "the format has no owners: each variable gets its own robot"))
     title = options.name or network.name
@@ -92,7 +92,7 @@ def to_team(network: CostFunctionNetwork, options: ImportOptions, dialect: str) 
     else:
         team = assemble(title, variables, constraints)
     bound = Fraction(network.bound) if reaches else None
-    return ImportResult(team, dialect, {**names.changed, **robots.changed}, tuple(notes), bound)
+    return ImportResult(team, dialect, {**names.originals, **robots.originals}, tuple(notes), bound)
 
 
 def _is_soft(constraint: Constraint) -> bool:
@@ -216,7 +216,7 @@ def team_costs(team: Team) -> TeamCosts:
     if team.scenario:
         raise UnsupportedError("toulbar2's formats do not support scenarios: remove scenario.xml")
     tables, constant = tabulate(team)
-    places, bound = Scale([constant, *amounts(tables)]).places, magnitude(tables, constant)
+    places, bound = Scale([constant, *amounts(tables)]).places, finite_cost_bound(tables, constant)
     if bound * 10**places >= LIMIT:
         unit = f" in units of {decimal(Fraction(1, 10**places))}" if places else ""
         what = f"costs may add up to {bound * 10**places:,}{unit}"

@@ -9,15 +9,15 @@ from lxml import etree
 
 from robochoc.formats.dialects.exact_costs import Amount
 from robochoc.formats.dialects.tabulation import (
-    HeldConstraint,
+    OwnedConstraint,
     TabulatedConstraint,
     Tabulator,
-    constant_of,
+    constant_cost,
     decimal,
-    free_name,
-    held_constraints,
     is_maximised,
-    too_large,
+    owned_constraints,
+    too_large_message,
+    unique_name,
 )
 from robochoc.model.constraint import INFINITE, Domain, Function, Predicate
 from robochoc.model.expression import Apply, Constant, Expression, Name, text
@@ -42,12 +42,12 @@ class FlatTeam:
         self.title = title
         self.maximize = is_maximised(team)
         self.is_weighted = team.kind == ProblemKind.DISWCSP
-        self.constant = constant_of(team)
+        self.constant = constant_cost(team)
         self.domains, self.domain_of = _domains(team)
-        self.held = list(held_constraints(team))
+        self.owned = list(owned_constraints(team))
         self._tabulator = Tabulator(team)
 
-    def table(self, one: HeldConstraint, hint: str = "") -> TabulatedConstraint:
+    def table(self, one: OwnedConstraint, hint: str = "") -> TabulatedConstraint:
         """Return a constraint as a table.
 
         Raises:
@@ -55,10 +55,10 @@ class FlatTeam:
         """
         table = self._tabulator.table(one)
         if table is None:
-            raise UnsupportedError(f"{self.title}: {too_large(self.team, one.constraint)}{hint}")
+            raise UnsupportedError(f"{self.title}: {too_large_message(self.team, one.constraint)}{hint}")
         return table
 
-    def small_table(self, one: HeldConstraint) -> TabulatedConstraint | None:
+    def small_table(self, one: OwnedConstraint) -> TabulatedConstraint | None:
         """Return a constraint as a table. None: it would have more than `MAX_LISTED` tuples."""
         return self._tabulator.table(one, most=MAX_LISTED)
 
@@ -189,7 +189,7 @@ class Document:
         """Add a constraint. Its name is made unique."""
         variables = tuple(scope)
         stated = {
-            "name": free_name(name, self._names),
+            "name": unique_name(name, self._names),
             "arity": str(len(variables)),
             "scope": " ".join(variables),
             "reference": reference,

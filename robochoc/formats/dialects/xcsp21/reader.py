@@ -173,9 +173,7 @@ class _Xcsp21Reader:
         if most and most != "infinity":
             bound = finite_cost(most)
             self.found.maximal_cost = bound
-            text = (
-                f"costs of {most} or more forbid (maximalCost); an optimum of as much means that there is no solution"
-            )
+            text = f"costs of {most} or more are infinite (maximalCost): an optimum of {most} or more is no solution"
             self.found.notes.append(ConversionNote("bound", text))
 
     def _agent(self, element: ElementView) -> None:

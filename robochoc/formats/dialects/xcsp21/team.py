@@ -86,7 +86,7 @@ class _TeamBuilder:
             costs=self._units() if is_weighted else PLAIN_COSTS,
             extras=Extras(parts=parts),
         )
-        changed = self._names.changed
+        changed = self._names.originals
         notes = (*notes_on_names([*changed.items()]), *self._notes)
         bound = None if instance.maximal_cost is None or instance.maximize else Fraction(instance.maximal_cost)
         return ImportResult(team, dialect, changed, notes, bound)
@@ -171,10 +171,10 @@ class _TeamBuilder:
         if len(owners) == 1:
             return ""
         if len(one.scope) > 2 or _is_function(one):  # noqa: PLR2004 - partially known constraints are binary
-            text = f"{one.name} was known to {one.private_agent} alone; now all robots of its scope know it"
+            text = f"{one.name} is known only to {one.private_agent} in the file; now all robots of its scope know it"
             self._notes.append(ConversionNote("known to more", text))
             return ""
-        self._notes.append(ConversionNote("partially known", f"{one.name} is known to {one.private_agent} alone (PKC)"))
+        self._notes.append(ConversionNote("partially known", f"{one.name} is known only to {one.private_agent} (PKC)"))
         return one.private_agent
 
     def _constraint(self, one: ForeignConstraint, content: ForeignTable | Formula) -> Constraint:

@@ -11,9 +11,8 @@ import itertools
 from collections.abc import Callable, Iterable, Sequence
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.posting import MAX_ENUMERATED, MAX_NODES, Item, Posting
-from robochoc.formats.dialects.xcsp3.template import Element, first_index
-from robochoc.formats.dialects.xcsp3.terms import (
+from robochoc.formats.dialects.xcsp3.constraint_element import Element, first_index
+from robochoc.formats.dialects.xcsp3.expressions import (
     FALSE,
     TRUE,
     Xcsp3Condition,
@@ -29,6 +28,7 @@ from robochoc.formats.dialects.xcsp3.terms import (
     total,
     zip_equal,
 )
+from robochoc.formats.dialects.xcsp3.posting import MAX_ENUMERATED, MAX_NODES, Item, Posting
 from robochoc.formats.dialects.xcsp3.variables import lists, values_of
 from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Name, names
 
@@ -57,7 +57,7 @@ def all_different(element: Element, posting: Posting) -> None:
     excepted = excepted_rows(element, groups)
     for group in groups:
         for here, there in itertools.combinations(group, 2):
-            posting.post(disjunction([differ(here, there), *_is_one_of(here, excepted)]))
+            posting.post(disjunction([different(here, there), *_is_one_of(here, excepted)]))
 
 
 def all_equal(element: Element, posting: Posting) -> None:
@@ -65,12 +65,12 @@ def all_equal(element: Element, posting: Posting) -> None:
     members = vectors(element, posting)
     excepted = excepted_rows(element, [members])
     for one, other in itertools.combinations(members, 2) if excepted else itertools.pairwise(members):
-        posting.post(disjunction([same(one, other), *_is_one_of(one, excepted), *_is_one_of(other, excepted)]))
+        posting.post(disjunction([equal(one, other), *_is_one_of(one, excepted), *_is_one_of(other, excepted)]))
 
 
 def ordered(element: Element, posting: Posting) -> None:
     """Post that values of a list are ordered, at given distances, or that lists are in lexicographic order."""
-    operator = order_of(element)
+    operator = read_order(element)
     members = vectors(element, posting)
     if not element.has("lengths") or any(len(member) > 1 for member in members):
         _post_chain(operator, members, posting)
@@ -85,7 +85,7 @@ def ordered(element: Element, posting: Posting) -> None:
 
 def lex(element: Element, posting: Posting) -> None:
     """Post that lists, or the rows and the columns of a matrix, are in lexicographic order."""
-    operator = order_of(element)
+    operator = read_order(element)
     if element.has("matrix"):
         rows = [tuple(as_integers(posting.item(word) for word in row)) for row in element.matrix("matrix")]
         groups = [rows, list(zip(*rows, strict=True))]
@@ -100,10 +100,10 @@ def lex(element: Element, posting: Posting) -> None:
 
 def sum_of(element: Element, posting: Posting) -> None:
     """Post a condition on a sum of products."""
-    posting.post(posting.condition(element.text("condition")).on(weighted(element, posting)))
+    posting.post(posting.condition(element.text("condition")).on(weighted_sum(element, posting)))
 
 
-def weighted(element: Element, posting: Posting) -> Expression:
+def weighted_sum(element: Element, posting: Posting) -> Expression:
     """Return the sum of the members of `<list>`, multiplied by `<coeffs>`."""
     members = as_integers(items(element.words("list"), posting))
     if not element.has("coeffs"):
@@ -124,20 +124,20 @@ def n_values(element: Element, posting: Posting) -> None:
     """Post a condition on the number of different values of a list, or of different lists."""
     members = vectors(element, posting)
     excepted = excepted_rows(element, [members])
-    posting.post(posting.condition(element.text("condition")).on(_distinct(members, excepted)))
+    posting.post(posting.condition(element.text("condition")).on(_number_of_values(members, excepted)))
 
 
-def distinct(members: Sequence[Expression]) -> Expression:
+def number_of_values(members: Sequence[Expression]) -> Expression:
     """Return the number of different values of `members`."""
-    return _distinct([(member,) for member in members], [])
+    return _number_of_values([(member,) for member in members], [])
 
 
-def _distinct(members: Sequence[Vector], excepted: Sequence[Row]) -> Expression:
+def _number_of_values(members: Sequence[Vector], excepted: Sequence[Row]) -> Expression:
     """Return the number of different `members` outside `excepted`: each counts unless an earlier one is equal."""
     _limit_pairs(members)
     first = []
     for number, member in enumerate(members):
-        new = [differ(member, earlier) for earlier in members[:number]]
+        new = [different(member, earlier) for earlier in members[:number]]
         if excepted:
             new.append(Apply("not", (disjunction(_is_one_of(member, excepted)),)))
         first.append(as_integer(conjunction(new)) if new else Constant(1))
@@ -167,7 +167,7 @@ def extremum(operator: str) -> Callable[[Element, Posting], None]:
         members = as_integers(items(element.words("list"), posting))
         if element.has("index"):
             place = Xcsp3Condition("eq", posting.term(element.text("index")))
-            _post_place(operator, members, place, element.start(), element.attribute("rank", "index"), posting)
+            _post_index(operator, members, place, element.start_index(), element.attribute("rank", "index"), posting)
             if not element.has("condition"):
                 return
         condition = posting.condition(element.text("condition"))
@@ -175,30 +175,30 @@ def extremum(operator: str) -> Callable[[Element, Posting], None]:
             for member in members:
                 posting.post(condition.on(member))
         else:
-            posting.post(condition.on(best(operator, members)))
+            posting.post(condition.on(extremum_of(operator, members)))
 
     return post
 
 
-def place_of_extremum(operator: str) -> Callable[[Element, Posting], None]:
+def index_of_extremum(operator: str) -> Callable[[Element, Posting], None]:
     """Return the function for a condition on the index of the least or greatest value of a list."""
 
     def post(element: Element, posting: Posting) -> None:
         members = as_integers(items(element.only_list(), posting))
         condition = posting.condition(element.text("condition"))
-        _post_place(operator, members, condition, element.start(), element.attribute("rank"), posting)
+        _post_index(operator, members, condition, element.start_index(), element.attribute("rank"), posting)
 
     return post
 
 
-def best(operator: str, members: Sequence[Expression]) -> Expression:
+def extremum_of(operator: str, members: Sequence[Expression]) -> Expression:
     """Return the least or greatest of `members`. Raises `MistakeError` if there are none."""
     if not members:
         raise MistakeError("the list of a minimum or maximum is empty", "name its members")
     return members[0] if len(members) == 1 else Apply(operator, tuple(members))
 
 
-def _post_place(
+def _post_index(
     operator: str, members: Sequence[Expression], condition: Xcsp3Condition, start: int, rank: str, posting: Posting
 ) -> None:
     """Post that `condition` holds for an index of the extremum: for any, for the first, or for the last one."""
@@ -308,7 +308,7 @@ def bin_packing(element: Element, posting: Posting) -> None:
     """Post conditions on the load of each bin."""
     bins = as_integers(items(element.words("list"), posting))
     sizes = [posting.term(word) for word in element.words("sizes")]
-    start = element.start()
+    start = element.start_index()
     if element.has("condition"):
         condition = posting.condition(element.text("condition"))
         used = sorted({value for item in bins for value in posting.domain(item)})
@@ -435,7 +435,7 @@ def excepted_rows(element: Element, groups: Sequence[Sequence[Vector]]) -> list[
     rows: list[Row] = (
         [(value,) for value in values_of(text.split())]
         if text[:1] != "("
-        else [tuple(map(integer, row)) for row in rows_of(text)]
+        else [tuple(map(integer, row)) for row in split_rows(text)]
     )
     for row in rows:
         if len(row) != width:
@@ -443,12 +443,12 @@ def excepted_rows(element: Element, groups: Sequence[Sequence[Vector]]) -> list[
     return rows
 
 
-def same(one: Vector, other: Vector) -> Expression:
+def equal(one: Vector, other: Vector) -> Expression:
     """Return an expression that is true if two vectors are equal."""
     return conjunction([compare("eq", *pair) for pair in zip(one, other, strict=True)])
 
 
-def differ(one: Vector, other: Vector) -> Expression:
+def different(one: Vector, other: Vector) -> Expression:
     """Return an expression that is true if two vectors differ."""
     return disjunction([compare("ne", *pair) for pair in zip(one, other, strict=True)])
 
@@ -463,7 +463,7 @@ def as_integers(members: Iterable[Item]) -> list[Expression]:
     return [as_integer(member) for member in members]
 
 
-def order_of(element: Element) -> str:
+def read_order(element: Element) -> str:
     """Return the operator of an ordered constraint. Raises `MistakeError`."""
     operator = element.text("operator")
     if operator not in ORDERS:
@@ -487,7 +487,7 @@ def _is_one_of(member: Vector, rows: Sequence[Row]) -> list[Expression]:
     """Return expressions of which one is true if `member` is one of `rows`."""
     if len(member) == 1:
         return [is_one_of(member[0], [value for (value,) in rows])] if rows else []
-    return [same(member, tuple(map(Constant, row))) for row in rows]
+    return [equal(member, tuple(map(Constant, row))) for row in rows]
 
 
 def _one_of(member: Expression, values: Sequence[Expression]) -> Expression:
@@ -523,6 +523,6 @@ def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]
     return disjunction(cases)
 
 
-def rows_of(text: str) -> list[list[str]]:
+def split_rows(text: str) -> list[list[str]]:
     """Return the words of each list in parentheses, without blanks."""
     return [[word.strip() for word in row] for row in lists(text)]

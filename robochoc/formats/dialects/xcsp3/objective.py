@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.constraints import as_integers, best, distinct, items, weighted
+from robochoc.formats.dialects.xcsp3.constraint_element import Element
+from robochoc.formats.dialects.xcsp3.constraints import as_integers, extremum_of, items, number_of_values, weighted_sum
 from robochoc.formats.dialects.xcsp3.document import ignore_remarks
+from robochoc.formats.dialects.xcsp3.expressions import as_integer, compare, disjunction, times, total
 from robochoc.formats.dialects.xcsp3.posting import Posting
-from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import as_integer, compare, disjunction, times, total
 from robochoc.formats.element_view import ElementView
 from robochoc.model.expression import Apply, Constant, Expression, names
 
@@ -34,7 +34,7 @@ def post_objective(objectives: ElementView, posting: Posting) -> bool:
     maximize = view.tag == "maximize"
     objective = _objective(Element(view, posting.variables), posting, maximize=maximize)
     worst = "min" if maximize else "max"
-    for term in split(objective):
+    for term in split_sum(objective):
         if isinstance(term, Apply) and term.operator == worst and posting.size(names(term)) > MAX_TOGETHER:
             posting.post_cost(_bounded_by(term, posting))
         else:
@@ -59,7 +59,7 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
     if kind == "expression":
         return as_integer(posting.term(element.text()))
     if kind == "sum" and element.view.has_children:
-        return weighted(element, posting)
+        return weighted_sum(element, posting)
     members = as_integers(items(element.only_list(), posting))
     if not members:
         raise MistakeError("the objective has no variables", "name them")
@@ -69,20 +69,20 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
         case "product":
             return members[0] if len(members) == 1 else Apply("mul", tuple(members))
         case "minimum" | "maximum":
-            return best(kind[:3], members)
+            return extremum_of(kind[:3], members)
         case "nValues":
-            return _number_of_values(members, posting, maximize=maximize)
+            return _n_values_objective(members, posting, maximize=maximize)
         case _:
             raise MistakeError(f'an objective of type="{shortened(kind)}" is not supported', "write a sum")
 
 
-def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximize: bool) -> Expression:
+def _n_values_objective(members: Sequence[Expression], posting: Posting, *, maximize: bool) -> Expression:
     """Return the number of different values of `members`; for many members, as a sum of auxiliary variables.
 
     In an optimal solution the sum equals this number; in other solutions the sum is no better.
     """
     if posting.size({name for member in members for name in names(member)}) <= MAX_TOGETHER:
-        return distinct(members)
+        return number_of_values(members)
     parts: list[Expression] = []
     if maximize:
         for number, member in enumerate(members):
@@ -107,7 +107,7 @@ def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximi
     return total(parts)
 
 
-def split(expression: Expression) -> list[Expression]:
+def split_sum(expression: Expression) -> list[Expression]:
     """Split `expression` into a sum of terms, one for each set of variables.
 
     The last term is the sum of the terms without variables, if there are any.

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.xcsp3.terms import (
+from robochoc.formats.dialects.xcsp3.expressions import (
     FALSE,
     TRUE,
     Xcsp3Condition,

@@ -11,11 +11,11 @@ from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, invalid_input
 from robochoc.formats.dialects.dialect import MAX_FILE, ConversionNote, ImportOptions, ImportResult, NameMap
 from robochoc.formats.dialects.xcsp3 import constraints, scheduling, tables
+from robochoc.formats.dialects.xcsp3.constraint_element import Element, slide_scopes
 from robochoc.formats.dialects.xcsp3.constraints import circuit
 from robochoc.formats.dialects.xcsp3.document import check_root, ignore_remarks
 from robochoc.formats.dialects.xcsp3.objective import post_objective
 from robochoc.formats.dialects.xcsp3.posting import Posting, readable_number
-from robochoc.formats.dialects.xcsp3.template import Element, slide_scopes
 from robochoc.formats.dialects.xcsp3.variables import Variables, domain_of, read_variables
 from robochoc.formats.element_view import ElementView, open_xml
 from robochoc.model.assembly import assemble
@@ -38,8 +38,8 @@ KINDS: Mapping[str, Kind] = {
     "cardinality": constraints.cardinality,
     "minimum": constraints.extremum("min"),
     "maximum": constraints.extremum("max"),
-    "minimumArg": constraints.place_of_extremum("min"),
-    "maximumArg": constraints.place_of_extremum("max"),
+    "minimumArg": constraints.index_of_extremum("min"),
+    "maximumArg": constraints.index_of_extremum("max"),
     "channel": constraints.channel,
     "instantiation": constraints.instantiation,
     "clause": constraints.clause,
@@ -115,9 +115,7 @@ def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imp
     changed = {ours: theirs for theirs, ours in ids.items() if ours != theirs}
     notes = list(_notes(posting, root, changed))
     if options.infinity is not None:
-        notes.append(
-            ConversionNote("infinity", "no cost of XCSP3 forbids, however large: its constraints are hard ones")
-        )
+        notes.append(ConversionNote("infinity", "--infinity has no effect: XCSP3 has hard constraints"))
     return ImportResult(team, NAME, changed, tuple(notes))
 
 

@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from robochoc.formats.diagnostics import MistakeError
+from robochoc.formats.dialects.xcsp3.constraint_element import Element
 from robochoc.formats.dialects.xcsp3.constraints import as_integers, items
-from robochoc.formats.dialects.xcsp3.posting import Posting
-from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import (
+from robochoc.formats.dialects.xcsp3.expressions import (
     Xcsp3Condition,
     as_integer,
     compare,
@@ -21,6 +20,7 @@ from robochoc.formats.dialects.xcsp3.terms import (
     total,
     zip_equal,
 )
+from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.model.expression import Constant, Expression
 
 MAX_COVERS = 5_000

@@ -10,10 +10,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from robochoc.formats.definitions import MAX_TUPLES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
-from robochoc.formats.dialects.xcsp3.constraints import as_integers, items, rows_of
-from robochoc.formats.dialects.xcsp3.posting import Item, Posting
-from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import (
+from robochoc.formats.dialects.xcsp3.constraint_element import Element
+from robochoc.formats.dialects.xcsp3.constraints import as_integers, items, split_rows
+from robochoc.formats.dialects.xcsp3.expressions import (
     Xcsp3Condition,
     compare,
     conjunction,
@@ -22,6 +21,7 @@ from robochoc.formats.dialects.xcsp3.terms import (
     is_one_of,
     span,
 )
+from robochoc.formats.dialects.xcsp3.posting import Item, Posting
 from robochoc.model.expression import Apply, Constant, Expression
 
 MAX_WRITTEN_OUT = 100_000
@@ -147,25 +147,25 @@ def element(element: Element, posting: Posting) -> None:
         return
     if element.attribute("rank", "index") not in {"", "any"}:
         raise MistakeError("the attribute rank of <element> is not supported", "delete it")
-    start = element.start()
+    start = element.start_index()
     index = posting.term(element.text("index"))
-    choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
+    post_element(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
 
 
 def _element_of_matrix(element: Element, posting: Posting, condition: Xcsp3Condition) -> None:
     rows = [as_integers(posting.term(word) for word in row) for row in element.matrix("matrix")]
-    down = element.start("startRowIndex", "matrix")
-    across = element.start("startColIndex", "matrix")
+    down = element.start_index("startRowIndex", "matrix")
+    across = element.start_index("startColIndex", "matrix")
     indexes = items(element.words("index"), posting)
     if len(indexes) != 2:  # noqa: PLR2004 - of row and column
         raise MistakeError(f"the matrix has {len(indexes)} indexes", "write two: <index> i j </index>")
     cells: dict[Row, Expression] = {
         (down + i, across + j): member for i, row in enumerate(rows) for j, member in enumerate(row)
     }
-    choose(posting, indexes, cells, condition)
+    post_element(posting, indexes, cells, condition)
 
 
-def choose(
+def post_element(
     posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Xcsp3Condition
 ) -> None:
     """Post `condition` on the cell at `indexes`: as a table if all cells are integers, else cell by cell.
@@ -223,7 +223,7 @@ def mdd(element: Element, posting: Posting) -> None:
 
 def _arcs(element: Element) -> Arcs:
     arcs: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
-    for row in rows_of(element.text("transitions")):
+    for row in split_rows(element.text("transitions")):
         if len(row) != 3:  # noqa: PLR2004 - from, value, to
             what = f"the transition ({shortened(','.join(row))}) is not valid"
             raise MistakeError(what, "write (state,value,state)")

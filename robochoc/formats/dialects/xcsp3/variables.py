@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.xcsp3.document import ignore_remarks
-from robochoc.formats.dialects.xcsp3.terms import integer, span, words_of
+from robochoc.formats.dialects.xcsp3.expressions import integer, span, words_of
 from robochoc.formats.element_view import ElementView
 from robochoc.model.problem import Domain
 from robochoc.model.ranges import merge_ranges

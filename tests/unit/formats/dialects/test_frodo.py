@@ -275,7 +275,7 @@ def test_a_constraint_that_is_too_large_for_a_relation_needs_intension() -> None
     predicate = Predicate("p", ("X", "Y", "Z"), parse("lt(add(X,Y),Z)", ("X", "Y", "Z"), Type.BOOLEAN))
     variables = {name: [Variable(name, Domain("d", (range(101),)))] for name in names}
     team = assemble("t", variables, [Constraint("c", predicate, names, names)])
-    with pytest.raises(UnsupportedError, match=r"1,030,301 combinations of values; .*--intension keeps"):
+    with pytest.raises(UnsupportedError, match=r"1,030,301 combinations of values; .*--intension writes"):
         written("frodo", team)
     (content,) = written("frodo", team, intension=True).values()
     assert content.count(b"<predicate ") == 1

@@ -14,7 +14,7 @@ import yaml
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.pydcop import python_function
-from robochoc.formats.dialects.pydcop.hosting import VariableOwners
+from robochoc.formats.dialects.pydcop.owners import VariableOwners
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.assembly import assemble

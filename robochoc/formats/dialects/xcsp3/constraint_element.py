@@ -9,7 +9,7 @@ from functools import cached_property
 
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.xcsp3.document import flag
-from robochoc.formats.dialects.xcsp3.terms import integer, zip_equal
+from robochoc.formats.dialects.xcsp3.expressions import integer, zip_equal
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.formats.element_view import ElementView
 
@@ -73,7 +73,7 @@ class Element:
         """Return an attribute of the element or of a child; empty if it is missing."""
         return (self.view.required(child) if child else self.view).attribute(name)
 
-    def start(self, name: str = "startIndex", child: str = "list") -> int:
+    def start_index(self, name: str = "startIndex", child: str = "list") -> int:
         """Return the number of the first member of a list. Raises `MistakeError`."""
         return first_index(self.view.required(child), name) if self.has(child) else 0
 
