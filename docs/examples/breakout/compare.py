@@ -1,4 +1,4 @@
-"""Breakout beside ABT and AFC, on the same random graphs: how often each finds a colouring, and at what cost."""
+"""Compare breakout with ABT and AFC on the same random graphs: the number of colourings found, and the costs."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from robochoc.run.options import Options, Runtime
 
 TEAMS = [soluble(15, 32, Random(seed)) for seed in range(20)]
 ENOUGH = 20_000
-"""Messages after which a run is given up."""
+"""The number of messages after which a run ends."""
 
 
 def row(protocol: str) -> str:
-    """One line of the table: the medians are over the runs that came to a solution."""
+    """Return a line of the table; the medians are over the runs that found a solution."""
     options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, messages=ENOUGH)
     solved = [outcome for team in TEAMS if (outcome := solve(team, options)).verdict is Verdict.SOLUTION]
     messages = median(sum(outcome.metrics.messages.values()) for outcome in solved)

@@ -1,25 +1,25 @@
 """Distributed breakout.
 
 Yokoo, Hirayama: "Distributed breakout algorithm for solving distributed constraint satisfaction problems", ICMAS
-1996; also Hirayama, Yokoo: "The distributed breakout algorithms", AIJ 161 (2005). The methods and the state bear the
+1996; also Hirayama, Yokoo: "The distributed breakout algorithms", AIJ 161 (2005). The methods and the state have the
 names of its procedures:
 
     send_improve   `_send_improve`      wait_ok? mode, wait_improve? mode   `_waits_for_ok`
     send_ok        `_send_ok`           weights of constraint violations    `weights`
 
-Local search in waves. All robots tell their neighbours their values (`Ok`), then by how much each could improve
-(`Improve`); of neighbours only the one that improves most moves. Where nobody can improve, what is violated there
-weighs more from then on. Whatever the messages' delays, the waves are the same, and so is the result.
+Local search in waves. All robots send their neighbours their values (`Ok`), then their possible improvements
+(`Improve`); among neighbours only the one with the largest improvement moves. If no neighbour can improve, the robot's
+violated constraints weigh more from then on. The waves, and so the result, do not depend on the messages' delays.
 
-Not complete: it proves nothing, and on a problem without a solution it goes on until a limit is reached. How the robots
-know that they have finished: a termination counter of c says that all robots within distance c hold no violated
-constraint. Distances are less than the number of robots, and when one robot's counter has come that far, so have those
-of all robots that it is connected with, in the same wave. So all fall silent at once, and nobody has to be told.
+Incomplete: it proves nothing, and on a problem without a solution it continues until a limit is reached. Termination: a
+counter of c means that no robot within distance c has a violated constraint. Distances are less than the number of
+robots, and when one robot's counter reaches this number, so do those of all connected robots, in the same wave. So all
+robots stop sending at once, without further messages.
 
-Five things the paper leaves open: constraints may be n-ary (all robots of a scope are neighbours, and each weighs the
-violation for itself); a weight belongs to a nogood, that is to a constraint and the values that violate it; the first
-value of the domain is where each robot begins, and of equally good values the first is taken, for a protocol draws no
-lots; the number of robots stands for the diameter that nobody knows; a robot whose domain is empty gives up at once.
+Choices that the paper leaves open: constraints may be n-ary (all robots of a scope are neighbours, and each weighs the
+violation for itself); a weight belongs to a nogood, that is to a constraint and the values that violate it; each robot
+starts with the first value of its domain, and of equally good values the first is chosen, without random numbers; the
+number of robots replaces the unknown diameter; a robot whose domain is empty gives up at once.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 Nogood = tuple[int, str, tuple[tuple[str, Value], ...]]
-"""The own value's place, the constraint that it violates, and what that constraint sees of the others."""
+"""The place of this robot's value, the constraint that it violates, and the values of others in that constraint."""
 
 
 class Ok(Message, frozen=True):
@@ -46,27 +46,27 @@ class Ok(Message, frozen=True):
     value: Value
 
     def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
+        """Return the sender's sentence."""
         return f"{words.own_value(self.value)} in this wave"
 
 
 class Improve(Message, frozen=True):
-    """By how much the sender could improve, what it pays now, and its termination counter (`improve`)."""
+    """The sender's possible improvement, its present cost, and its termination counter (`improve`)."""
 
     my_improve: int
     current_eval: int
     my_termination_counter: int
 
-    act = Act(Performative.PROPOSE, "of neighbours, the one that improves most is to move")
+    act = Act(Performative.PROPOSE, "the neighbour with the largest improvement moves")
 
     def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
+        """Return the sender's sentence."""
         weight = counted(self.current_eval, "weighted violation")
         return f"I have {weight}, and could do with {self.my_improve} less"
 
 
 class Breakout(Protocol):
-    """One agent of distributed breakout. State: as the paper names it, and what has come of the two waves so far."""
+    """One agent of distributed breakout. State: as in the paper, and the messages of both waves received so far."""
 
     messages = Ok | Improve
     traits = Traits(
@@ -87,16 +87,16 @@ class Breakout(Protocol):
         self._improves: dict[str, Improve] = {}
 
     def start(self) -> None:
-        """Take the first value, and tell it."""
+        """Choose the first value, and send it."""
         if self.problem.values:
-            self._take(0)
+            self._choose(0)
         else:
             self.conclude(Verdict.UNKNOWN)
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type; a wave that is complete is answered by the next one.
+        """Store the message; a complete wave is answered by the next one.
 
-        A neighbour may be ahead by one message, so each is kept until its wave's turn has come.
+        A neighbour may be ahead by one message, so each message is stored until its wave.
         """
         if self.verdict is not None:
             return
@@ -113,7 +113,7 @@ class Breakout(Protocol):
             self._send_ok()
 
     def _send_improve(self) -> None:
-        """All neighbours' values are known: find the best own one, and say by how much it would be better."""
+        """All neighbours' values are known: find this robot's best value, and send the improvement."""
         self.agent_view, self._oks, self._waits_for_ok = self._oks, {}, False
         current_eval = best = self._eval(self.current_value)
         self.consistent = current_eval == 0
@@ -123,12 +123,12 @@ class Breakout(Protocol):
         self.my_improve = current_eval - best
         self.can_move = self.my_improve > 0
         self.quasi_local_minimum = self.my_improve == 0
-        self._tell(Improve(self.my_improve, current_eval, self.my_termination_counter))
+        self._send_to_all(Improve(self.my_improve, current_eval, self.my_termination_counter))
 
     def _send_ok(self) -> None:
         """All neighbours' improvements are known: finish, make violations weigh more, or move."""
-        for neighbour, told in self._improves.items():
-            self._compare(neighbour, told)
+        for neighbour, improve in self._improves.items():
+            self._compare(neighbour, improve)
         self._improves, self._waits_for_ok = {}, True
         if self.consistent:
             self.my_termination_counter += 1
@@ -137,31 +137,31 @@ class Breakout(Protocol):
         if self.quasi_local_minimum:
             for nogood in self._violations(self.current_value):
                 self.weights[nogood] = self.weights.get(nogood, 1) + 1
-        self._take(self.new_value if self.can_move else self.current_value)
+        self._choose(self.new_value if self.can_move else self.current_value)
 
-    def _compare(self, neighbour: str, told: Improve) -> None:
-        """Who improves most moves, and between equals the one that comes first in the order."""
-        self.my_termination_counter = min(self.my_termination_counter, told.my_termination_counter)
-        if told.my_improve > self.my_improve:
+    def _compare(self, neighbour: str, improve: Improve) -> None:
+        """Let the robot with the largest improvement move; of equal ones the first in the order."""
+        self.my_termination_counter = min(self.my_termination_counter, improve.my_termination_counter)
+        if improve.my_improve > self.my_improve:
             self.can_move = self.quasi_local_minimum = False
-        elif told.my_improve == self.my_improve and self.order.rank[neighbour] < self.order.rank[self.problem.agent]:
+        elif improve.my_improve == self.my_improve and self.order.rank[neighbour] < self.order.rank[self.problem.agent]:
             self.can_move = False
-        if told.current_eval > 0:
+        if improve.current_eval > 0:
             self.consistent = False
 
     def _eval(self, index: int) -> int:
-        """The sum of the weights of all violations by the value at `index`."""
+        """Return the sum of the weights of all violations by the value at `index`."""
         return sum(self.weights.get(nogood, 1) for nogood in self._violations(index))
 
     def _violations(self, index: int) -> list[Nogood]:
         conflicts = self.problem.conflicts(index, self.agent_view)
         return [(index, key, tuple(conflict.items())) for conflict, key in conflicts]
 
-    def _take(self, index: int) -> None:
-        """Take the value at `index`, which may be the present one, and tell all neighbours (`ok?`)."""
+    def _choose(self, index: int) -> None:
+        """Choose the value at `index`, which may be the present one, and send it to all neighbours (`ok?`)."""
         self.value = self.current_value = index
-        self._tell(Ok(self.problem.values[index]))
+        self._send_to_all(Ok(self.problem.values[index]))
 
-    def _tell(self, message: Message) -> None:
+    def _send_to_all(self, message: Message) -> None:
         for neighbour in self.problem.neighbours:
             self.send(neighbour, message)

@@ -147,7 +147,7 @@ class BreadthFirstTree:
         return sent
 
     def _round(self, others: dict[str, Place]) -> Sent:
-        """Process one round, with the others of all neighbours."""
+        """Process one round, with the places of all neighbours."""
         heights = [place.height for place in others.values() if place.height is not None]
         if heights:
             self.height = heights[0]

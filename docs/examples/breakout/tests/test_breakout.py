@@ -28,19 +28,19 @@ def agents(team: Team) -> dict[str, Breakout]:
 
 
 def deliver(team: dict[str, Breakout]) -> list[tuple[str, str, Message]]:
-    """Hand over all that has been said so far: who said what to whom."""
-    said = [(name, receiver, message) for name, agent in team.items() for receiver, message in agent.outbox]
+    """Deliver all sent messages; return them with their senders and receivers."""
+    sent = [(name, receiver, message) for name, agent in team.items() for receiver, message in agent.outbox]
     for agent in team.values():
         agent.outbox.clear()
-    for sender, receiver, message in said:
+    for sender, receiver, message in sent:
         team[receiver].receive(sender, message)
-    return said
+    return sent
 
 
-def told(agent: Breakout, *said: tuple[str, Message]) -> list[tuple[str, Message]]:
-    """What `agent` answers."""
+def answers(agent: Breakout, *received: tuple[str, Message]) -> list[tuple[str, Message]]:
+    """Return the answers of `agent` to the messages."""
     agent.outbox.clear()
-    for sender, message in said:
+    for sender, message in received:
         agent.receive(sender, message)
     return agent.outbox
 
@@ -75,60 +75,60 @@ def test_the_first_value_is_told_to_all_neighbours() -> None:
 def test_who_improves_most_moves_and_the_others_stay() -> None:
     others = [Ok((1,)), Improve(1, 1, 0)]
     agent = started(PATH, "R1")
-    assert told(agent, *[(name, message) for message in others for name in ("R0", "R2")])[-1] == ("R2", Ok((2,)))
+    assert answers(agent, *[(name, message) for message in others for name in ("R0", "R2")])[-1] == ("R2", Ok((2,)))
     agent = started(PATH, "R0")
-    assert told(agent, ("R1", Ok((1,))), ("R1", Improve(2, 2, 0)))[-1] == ("R1", Ok((1,)))
+    assert answers(agent, ("R1", Ok((1,))), ("R1", Improve(2, 2, 0)))[-1] == ("R1", Ok((1,)))
 
 
 def test_of_equals_the_first_in_the_order_moves() -> None:
     alike = [Ok((1,)), Improve(1, 1, 0)]
-    assert told(started(PAIR, "R0"), *[("R1", message) for message in alike])[-1] == ("R1", Ok((2,)))
-    assert told(started(PAIR, "R1"), *[("R0", message) for message in alike])[-1] == ("R0", Ok((1,)))
+    assert answers(started(PAIR, "R0"), *[("R1", message) for message in alike])[-1] == ("R1", Ok((2,)))
+    assert answers(started(PAIR, "R1"), *[("R0", message) for message in alike])[-1] == ("R0", Ok((1,)))
 
 
 def test_in_a_quasi_local_minimum_violations_weigh_more() -> None:
     agent = started(colouring(2, [(0, 1)], 1), "R0")
     wave = [("R1", Ok((1,))), ("R1", Improve(0, 1, 0))]
-    assert told(agent, *wave)[0] == ("R1", Improve(0, 1, 0))
-    assert told(agent, *wave)[0] == ("R1", Improve(0, 2, 0))
-    assert told(agent, *wave)[0] == ("R1", Improve(0, 3, 0))
+    assert answers(agent, *wave)[0] == ("R1", Improve(0, 1, 0))
+    assert answers(agent, *wave)[0] == ("R1", Improve(0, 2, 0))
+    assert answers(agent, *wave)[0] == ("R1", Improve(0, 3, 0))
 
 
 def test_where_a_neighbour_can_improve_nothing_weighs_more() -> None:
     agent = started(colouring(2, [(0, 1)], 1), "R0")
-    told(agent, ("R1", Ok((1,))), ("R1", Improve(1, 1, 0)))
+    answers(agent, ("R1", Ok((1,))), ("R1", Improve(1, 1, 0)))
     assert agent.weights == {}
 
 
 def test_a_neighbour_may_be_ahead_by_one_message() -> None:
     agent = started(TRIANGLE, "R0")
-    assert told(agent, ("R1", Ok((2,))), ("R1", Improve(0, 0, 0))) == []
-    assert told(agent, ("R2", Ok((1,)))) == [("R1", Improve(1, 1, 0)), ("R2", Improve(1, 1, 0))]
-    assert told(agent, ("R1", Ok((3,)))) == []
+    assert answers(agent, ("R1", Ok((2,))), ("R1", Improve(0, 0, 0))) == []
+    assert answers(agent, ("R2", Ok((1,)))) == [("R1", Improve(1, 1, 0)), ("R2", Improve(1, 1, 0))]
+    assert answers(agent, ("R1", Ok((3,)))) == []
     assert agent.agent_view == {"R1": (2,), "R2": (1,)}
-    assert told(agent, ("R2", Improve(1, 1, 0))) == [("R1", Ok((3,))), ("R2", Ok((3,)))]
+    assert answers(agent, ("R2", Improve(1, 1, 0))) == [("R1", Ok((3,))), ("R2", Ok((3,)))]
 
 
 def test_the_counter_is_one_more_than_the_least_around() -> None:
     agent = started(colouring(5, [(0, 1), (1, 2), (2, 3), (3, 4)]), "R1")
-    first = told(agent, *_satisfied(0, 0), *_satisfied(0, 0))
+    first = answers(agent, *_satisfied(0, 0), *_satisfied(0, 0))
     assert ("R0", Improve(0, 0, 0)) in first
-    assert ("R0", Improve(0, 0, 1)) in told(agent, *_satisfied(0, 1))
-    assert ("R0", Improve(0, 0, 1)) in told(agent, *_satisfied(7, 7))
+    assert ("R0", Improve(0, 0, 1)) in answers(agent, *_satisfied(0, 1))
+    assert ("R0", Improve(0, 0, 1)) in answers(agent, *_satisfied(7, 7))
 
 
 def test_the_counter_begins_again_beside_a_violation() -> None:
     agent = started(colouring(5, [(0, 1), (1, 2), (2, 3), (3, 4)]), "R1")
-    told(agent, *_satisfied(0, 0))
+    answers(agent, *_satisfied(0, 0))
     assert agent.my_termination_counter == 1
-    told(agent, ("R0", Ok((2,))), ("R2", Ok((2,))), ("R0", Improve(0, 0, 3)), ("R2", Improve(0, 1, 0)))
+    answers(agent, ("R0", Ok((2,))), ("R2", Ok((2,))), ("R0", Improve(0, 0, 3)), ("R2", Improve(0, 1, 0)))
     assert agent.my_termination_counter == 0
 
 
 def test_the_counter_begins_again_with_an_own_violation() -> None:
     agent = started(colouring(5, [(0, 1), (1, 2), (2, 3), (3, 4)]), "R1")
-    told(agent, *_satisfied(0, 0))
-    assert told(agent, ("R0", Ok((1,))), ("R2", Ok((2,)))) == [("R0", Improve(1, 1, 0)), ("R2", Improve(1, 1, 0))]
+    answers(agent, *_satisfied(0, 0))
+    assert answers(agent, ("R0", Ok((1,))), ("R2", Ok((2,)))) == [("R0", Improve(1, 1, 0)), ("R2", Improve(1, 1, 0))]
 
 
 def test_a_robot_without_neighbours_says_nothing() -> None:
@@ -140,7 +140,7 @@ def test_a_robot_without_neighbours_says_nothing() -> None:
 def test_a_robot_without_values_gives_up() -> None:
     agent = started(colouring(2, [(0, 1)], 0), "R0")
     assert agent.verdict is Verdict.UNKNOWN
-    assert told(agent, ("R1", Ok((1,)))) == []
+    assert answers(agent, ("R1", Ok((1,)))) == []
 
 
 @pytest.mark.parametrize("nodes", [2, 3, 6, 10])
