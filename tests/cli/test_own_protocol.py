@@ -186,7 +186,7 @@ def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(here: Path, tmp_p
     about, details = json.loads(feed.about()), json.loads(feed.details(0))
     (improved,) = [kind for kind in about["kinds"] if kind["name"] == "Improve"]
     assert improved["performative"] == "propose"
-    assert improved["why"] == "of neighbours, the one that improves most is to move"
+    assert improved["why"] == "the neighbour with the largest improvement moves"
     assert next(one["words"] for one in details if "V1" in one["words"]) == f"Scout says: {ok}"
 
 
