@@ -161,7 +161,7 @@ def test_a_message_in_full(page: Page, tmp_path: Path) -> None:
         page.get_by_role("button", name="ACL text").click()
     coming.value.save_as(tmp_path / "saved")
     assert (tmp_path / "saved").read_text() == FEED.detail(TRACE.causes(later)[0])["acl"] + "\n"
-    page.get_by_label("What is saved").select_option("shown")
+    page.get_by_label("Messages to save").select_option("shown")
     with page.expect_download() as coming:
         page.get_by_role("button", name="JSON").click()
     coming.value.save_as(tmp_path / "all")

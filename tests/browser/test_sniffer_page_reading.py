@@ -170,7 +170,7 @@ def test_the_verdict_leads_to_the_step_that_decided(page: Page) -> None:
     last = max(step for step, number in enumerate(TRACE.steps.robot) if TRACE.robots[number] == witness)
     page.click("#verdict")
     text_is(page, "#moment + output b", f"step {last + 1} of {len(TRACE.steps.t)}")
-    until(lambda: f"{witness} took it in, and concluded: no solution." in page.inner_text("#message"), "not said")
+    until(lambda: f"{witness} received it, and concluded: no solution." in page.inner_text("#message"), "not said")
     page.hover(".head[aria-pressed=true]")
     assert page.evaluate(CONTRAST) == []
     assert page.locator(".head.party").count() == 2
@@ -188,7 +188,7 @@ def test_why_there_is_no_state_is_told(page: Page) -> None:
       source.states = async () => [{ ...nothing, more: { replay: "ends here: no `Ok`" } }];
     }""")
     page.evaluate(f"Sniffer.page.robot({robot('Robot2.2')}); Sniffer.page.time.go(91)")
-    until(lambda: "cannot be worked out further: no Ok" in page.inner_text("#robot"), "not said")
+    until(lambda: "Its later states are not available: no Ok" in page.inner_text("#robot"), "not said")
     assert page.inner_text("#robot .notice code") == "Ok"
     assert "its last step before this moment" in page.inner_text("#robot")
     page.evaluate("() => { Sniffer.page.source.states = window.states; }")
@@ -214,7 +214,7 @@ def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Pag
         file.write_bytes(b"".join(list(lines_of(JOURNAL))[:600]))
         until(lambda: "The run continues." in page.inner_text("#verdict"), "it has not begun")
         until(lambda: not page.locator("#nothing").is_visible(), "it still waits")
-    text_is(page, "#verdict", "The run's end was not seen.")
+    text_is(page, "#verdict", "The end of the run is not known.")
     page.close()
 
 

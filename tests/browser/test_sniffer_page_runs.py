@@ -77,7 +77,7 @@ def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Browser, tmp
         count = server.json("about")["messages"]
         with shown(browser, server.url, f"{count} messages") as page:
             ends.close()
-            until(lambda: "The run's server has ended" in page.inner_text("#notices"), "nobody says so")
+            until(lambda: "The server of this page has ended" in page.inner_text("#notices"), "nobody says so")
             assert page.inner_text("#counts") == f"{count} messages"
             assert rows(page)
 
@@ -112,7 +112,7 @@ def test_names_of_strangers_are_text(browser: Browser, tmp_path: Path) -> None:
         assert any(name.startswith("</script>") for name in heads(page))
         assert page.locator("img").count() == 0
         assert "broken" not in page.title().split("onerror")[0]
-        assert "cannot be worked out" in page.inner_text("#notices")
+        assert "states are not available" in page.inner_text("#notices")
 
 
 def test_an_export_needs_no_server(browser: Browser, tmp_path: Path) -> None:

@@ -1,6 +1,6 @@
 "use strict";
-/* The view in the page's address, behind the #: a reload, or a bookmark, shows the same. Only what differs from how the
-   page begins is written. */
+/* The view in the fragment of the page's address, for reloads and bookmarks. Only differences from the initial view are
+   written. */
 (() => {
   /* 0,1,2,5 as 0-2,5 */
   const ranges = (numbers) => {
@@ -30,13 +30,13 @@
     arrows: ["bent", "straight"] };
 
   Sniffer.Address = class {
-    /* `keepsMoment`: whether the user has chosen it; else it is the end of the run, wherever that is by then. */
+    /* `keepsMoment`: whether the user has chosen the moment; otherwise it is the present end of the run. */
     constructor(model, view, keepsMoment) {
       Object.assign(this, { model, view, keepsMoment });
       this.save = Sniffer.seldom(250, () => this._save());
     }
 
-    /* How the page begins: called before anything was changed. */
+    /* The initial view: called before any change. */
     begin() {
       this.first = this._entries();
     }
@@ -67,11 +67,11 @@
       try {
         history.replaceState(null, "", hash);
       } catch {
-        /* some viewers of files do not allow it; then a reload begins anew */
+        /* some viewers of files do not allow it; then a reload shows the initial view */
       }
     }
 
-    /* Takes what the address says. The places in the run come back, for when that much has been loaded. */
+    /* Applies the address. Returns the positions in the run, which are used when these parts are loaded. */
     read() {
       const { view, model } = this;
       const parts = new URLSearchParams(location.hash.slice(1));
@@ -97,7 +97,7 @@
           const list = JSON.parse(parts.get(name));
           if (Array.isArray(list)) changes[key] = wrap(list.filter((entry) => typeof entry === "string").slice(0, 1000));
         } catch {
-          /* an address that somebody has edited: what cannot be read is left as it is */
+          /* invalid parts of an edited address are ignored */
         }
       }
       if (parts.has("off")) changes.off = new Set(numbers(parts.get("off"), 65536));

@@ -1,11 +1,11 @@
 "use strict";
-/* The chart's window: when it is painted, how it is moved, and what is pointed at. */
+/* The chart's window: painting, scrolling, and the elements under the pointer. */
 (() => {
-  const NEAR = 7; // pixels: nearer than that an arrow is meant
+  const NEAR = 7; // pixels: the largest distance at which the pointer selects an arrow
   const SMALLEST = 2;
   const LARGEST = 64;
 
-  /* How far a point is from a line between two others. */
+  /* The distance of a point from the line between two others. */
   const distance = (x, y, { x1, y1, x2, y2 }) => {
     const along = ((x - x1) * (x2 - x1) + (y - y1) * (y2 - y1)) / ((x2 - x1) ** 2 + (y2 - y1) ** 2 || 1);
     const at = Math.min(Math.max(along, 0), 1);
@@ -22,7 +22,7 @@
       this.drawing = new Sniffer.Drawing(model, view, this.shape);
       this.heads = new Sniffer.Heads(model, view, lanes, this.shape, handlers);
       this.minimap = new Sniffer.Minimap(model, view, this.shape, () => this.scrolled());
-      this.costs = []; // of the last frames, in ms
+      this.costs = []; // durations of the last frames, in ms
       this._listen();
     }
 
@@ -46,10 +46,10 @@
       canvas.height = Math.round(box.height * sharp);
       this.minimap.measure();
       this.shape.clamp();
-      this.paint(); // at once: a canvas that is resized is empty
+      this.paint(); // immediately, since a resized canvas is empty
     }
 
-    /* Whatever has changed, one frame shows it. */
+    /* One frame shows all changes. */
     draw() {
       if (this._waiting) return;
       this._waiting = true;
@@ -100,7 +100,7 @@
       this.scrolled();
     }
 
-    /* Brings a row into the window, with some of what is around it. */
+    /* Scrolls a row into the window, with some rows around it. */
     reveal(row, lane = -1) {
       const { view, shape } = this;
       const rows = shape.rowsInWindow;
@@ -129,7 +129,7 @@
       this.shape.clamp();
     }
 
-    /* All lifelines in the window, rows as at first, and what was looked at still there. */
+    /* Shows all lifelines, with the initial row height, and keeps the present position. */
     fit() {
       const { view, filter, shape } = this;
       const row = view.selected >= 0 ? filter.rowOf(view.selected) : -1;
@@ -151,7 +151,7 @@
       else this.scrollBy(down / this.view.rowHeight, across);
     }
 
-    /* Pressed and moved: the window moves along. Pressed and let go in one place: what is there is chosen. */
+    /* A drag scrolls the window; a click selects the element under the pointer. */
     _grab(event) {
       if (event.button) return;
       const { canvas, view } = this;
@@ -174,7 +174,7 @@
       for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, end, { once: true });
     }
 
-    /* What is at a point: a step's box, else the nearest arrow, else the message of that row. */
+    /* The element at a point: a step's box, else the nearest arrow, else the message of the row. */
     at(event) {
       const { left, top } = this.canvas.getBoundingClientRect();
       const [x, y] = [event.clientX - left, event.clientY - top];
@@ -233,8 +233,8 @@
       const { sender, receiver, t, bytes } = model.messages;
       const kind = model.kindOf(m);
       const taken = model.receivedStep[m];
-      const fate = taken === Sniffer.NONE ? (model.whole ? "never taken in" : "not taken in yet")
-        : `taken in after ${Sniffer.moment(model.steps.t[taken] - t[m])}`;
+      const fate = taken === Sniffer.NONE ? (model.whole ? "never received" : "not received yet")
+        : `received after ${Sniffer.moment(model.steps.t[taken] - t[m])}`;
       return [
         Sniffer.make("strong", {}, `${Sniffer.count(m)} ${kind.name}`),
         Sniffer.make("span", {}, `${model.nameOf(sender[m])} → ${model.nameOf(receiver[m])}`),
@@ -252,7 +252,7 @@
         Sniffer.make("strong", {}, model.nameOf(robot)),
         Sniffer.make("span", {}, `its step ${Sniffer.count(model.ordinal[step] + 1)}, step ${Sniffer.count(step + 1)} of all`),
         Sniffer.make("span", {}, model.valueAt(robot, step) || "no value"),
-        Sniffer.make("small", {}, `took in ${Sniffer.count(took)}, said ${Sniffer.count(said)}`),
+        Sniffer.make("small", {}, `received ${Sniffer.count(took)}, sent ${Sniffer.count(said)}`),
       ];
     }
   };

@@ -1,5 +1,5 @@
 "use strict";
-/* What every button, list and key of the page does. */
+/* The actions of all buttons, lists and keys of the page. */
 (() => {
   const byId = (id) => document.getElementById(id);
 

@@ -1,25 +1,25 @@
 "use strict";
-/* How much was said by when: `Sniffer.counters(element, model) -> {show(step), update()}`.
+/* Counters over time: `Sniffer.counters(element, model) -> {show(step), update()}`.
 
-   Three small charts over the run's steps: messages sent, taken in and under way; the clock of non-concurrent constraint
-   checks; messages by type. The numbers at the present moment stand in a table below. A click (or a drag) on a chart
+   Three small charts over the run's steps: messages sent, received and in transit; the clock of non-concurrent constraint
+   checks; messages by type. The numbers at the present moment are in a table below. A click (or a drag) on a chart
    sends `moment` with the step in `detail`, from the element upwards. */
 (() => {
-  const SAMPLES = 512; // at most; then every other one goes
+  const SAMPLES = 512; // the maximum number of points; with more, every other point is dropped
   const HEIGHT = 76;
-  const KINDS = 8; // lines of their own; there are as many colours
+  const KINDS = 8; // the number of types with their own line, and of colours
 
-  /* How many messages nobody has taken in when `run` began: what is under way when a run ends is lost. */
+  /* The number of messages in transit when `run` began: messages in transit at the end of a run are lost. */
   const lost = (model, run) => {
     const began = model.about.runs[run];
     return began ? began.message - (began.step ? model.steps.packetEnd[began.step - 1] : 0) : 0;
   };
 
-  /* The running sums at every `every`-th step: all that is drawn, however long the run. */
+  /* The running sums at every `every`-th step, so that the number of drawn points is limited. */
   class Sums {
     constructor() {
       this.every = 1;
-      this.steps = 0; // counted so far
+      this.steps = 0; // steps counted so far
       this.messages = 0;
       this.clock = 0;
       this.run = -1;
@@ -57,7 +57,7 @@
     }
   }
 
-  /* What was counted up to the end of `step`, exactly. */
+  /* The exact counts at the end of `step`. */
   const countedAt = (model, sums, step) => {
     const { messages, steps } = model;
     const place = Math.floor((step + 1) / sums.every) - 1;
@@ -142,7 +142,7 @@
       pen.lineTo(Math.min(now, width - 1), HEIGHT);
       pen.stroke();
       const last = lines.map((line) => `${line.name} ${Sniffer.count(line.of(sums.now))}`).join(", ");
-      this.canvas.setAttribute("aria-label", `${this.title} over ${Sniffer.many(stepCount, "step")}; in the end: ${last}`);
+      this.canvas.setAttribute("aria-label", `${this.title} over ${Sniffer.many(stepCount, "step")}; at the end: ${last}`);
       this.key.style.cssText = "margin:.1rem 0 0";
       const again = runs.length > 1 ? [Sniffer.make("span", { class: "soft" }, this.again)] : [];
       Sniffer.fill(this.key, ...lines.map((line) => {
@@ -152,7 +152,7 @@
       }), ...again);
     }
 
-    /* A line where another run, or epoch, begins: what is under way is lost there, and the clocks begin again. */
+    /* A line at the start of another run or epoch: messages in transit are lost there, and the clocks restart. */
     begun(pen, runs, stepCount, width) {
       pen.strokeStyle = Sniffer.palette.paint.soft;
       pen.lineWidth = 1;
@@ -185,12 +185,12 @@
       this.charts = [
         new Chart("Messages", () => [
           { name: "sent", colour: colour(0), dash: dash(0), of: (row) => row.sent },
-          { name: "taken in", colour: colour(1), dash: dash(1), of: (row) => row.received },
-          { name: "under way", colour: colour(2), dash: dash(2), of: (row) => row.way },
+          { name: "received", colour: colour(1), dash: dash(1), of: (row) => row.received },
+          { name: "in transit", colour: colour(2), dash: dash(2), of: (row) => row.way },
         ], choose),
         new Chart("Non-concurrent constraint checks", () => [
           { name: "NCCC", colour: colour(3), dash: dash(0), of: (row) => row.clock },
-        ], choose, "┊ new run, NCCCs from 0 on"),
+        ], choose, "┊ new run, NCCCs restart at 0"),
         new Chart("By type", () => this.kinds().map((kind) => (
           { name: this.model.about.kinds[kind].name, colour: colour(kind), dash: dash(kind), of: (row) => row.kinds[kind] || 0 }
         )), choose),
@@ -207,7 +207,7 @@
       this.update();
     }
 
-    /* The types said most often. */
+    /* The most frequent types. */
     kinds() {
       const { kindCounts, about } = this.model;
       return about.kinds.map((_, kind) => kind).sort((a, b) => kindCounts[b] - kindCounts[a]).slice(0, KINDS);
@@ -253,8 +253,8 @@
         Sniffer.make("thead", {}, head),
         Sniffer.make("tbody", {},
           row("sent", (at) => at.sent),
-          row("taken in", (at) => at.received),
-          row("under way", (at) => at.way),
+          row("received", (at) => at.received),
+          row("in transit", (at) => at.way),
           row("NCCC", (at) => at.clock),
           ...this.kinds().map((kind) => row(model.about.kinds[kind].name, (at) => at.kinds[kind] || 0))));
     }

@@ -1,10 +1,10 @@
 "use strict";
-/* One message in full: what it says in words, every field of the ACL message, its content, its causes, its consequences. */
+/* One message in full: in words, all fields of the ACL message, its content, causes and consequences. */
 (() => {
-  const LINKS = 60; // a packet of thousands is told by its number
-  const ENTRIES = 500; // of one list in a content
+  const LINKS = 60; // of a larger packet, only the number is shown
+  const ENTRIES = 500; // the maximum number of shown entries of a list
 
-  /* JSON as a tree. Inner levels are made when they are opened, so that no depth or length of a stranger's can hurt. */
+  /* JSON as a tree. Inner levels are created when they are opened, so that untrusted content of any size is harmless. */
   Sniffer.tree = (value, name, depth = 0) => {
     const { make } = Sniffer;
     const label = name === undefined ? null : make("b", {}, `${name}: `);
@@ -50,7 +50,7 @@
         button.textContent = "Copied";
         Sniffer.say("Copied");
       } catch {
-        button.textContent = "The browser does not allow it";
+        button.textContent = "The browser does not allow copying";
       }
       setTimeout(() => (button.textContent = "Copy"), 1500);
     } }, "Copy");
@@ -69,7 +69,7 @@
       if (m < 0 || m >= model.messageCount) {
         this._key = "";
         Sniffer.fill(this.element, Sniffer.make("p", { class: "hint" }, m < 0
-          ? "Choose a message: press its arrow, or its row in the table. What it says, why it was said and what came of it then stand here."
+          ? "Choose a message: click its arrow, or its row in the table. Its words, causes and consequences are shown here."
           : `Message ${Sniffer.count(m)} has not been loaded yet.`));
         return;
       }
@@ -100,13 +100,13 @@
         make("p", { class: "who" }, robot(sender[m]), " → ", robot(receiver[m])),
         this.words,
         kind.why ? make("p", { class: "soft" }, ...Sniffer.coded(kind.why)) : null,
-        make("h3", {}, "Why it was said"),
+        make("h3", {}, "Causes"),
         Sniffer.links(model, causes, handlers, this._uncaused(sender[m], step[m])),
-        make("h3", {}, "What came of it"),
+        make("h3", {}, "Consequences"),
         Sniffer.links(model, model.consequencesOf(m), handlers, taken !== Sniffer.NONE ? this._quietly(receiver[m], taken)
-          : model.whole ? `${to} never took it in.` : `${to} has not taken it in yet.`),
+          : model.whole ? `${to} never received it.` : `${to} has not received it yet.`),
         make("h3", {}, "When"),
-        Sniffer.facts([["Said", `t = ${moment(t[m])}`], ["Taken in", fate], ["Run", Sniffer.runName(model.runOf(m) || { protocol: "?" })],
+        Sniffer.facts([["Said", `t = ${moment(t[m])}`], ["Received", fate], ["Run", Sniffer.runName(model.runOf(m) || { protocol: "?" })],
           ["Step", `${count(step[m] + 1)}, ${from}'s ${count(model.ordinal[step[m]] + 1)}`],
           ["NCCC clock", count(clock[m])], ["Size", Sniffer.many(bytes[m], "byte")]]),
         this.more,
@@ -115,21 +115,21 @@
       this._details(m);
     }
 
-    /* Why a message without a cause was said. */
+    /* The reason for a message without a cause. */
     _uncaused(robot, step) {
       const { model } = this;
       const before = model.ordinal[step] ? model.ownSteps[robot].all[model.ordinal[step] - 1] : -1;
       const begins = before < 0 || model.steps.run[before] !== model.steps.run[step];
       const name = model.nameOf(robot);
-      return begins ? `${name} said it at its start, before any message had come.`
-        : `The messages that ${name} had taken in before are not in this journal.`;
+      return begins ? `${name} sent it at its start, before it received any message.`
+        : `The messages that ${name} received before are not in this journal.`;
     }
 
-    /* What came of a message after which nothing was said. */
+    /* The consequence of a message without further messages. */
     _quietly(robot, step) {
       const found = this.model.concludedIn.get(step);
       const name = this.model.nameOf(robot);
-      return found && found.robot === robot ? `${name} took it in, and ${found.text}.` : `${name} took it in and said nothing.`;
+      return found && found.robot === robot ? `${name} received it, and ${found.text}.` : `${name} received it and sent nothing.`;
     }
 
     async _details(m) {
@@ -138,7 +138,7 @@
       try {
         detail = await this.texts.detail(m);
       } catch (trouble) {
-        if (this.view.selected === m) this.words.textContent = `What it says cannot be had: ${trouble.message}`;
+        if (this.view.selected === m) this.words.textContent = `The message cannot be loaded: ${trouble.message}`;
         return;
       }
       if (this.view.selected !== m || !detail) return;

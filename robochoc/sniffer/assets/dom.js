@@ -1,9 +1,9 @@
 "use strict";
-/* Small things the other files need: elements whose texts are text only, numbers as people read them, tabs. */
+/* Common functions: elements with plain text, readable numbers, tabs. */
 (() => {
   Sniffer.byId = (id) => document.getElementById(id);
 
-  /* An element. Whatever is in `children` and is no element becomes text: data never becomes markup here. */
+  /* Creates an element. Items of `children` that are not elements become text, so data never becomes markup. */
   Sniffer.make = (name, properties = {}, ...children) => {
     const element = document.createElement(name);
     for (const [key, value] of Object.entries(properties)) {
@@ -17,13 +17,13 @@
     return element;
   };
 
-  /* Replaces the children only where something changed, so that live news do not close what a user has opened. */
+  /* Replaces only the changed children, so that live news do not close elements that the user has opened. */
   Sniffer.fill = (element, ...children) => {
     element.replaceChildren(...children.filter((child) => child !== null && child !== undefined));
     return element;
   };
 
-  /* A sentence in which names stand between backticks, as what can be put into an element: these become code. */
+  /* The parts of a sentence for an element; names between backticks become code. */
   Sniffer.coded = (text) => String(text).split("`").map((part, at) => (at % 2 ? Sniffer.make("code", {}, part) : part));
   Sniffer.uncoded = (text) => String(text).replaceAll("`", "");
 
@@ -31,13 +31,13 @@
   Sniffer.count = (number) => whole.format(number);
   Sniffer.many = (number, one, several = one + "s") => `${whole.format(number)} ${number === 1 ? one : several}`;
 
-  /* Seconds to a precision that tells neighbouring events apart; simulated steps are whole numbers. */
+  /* Seconds with a precision that distinguishes neighbouring events; simulated steps are integers. */
   Sniffer.moment = (t) => {
     if (!Number.isFinite(t)) return "";
     return Number.isInteger(t) ? whole.format(t) : t < 10 ? t.toFixed(4) : t < 1000 ? t.toFixed(3) : t.toFixed(1);
   };
 
-  /* Said to screen readers, without moving anything. Repeating news are kept apart by time, not to talk all the while. */
+  /* Announces a text to screen readers. Repeated news are announced only from time to time. */
   let spoken = 0;
   Sniffer.say = (text, seldom = false) => {
     const now = performance.now();
@@ -46,7 +46,7 @@
     Sniffer.byId("said").textContent = text;
   };
 
-  /* Runs `action` at most every `ms`, with what was said last: all the while, and once more after the end. */
+  /* Runs `action` at most every `ms`, with the latest arguments, and once more after the last call. */
   Sniffer.seldom = (ms, action) => {
     let last = null;
     return (...all) => {
@@ -61,7 +61,7 @@
 
   Sniffer.icon = (button, name) => button.querySelector("use").setAttribute("href", "#i-" + name);
 
-  /* A tablist as ARIA's authoring practices describe it: arrows move, the chosen tab alone is in the tab order. */
+  /* A tab list according to ARIA's authoring practices: arrow keys move, and only the chosen tab is in the tab order. */
   Sniffer.tabs = (list, chosen) => {
     const tabs = [...list.querySelectorAll("[role=tab]")];
     const choose = (tab, tell = true) => {

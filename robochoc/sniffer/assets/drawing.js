@@ -1,8 +1,8 @@
 "use strict";
-/* Paints the chart: what is in the window, and nothing else, so that a frame costs the same in any run. */
+/* Paints the chart. Only the content of the window is painted, so that the cost of a frame does not depend on the run. */
 (() => {
-  const PASSING = 400; // arrows that only pass through the window
-  const STEPS = 4000; // more steps than this between two rows are not looked through, only those that speak
+  const PASSING = 400; // the maximum number of arrows that only pass through the window
+  const STEPS = 4000; // of more steps between two rows, only those with messages are painted
   const FONT = "12px system-ui, sans-serif";
   const SMALL = "11px system-ui, sans-serif";
 
@@ -20,7 +20,7 @@
   Sniffer.Drawing = class {
     constructor(model, view, shape) {
       Object.assign(this, { model, view, shape, hover: -1 });
-      this.arrows = []; // what was painted last, for who points at it
+      this.arrows = []; // the painted elements, for the pointer
       this.boxes = [];
       this.pills = new Set();
     }
@@ -50,7 +50,7 @@
       this._moment();
     }
 
-    /* The selected message's causes and consequences stand out; the rest steps back a little. */
+    /* Highlights the causes and consequences of the selected message; other messages are dimmed. */
     _relate() {
       const { model, view } = this;
       this.related = new Map();
@@ -60,7 +60,7 @@
       this.related.set(view.selected, "this");
     }
 
-    /* Who says the chosen message, and who hears it, stand on a lighter ground; the chosen robot's own line is bold. */
+    /* The sender and receiver of the chosen message have a lighter background; the chosen robot's lifeline is bold. */
     _lifelines() {
       const { pen, shape, paints, view, model } = this;
       const { list } = shape.lanes;
@@ -101,7 +101,7 @@
       pen.globalAlpha = 1;
     }
 
-    /* A line where another run, or epoch, begins. */
+    /* A line at the start of another run or epoch. */
     _runs() {
       const { pen, shape, paints, model } = this;
       this.begun = [];
@@ -119,7 +119,7 @@
       }
     }
 
-    /* Above all that stands there. */
+    /* Above all other elements. */
     _runNames() {
       const { pen, shape, paints } = this;
       for (const [run, y] of this.begun) {
@@ -139,7 +139,7 @@
       if (this.first >= shape.filter.length) return;
       const message = shape.filter.at(this.first);
       const passing = model.passing(message, model.firstStepAt(message), PASSING).filter((m) => shape.filter.shows(m));
-      const waiting = new Map(); // by lifeline: the more wait at one, the fainter each is
+      const waiting = new Map(); // by lifeline: with more waiting messages, each is fainter
       for (const m of passing) {
         const lane = shape.lanes.of[model.messages.receiver[m]];
         waiting.set(lane, (waiting.get(lane) || 0) + 1);
@@ -183,7 +183,7 @@
       this.arrows.push({ m, x1, y1, x2, y2 });
     }
 
-    /* To a robot's own lifeline: what robots of one group, or the others, say to each other. */
+    /* Messages to the same lifeline, between robots of a group or of the others. */
     _loop(x, y1, y2, bold) {
       const { pen } = this;
       const out = x + Math.min(34, this.shape.laneWidth * 0.45);
@@ -194,8 +194,8 @@
       this._point(x + 5, y2, out, y2, bold);
     }
 
-    /* What waits long goes over at once, and then waits beside the receiver's lifeline for the step that takes it in: so one
-       sees who speaks to whom, and how much waits where. Returns how far down what can be pointed at goes. */
+    /* A message that waits long crosses at once, and then waits beside the receiver's lifeline for the step that receives
+       it, so that the receiver and the number of waiting messages are visible. Returns the lowest y of the clickable part. */
     _bent({ x1, y1, x2, y2, side, bend, bold }) {
       const { pen } = this;
       const beside = x2 - side * 1.4;
@@ -289,7 +289,7 @@
       }
     }
 
-    /* The value a robot has now, on the side of its lifeline where its first message does not go. */
+    /* A robot's present value, on the side of its lifeline that is opposite to its first message. */
     _pill(step, decision, x, y) {
       const { pen, shape, model, paints } = this;
       pen.font = SMALL;
@@ -311,7 +311,7 @@
       pen.fillText(text, left + 5, y + 0.5);
     }
 
-    /* Type, and performative where there is room, above the arrow's beginning: one message a row, so nothing collides. */
+    /* The type, and the performative if there is room, above the start of the arrow. Each row has only one message. */
     _label(m, row) {
       const { pen, shape, model } = this;
       const { sender, receiver } = model.messages;
@@ -333,7 +333,7 @@
       pen.globalAlpha = 1;
     }
 
-    /* Text on a rim of paper, so that lines below it do not cross it out. */
+    /* Text with an outline in the background colour, for readability on lines. */
     _text(text, x, y, colour) {
       const { pen } = this;
       pen.lineWidth = 3.5;

@@ -1,5 +1,5 @@
 "use strict";
-/* Which messages are shown: rows, in order. While nothing is left out there is no list, as rows are messages then. */
+/* The shown messages as rows, in order. Without a filter there is no list: row numbers are message numbers. */
 (() => {
   Sniffer.Filter = class {
     constructor(model, view, search) {
@@ -25,7 +25,7 @@
       return !this.rows ? message < this.done : this.at(this.rowOf(message)) === message && this.rowOf(message) < this.length;
     }
 
-    /* Whether anything is left out by more than the choice of robots. */
+    /* Whether there are filters other than the choice of robots. */
     get narrowed() {
       const { view } = this;
       return Boolean(view.off.size || view.senders || view.receivers || view.run >= 0 || view.from !== null ||
@@ -50,7 +50,7 @@
       this.extend();
     }
 
-    /* Goes on with the messages that have been loaded since. */
+    /* Adds the messages that were loaded since the last call. */
     extend() {
       const { model, view, rows } = this;
       if (model.ownSteps.length !== this._robots) return this.rebuild();
@@ -78,11 +78,11 @@
     }
   };
 
-  /* `message`, what led to it and what came of it, `depth` messages far each way. */
+  /* `message` with its causes and consequences, up to a distance of `depth` messages. */
   const concerned = (model, message, depth) => {
     const found = new Set([message]);
     for (const next of [(m) => model.causesOf(m), (m) => model.consequencesOf(m)]) {
-      const seen = new Set([message]); // of this direction: what is both cause and consequence is followed both ways
+      const seen = new Set([message]); // visited in this direction: a message may be both a cause and a consequence
       let edge = [message];
       for (let far = 0; far < depth && edge.length; far++) {
         const further = [];

@@ -1,5 +1,5 @@
 "use strict";
-/* The filters: types and performatives, who speaks to whom, when, and what concerns one message. */
+/* The filters: types and performatives, senders and receivers, times, and causes and consequences of a message. */
 (() => {
   Sniffer.FilterPane = class {
     constructor(model, view, filter) {
@@ -29,8 +29,8 @@
       };
       this.run = make("select", { "aria-label": "Run", onchange: () => view.set({ run: Number(this.run.value) }) });
       this.concern = make("select", { "aria-label": "Which messages, by cause and consequence", onchange: () => this._concern(Number(this.concern.value)) },
-        ...[["0", "all messages"], ["1", "it, its causes, what it led to"], ["2", "2 messages far"], ["4", "4 messages far"],
-          ["8", "8 messages far"], ["1000000000", "as far as it goes"]].map(([value, name]) => make("option", { value }, name)));
+        ...[["0", "all messages"], ["1", "the message, its causes and consequences"], ["2", "up to distance 2"], ["4", "up to distance 4"],
+          ["8", "up to distance 8"], ["1000000000", "at any distance"]].map(([value, name]) => make("option", { value }, name)));
       this.hits = make("input", { type: "checkbox", onchange: () => view.set({ hitsOnly: this.hits.checked }) });
       this.concerned = make("span", { class: "soft" });
       this.element.append(
@@ -75,7 +75,7 @@
       this.hits.checked = view.hitsOnly;
     }
 
-    /* No robot has a name that was written: which, and the names that exist. */
+    /* The text for a pattern that matches no robot, with the existing names. */
     _unknown(patterns, element) {
       const { robots } = this.model;
       const parts = patterns.split(",").map((part) => part.trim()).filter(Boolean);
@@ -89,7 +89,7 @@
       element.textContent = element.hidden ? "" : `No robot is named ${unknown}; there ${robots.length > 1 ? "are" : "is"} ${some}.`;
     }
 
-    /* One box a type, with its colour, dash and count; and one a performative, where that says more than the types. */
+    /* A box for each type, with its colour, dash and count; also for each performative, if these differ from the types. */
     _types() {
       const { view, model } = this;
       const { kinds } = model.about;

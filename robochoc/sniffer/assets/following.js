@@ -1,8 +1,8 @@
 "use strict";
-/* Keeping up: what has been told to exist is asked for, piece by piece, until the page has it all. A run that is faster
-   than the page is told of by how far the page is behind; the run is never waited for, nor does it wait. */
+/* Loads announced data, piece by piece, until the page is complete. If the run is faster than the page, the page shows
+   how far it is behind; neither waits for the other. */
 (() => {
-  const PAUSE_MS = 15; // between pieces, for frames to be painted
+  const PAUSE_MS = 15; // pause between pieces, in which frames are painted
 
   Sniffer.Following = class {
     constructor(model, source, handlers) {
@@ -16,13 +16,13 @@
       return Math.max(this.goal.messages - this.model.messageCount, 0);
     }
 
-    /* Whether all there will ever be is here. */
+    /* Whether the run has ended and is completely loaded. */
     get whole() {
       const { model, goal } = this;
       return Boolean(model.about.over) && model.messageCount >= goal.messages && model.stepCount >= goal.steps;
     }
 
-    /* `news`: about's numbers as they are by now. */
+    /* `news`: the present numbers of `about`. */
     async news(news) {
       const { model } = this;
       if (news.generation !== undefined && news.generation !== model.about.generation) return this.handlers.anew();
@@ -51,7 +51,7 @@
       }
     }
 
-    /* One round: messages, then the steps that may speak of them, then decisions. Whether there was anything. */
+    /* One round: messages, then steps that may refer to them, then decisions. Returns whether there was anything to load. */
     async _piece() {
       const { model, source, goal } = this;
       if (this._stale || model.outgrown) {
@@ -65,7 +65,7 @@
       }
       const upTo = (from, to) => Math.min(to, from + source.span);
       const before = [model.messageCount, model.stepCount, model.decisionCount];
-      const target = { ...goal }; // steps that came later speak of messages that are not here yet
+      const target = { ...goal }; // later steps refer to messages that are not loaded yet
       if (before[0] < target.messages) {
         const to = upTo(before[0], target.messages);
         model.addMessages(await source.columns(before[0], to), to - before[0]);

@@ -1,5 +1,5 @@
 "use strict";
-/* The boxes over the lifelines: who it is, and its value at the moment. They can be pressed, dragged, and moved by keys. */
+/* The boxes over the lifelines: the robot's name and present value. They can be clicked, dragged, and moved by keys. */
 (() => {
   Sniffer.Heads = class {
     constructor(model, view, lanes, shape, handlers) {
@@ -11,7 +11,7 @@
       this.element.addEventListener("keydown", (event) => this._key(event));
     }
 
-    /* Only those in the window are there; each keeps its button while it is. */
+    /* Only the boxes in the window exist; each keeps its button while it is there. */
     place() {
       const { shape, lanes, element } = this;
       const width = shape.laneWidth;
@@ -61,7 +61,7 @@
       head.title = `${lane.name}\n${value || "no value"}${found.replace("; ", "\n")}\nDrag it, or press Alt and an arrow, to move it`;
     }
 
-    /* What a head of that width has room for of a value, or of how many share it. */
+    /* The part of a value, or of the number of robots, that fits in a box of this width. */
     _short(value, shared, width) {
       if (shared) return width < 84 ? Sniffer.count(shared) : value;
       if (width >= 96) return value;
@@ -69,7 +69,7 @@
       return value.replace(/^[^,]* = ([^,]*)$/, width < 34 ? "$1" : "= $1");
     }
 
-    /* How many letters all names begin with, where a number follows: what narrow heads can do without. */
+    /* The length of the common prefix of all names before a number, which narrow boxes leave out. */
     _common() {
       const { robots } = this.model;
       if (this._of === robots) return this._letters;
@@ -108,7 +108,7 @@
         const { name } = this.lanes.list[at];
         this.lanes.move(at, step > 0 ? at + 2 : at - 1);
         this._focus = to;
-        Sniffer.say(`${name} is lifeline ${to + 1} now`);
+        Sniffer.say(`${name} is now lifeline ${to + 1}`);
       } else this._focusOn(to);
       requestAnimationFrame(() => requestAnimationFrame(() => this._focusOn(to)));
     }
@@ -138,7 +138,7 @@
         head.classList.remove("held");
         head.style.translate = "";
         if (!this._dragged) return;
-        setTimeout(() => (this._dragged = false)); // the click that follows is none
+        setTimeout(() => (this._dragged = false)); // ignore the following click
         const place = (now.clientX - left + this.view.left - this.shape.start) / this.shape.laneWidth;
         const to = Math.min(Math.max(Math.round(place), 0), this.lanes.list.length);
         if (to !== from && to !== from + 1) this.lanes.move(from, to);

@@ -1,34 +1,34 @@
 "use strict";
-/* The keyboard. Keys are left alone where something else has them: in text, on sliders, in lists of choices. */
+/* The keyboard. Keys are not handled in text fields, sliders, and lists of choices, which use them. */
 (() => {
   Sniffer.KEYS = [
-    ["↓ or j", "next message"], ["↑ or k", "message before"], ["PgDn, PgUp", "a window further, or back"],
+    ["↓ or j", "next message"], ["↑ or k", "previous message"], ["PgDn, PgUp", "one window forward, or back"],
     ["Home, End", "first message, last message"], ["Enter", "read the chosen message"], ["→, ←", "step forward, back"],
-    ["], [", "step forward, back, of the chosen robot"], [". ,", "next change of value, the one before, of the chosen robot"],
-    ["p", "play, or pause"], ["f", "follow what is newest"],
-    ["/", "search"], ["n, N", "next hit, hit before"], ["c, v", "first cause, first consequence"],
-    ["+, -", "larger rows, smaller rows"], ["r", "the robot that says the chosen message"], ["Esc", "choose nothing; back to the messages"],
+    ["], [", "next, previous step of the chosen robot"], [". ,", "next, previous change of the chosen robot's value"],
+    ["p", "play, or pause"], ["f", "follow the newest messages"],
+    ["/", "search"], ["n, N", "next, previous hit"], ["c, v", "first cause, first consequence"],
+    ["+, -", "larger rows, smaller rows"], ["r", "the sender of the chosen message"], ["Esc", "clear the selection; back to the messages"],
     ["Alt+← or →", "move the lifeline that has the focus"], ["?", "this list"],
   ];
   Sniffer.SIGNS = [
-    ["Box on a lifeline", "a step of that robot: what it takes in at once, decides and says"],
-    ["Yellow label", "the value it takes in that step"],
-    ["Bent arrow", "goes over when it is said, then waits beside the receiver's lifeline for the step that takes it in"],
-    ["Straight arrow", "from the step that says it to the step that takes it in"],
-    ["Red cross", "it was never taken in; while the run goes on, a dotted arrow is one not taken in yet"],
-    ["Pink line", "the moment chosen below; what comes later is faded"],
+    ["Box on a lifeline", "a step of the robot: it receives messages, decides, and sends messages"],
+    ["Yellow label", "the robot's new value in this step"],
+    ["Bent arrow", "a message crosses when it is sent, then waits beside the receiver's lifeline until a step receives it"],
+    ["Straight arrow", "from the step that sends a message to the step that receives it"],
+    ["Red cross", "the message was never received; during a run, a dotted arrow is a message not received yet"],
+    ["Pink line", "the moment chosen below; later events are faded"],
     ["▴ ▾", "a cause, a consequence, of the chosen message"],
     ["Light lifelines", "sender and receiver of the chosen message; the chosen robot's own line is bold"],
-    ["⚑", "found out how the run ends; the verdict above goes to that step"],
-    ["Strip on the right", "the whole run: how much is said of which type, where the window is (frame), the moment (pink), hits (yellow); press it to go there"],
-    ["⊞", "one lifeline for all robots of a group; ⊟: one for each again"],
+    ["⚑", "the robot found the verdict of the run; the verdict above leads to this step"],
+    ["Strip on the right", "the complete run: messages by type, the window (frame), the moment (pink), hits (yellow); click to go there"],
+    ["⊞", "one lifeline for all robots of a group; ⊟: one for each robot again"],
     ["others", "one lifeline for all robots that are not chosen"],
-    ["Only neighbours", "lifelines for the chosen robot and those it has spoken with"],
-    ["Follow", "in a run that goes on: what is newest is shown as it comes"],
+    ["Only neighbours", "lifelines for the chosen robot and the robots that exchange messages with it"],
+    ["Follow", "during a run: new messages are shown when they arrive"],
   ];
 
   const TYPING = "input:not([type=radio], [type=checkbox], [type=range]), select, textarea, [contenteditable]";
-  const MOVING = ".scrolls, [role=tablist], [role=separator], #heads, input"; // there arrows and the like have a meaning
+  const MOVING = ".scrolls, [role=tablist], [role=separator], #heads, input"; // these elements use arrow keys themselves
   const SCROLLING = new Set(["ArrowUp", "ArrowDown", "PageUp", "PageDown", "Home", "End", "ArrowLeft", "ArrowRight"]);
 
   Sniffer.keys = (does) => {

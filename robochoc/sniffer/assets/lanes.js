@@ -1,8 +1,8 @@
 "use strict";
-/* Which lifelines there are: one for each chosen robot, one for each collapsed group, and one for all others. */
+/* The lifelines: one for each chosen robot, one for each collapsed group, and one for all other robots. */
 (() => {
   const natural = new Intl.Collator("en", { numeric: true });
-  const ROW = /^(.*\d)\.\d+$/; // Robot3.1 stands in row Robot3
+  const ROW = /^(.*\d)\.\d+$/; // Robot3.1 belongs to row Robot3
 
   /* A pattern with * and ?, or several with commas between, as a test of names. Empty: any name. */
   Sniffer.matcher = (patterns) => {
@@ -22,7 +22,7 @@
       this.arrange();
     }
 
-    /* The robots in their natural order, and those of `about.chosen` chosen (all, where it names none). */
+    /* Sets the robots in their natural order, and chooses those in `about.chosen`; all if it is empty. */
     begin() {
       const { model, view } = this;
       const robots = model.robots.map((_, robot) => robot);
@@ -36,7 +36,7 @@
       this.arrange();
     }
 
-    /* Robots that have turned up since; they are chosen as the first ones were. */
+    /* Adds new robots, which are chosen in the same way as the first ones. */
     welcome() {
       const known = new Set(this.view.order);
       const wanted = this.model.about.chosen || [];
@@ -92,7 +92,7 @@
       lanes.forEach((lane, at) => lane.robots.forEach((robot) => (this.of[robot] = at)));
     }
 
-    /* Puts the robots of one lifeline before those of another; past the last one: at the end. */
+    /* Moves the robots of a lifeline before those of another one; after the last lifeline, to the end. */
     move(from, to) {
       const { view } = this;
       const moving = new Set(this.list[from].robots);
@@ -104,7 +104,7 @@
       view.touch("order");
     }
 
-    /* `robot`, and all that have spoken with it so far. */
+    /* `robot`, and all robots that have exchanged messages with it. */
     neighbours(robot) {
       const { sender, receiver } = this.model.messages;
       const found = new Set([robot]);

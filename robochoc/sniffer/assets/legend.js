@@ -1,7 +1,7 @@
 "use strict";
-/* What colours mean, where that does not stand at the filters: by performative, conversation, sender. */
+/* The meaning of colours by performative, conversation, or sender; colours of types are explained at the filters. */
 (() => {
-  const NAMED = 3; // of those that share a colour; the others stand in its tip
+  const NAMED = 3; // the maximum number of listed names with one colour; the others are in its tooltip
 
   const names = (about, robots, by) => {
     if (by === "run") return about.runs.map((run) => Sniffer.runName(run));

@@ -1,10 +1,10 @@
 "use strict";
-/* The messages as a table: the same rows as the chart's, for who reads rather than looks, and for screen readers. Only
-   the rows in the window exist; `aria-rowindex` tells which they are of all. */
+/* The messages as a table with the same rows as the chart, for reading and for screen readers. Only the rows in the
+   window exist; `aria-rowindex` has their numbers. */
 (() => {
-  const NARROW = 560; // pixels: in less, the words stand below the names
-  const MOST = 8_000_000; // pixels: browsers do not draw elements much taller than that
-  const COLUMNS = [["#", "number"], ["Time", "time"], ["From", "from"], ["To", "to"], ["Type", "type"], ["What it says", "says"]];
+  const NARROW = 560; // pixels: in a narrower table, the words are below the names
+  const MOST = 8_000_000; // pixels: browsers do not draw much taller elements
+  const COLUMNS = [["#", "number"], ["Time", "time"], ["From", "from"], ["To", "to"], ["Type", "type"], ["In words", "says"]];
 
   Sniffer.List = class {
     constructor(model, view, filter, source, handlers) {
@@ -12,7 +12,7 @@
       this.grid = Sniffer.byId("grid");
       this.table = Sniffer.byId("table");
       this.rows = [];
-      this.said = new Map(); // chunk -> its details, for those in the window
+      this.said = new Map(); // chunk -> its details, for chunks in the window
       this._placed = 0; // the position set by the page; any other position was set by the user
       this._build();
     }
@@ -39,10 +39,10 @@
       new ResizeObserver(() => this._measure()).observe(grid);
     }
 
-    /* Another width: the row on top stays there, however tall rows are now. */
+    /* After a change of the width, the top row remains, although the row height may differ. */
     _measure() {
       const { grid } = this;
-      if (grid.clientWidth < 10) return; // it is not to be seen
+      if (grid.clientWidth < 10) return; // the table is hidden
       const row = this.top;
       const narrow = grid.clientWidth < NARROW;
       if (narrow !== Boolean(this.narrow)) {
@@ -61,7 +61,7 @@
       return Math.max(Math.floor((this.grid.clientHeight - this.tall) / this.tall), 1);
     }
 
-    /* Where the whole is taller than a browser can draw, a pixel of its scrollbar stands for more than one. */
+    /* If the table is taller than browsers can draw, a pixel of its scrollbar means more than one pixel. */
     get scale() {
       const room = this.grid.clientHeight - this.tall;
       const whole = this.filter.length * this.tall;
@@ -73,7 +73,7 @@
     }
 
     set top(row) {
-      this._stretch(); // a browser scrolls no farther than the element is tall by now
+      this._stretch(); // browsers do not scroll beyond the present height of the element
       this.grid.scrollTop = (row * this.tall) / this.scale;
       this._placed = this.grid.scrollTop;
     }
@@ -99,7 +99,7 @@
       if (this.spacer.style.height !== tall) this.spacer.style.height = tall;
     }
 
-    /* Columns as wide as what stands in them, so that the words have the rest. */
+    /* Sets the widths of columns by their content, so that the words have the rest. */
     _widths() {
       const { model, grid } = this;
       const longest = (texts, most) => Math.min(texts.reduce((long, text) => Math.max(long, text.length), 4), most);
@@ -156,7 +156,7 @@
       const { sender, receiver, t } = model.messages;
       const kind = model.kindOf(m);
       const from = model.nameOf(sender[m]);
-      const prefix = `${from} says: `; // that stands under From
+      const prefix = `${from} says: `; // in the column From
       const texts = [Sniffer.count(m), Sniffer.moment(t[m]), from, model.nameOf(receiver[m]), kind.name,
         words.startsWith(prefix) ? words.slice(prefix.length) : words];
       texts.forEach((text, cell) => {
@@ -168,17 +168,17 @@
       row.children[4].style.color = Sniffer.palette.colour(Sniffer.colouring(model, view.colourBy)(m));
     }
 
-    /* The words of what is in the window; what is there already is not asked for. */
+    /* Loads the missing words of the messages in the window. */
     _words(first, shown) {
       const chunks = new Set();
       for (let at = 0; at < shown; at++) chunks.add(this.filter.at(first + at) >> 10);
       const missing = [...chunks].filter((chunk) => !this.handlers.has(chunk, this.model.messageCount));
       if (!missing.length) return;
       clearTimeout(this._asking);
-      this._asking = setTimeout(() => this.handlers.ask(missing.slice(0, 4)), 120); // not for each that is scrolled past
+      this._asking = setTimeout(() => this.handlers.ask(missing.slice(0, 4)), 120); // not for each row during scrolling
     }
 
-    /* Brings a row into the window: by as little as that takes where it is near, else with some of what is around it. */
+    /* Scrolls a row into the window: as little as possible if it is near, else with some rows around it. */
     reveal(row) {
       const first = this.top;
       const rows = this.inWindow;

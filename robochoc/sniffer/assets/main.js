@@ -1,5 +1,5 @@
 "use strict";
-/* Puts the parts together: what the user does changes the view, news change the model, and both are shown once a frame. */
+/* Connects the parts: user actions change the view, news change the model, and each frame shows both. */
 (() => {
   const { byId } = Sniffer;
   const FILTERS = ["chosen", "off", "senders", "receivers", "run", "from", "to", "concern", "about", "hitsOnly"];
@@ -28,7 +28,7 @@
       this.chart = new Sniffer.Chart(model, view, this.lanes, this.filter, { ...handlers, scrolled: () => this.sight.scrolled(this.chart) });
       this.list = new Sniffer.List(model, view, this.filter, source, { ...handlers, scrolled: () => this.sight.scrolled(this.list), message: (m) => {
         this.message(m);
-        if (this.windows.narrow()) this.windows.right(true); // there is no room for it beside the table
+        if (this.windows.narrow()) this.windows.right(true); // there is no room next to the table
       } });
       this.robots = new Sniffer.RobotList(model, view, this.lanes, handlers);
       this.filters = new Sniffer.FilterPane(model, view, this.filter);
@@ -54,7 +54,7 @@
       this.following.begin();
     }
 
-    // What the user does
+    // User actions
 
     message(m) {
       if (m < 0 || m >= this.model.messageCount) return;
@@ -68,11 +68,11 @@
       this.view.set({ robot, upper: "robot" });
     }
 
-    /* Where the run was decided: by who found out how it ends, else by the last change of a value. */
+    /* Goes to the step that decided the run: the robot's conclusion, else the last change of a value. */
     decided() {
       const { model, time, view } = this;
       const step = model.deciding >= 0 ? model.deciding : Math.max(-1, ...model.decided.map((one) => (one.step.length ? one.step.all[one.step.length - 1] : -1)));
-      if (step < 0 || step >= model.stepCount) return Sniffer.say("It is not known which step that was");
+      if (step < 0 || step >= model.stepCount) return Sniffer.say("This step is not known");
       const packet = model.packetOf(step);
       if (packet.length) this.message(packet[packet.length - 1]);
       view.set({ robot: model.steps.robot[step], upper: packet.length ? "message" : "robot" });
@@ -88,7 +88,7 @@
       byId("grid").focus({ preventScroll: true });
     }
 
-    /* Goes to the next hit (back: `step` -1) of what stands in the field by now; of a new text, to its first. */
+    /* Goes to the next hit of the search text (previous: `step` -1); for a new text, to the first hit. */
     hit(step) {
       const { view, search } = this;
       const query = byId("query").value;
@@ -96,7 +96,7 @@
         view.set({ query });
         search.find(query);
       }
-      if (!search.query) return Sniffer.say("Write what is to be searched for");
+      if (!search.query) return Sniffer.say("Enter a text to search for");
       const anew = this.visited !== search.query;
       const from = view.selected >= 0 && !anew ? view.selected : step > 0 ? -1 : Infinity;
       const found = search.running && step < 0 ? -1 : search.next(from, step, (m) => this.filter.shows(m));
@@ -117,15 +117,15 @@
       const { view } = this;
       if (view.selected < 0 || view.selected >= this.model.messageCount) return;
       const [first] = list(view.selected);
-      if (first === undefined) Sniffer.say("There is none");
+      if (first === undefined) Sniffer.say("There is none in this direction");
       else this.message(first);
     }
 
-    // What is shown of it
+    // Display
 
     changed(changed) {
       const { view, model } = this;
-      if ([...changed].every((name) => name === "top" || name === "left")) { // scrolling is the most frequent, and the least
+      if ([...changed].every((name) => name === "top" || name === "left")) { // scrolling is the most frequent change, and the smallest
         this.chart.draw();
         this.address.save();
         return;
@@ -162,7 +162,7 @@
       this.status();
     }
 
-    /* Other rows, or other lifelines: the message that is looked at stays where it is. */
+    /* After a change of rows or lifelines, the present message remains at its position in the window. */
     _refilter(lanes = false) {
       const { filter, view } = this;
       const held = this.sight.held();
@@ -221,7 +221,7 @@
       this.slowly();
     }
 
-    /* The places that the address named, once that much is here. */
+    /* Applies the positions of the address when these parts are loaded. */
     _restore() {
       const { wanted, model, view, filter, chart } = this;
       const whole = model.messageCount >= this.following.goal.messages;
@@ -251,11 +251,11 @@
       this.legend.paint();
     }
 
-    /* What was numbered is numbered anew: the page begins again, at the same view. */
+    /* The numbering has changed: loads everything again, with the same view. */
     anew() {
       this.ordering = true;
       this.status();
-      if (this.view.follow) this.time.touched = true; // who has followed it to its end is there again
+      if (this.view.follow) this.time.touched = true; // a user who has followed the run to its end is at the end again
       this.address._save();
       location.reload();
       return false;
@@ -285,22 +285,22 @@
       const late = following.behind > 0 && !following.gone ? ` · ${Sniffer.many(following.behind, "message")} not drawn yet` : "";
       byId("counts").textContent = shown + late;
       const verdict = byId("verdict");
-      const said = this.ordering || about.ordering ? "The journal is being put in order."
-        : following.gone && !about.over ? "The run's end was not seen." : about.verdict || "";
+      const said = this.ordering || about.ordering ? "The journal is being sorted."
+        : following.gone && !about.over ? "The end of the run is not known." : about.verdict || "";
       verdict.hidden = !said;
       if (verdict.textContent !== said) verdict.textContent = said;
       verdict.dataset.over = String(Boolean(about.over || following.gone));
       verdict.disabled = !about.over || model.deciding < 0 && !model.decisionCount;
-      verdict.title = verdict.disabled ? said : `${said}\nPress it to see the step that decided it`;
+      verdict.title = verdict.disabled ? said : `${said}\nClick to see the step that decided it`;
       const live = byId("live");
       live.hidden = about.over || following.gone;
       live.setAttribute("aria-pressed", String(view.follow));
       live.textContent = view.follow ? "Following" : "Follow";
-      live.title = view.follow ? "What is newest is shown as it comes (f)" : "Show what is newest (f)";
+      live.title = view.follow ? "New messages are shown when they arrive (f)" : "Show the newest messages (f)";
       const nothing = byId("nothing");
       nothing.hidden = filter.length > 0 || !(following.whole || model.messageCount || (about.live && !about.messages));
-      nothing.textContent = model.messageCount ? "The filters and the choice of robots leave nothing over."
-        : about.over ? "No message has been said." : following.gone ? "" : "Waiting for the robots";
+      nothing.textContent = model.messageCount ? "No message matches the filters and the chosen robots."
+        : about.over ? "No message was sent." : following.gone ? "" : "Waiting for the robots";
       if (this.search.query) this.searchedQuietly();
       this.notices.paint();
     }
@@ -326,14 +326,14 @@
         const scene = await this.source.scene();
         this.sceneUpTo = scene ? scene.decisions : 0;
         if (scene) this.scene = Sniffer.scene(element, scene);
-        else Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "This team's problem has no scene that could be drawn."));
+        else Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "There is no scene for this team's problem."));
         this._showMoment();
       } catch (trouble) {
         Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, `The scene cannot be shown: ${trouble.message}`));
       }
     }
 
-    /* What has been decided since goes to the scene, where that is to be seen; one question at a time. */
+    /* Loads new decisions for the scene if it is visible; one request at a time. */
     async _growScene() {
       if (!this.scene || !this.scene.add || this._askingScene || !(this.sceneUpTo < this.model.decisionCount) || byId("scene").hidden) return;
       this._askingScene = true;
@@ -342,13 +342,13 @@
         this.sceneUpTo = scene ? scene.decisions : Infinity;
         this.scene.add(scene);
       } catch {
-        /* it stands still; that the server is gone is told elsewhere */
+        /* the scene remains unchanged; the end of the server is shown elsewhere */
       }
       this._askingScene = false;
     }
   }
 
-  /* What is known of the run. A live page may be there before it: it is asked for until the robots begin. */
+  /* Loads the description of the run. A live page may be open before the robots start: it repeats the request. */
   const met = async (source) => {
     for (;;) {
       try {
@@ -363,7 +363,7 @@
   const begin = async () => {
     const source = Sniffer.source();
     Sniffer.palette.apply();
-    // ?driven: a page around this one has the line of time, so that there is no second one.
+    // ?driven: the surrounding page has the time line, so this page shows none.
     if (new URLSearchParams(location.search).has("driven")) document.documentElement.dataset.driven = "";
     const waiting = setTimeout(() => {
       byId("nothing").hidden = false;

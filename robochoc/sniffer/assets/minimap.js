@@ -1,5 +1,5 @@
 "use strict";
-/* The whole run at the side of the chart: how much is said of which type, where the window is, and a way to go there. */
+/* An overview of the run next to the chart: messages by type, and the window. A click moves the window. */
 (() => {
   const NARROW = 22;
 
@@ -27,7 +27,7 @@
       this._count();
     }
 
-    /* How many messages of which colour stand in each slice of all messages, and how many of them are shown. */
+    /* The number of messages by colour in each slice, and the number of shown messages. */
     _count() {
       const { model, view, shape } = this;
       const total = model.messageCount;
@@ -35,7 +35,7 @@
       const colours = new Uint32Array(slices * 8);
       const colourOf = Sniffer.colouring(model, view.colourBy);
       const { filter } = shape;
-      const stride = Math.max(1, Math.floor(filter.length / 400000)); // an estimate is as good where a slice is thousands
+      const stride = Math.max(1, Math.floor(filter.length / 400000)); // for slices of thousands of messages, an estimate is sufficient
       const scale = slices / Math.max(total, 1);
       for (let row = 0; row < filter.length; row += stride) {
         const m = filter.at(row);
@@ -91,7 +91,7 @@
       const room = this.width - NARROW;
       for (let slice = 0; slice < slices; slice++) {
         let x = NARROW / 2;
-        const each = Math.ceil(((slice + 1) * total) / slices) - Math.ceil((slice * total) / slices); // messages there are
+        const each = Math.ceil(((slice + 1) * total) / slices) - Math.ceil((slice * total) / slices); // the number of messages
         for (let colour = 0; colour < 8; colour++) {
           const wide = (colours[slice * 8 + colour] / Math.max(each, 1)) * room;
           if (!wide) continue;
@@ -104,7 +104,7 @@
       pen.globalAlpha = 1;
     }
 
-    /* Where hits of the search are, and the selected message. */
+    /* The hits of the search, and the selected message. */
     _marks(pen, paints) {
       const hits = this.hits || [];
       pen.fillStyle = paints.hit;

@@ -1,8 +1,8 @@
 "use strict";
-/* What has been loaded of a run, as columns, and what follows from them: who took what in, what was said in a step,
-   where steps stand among messages, and who had which value when. Everything here is append-only.
+/* The loaded part of a run as columns, and derived data: received and sent messages of steps, positions of steps among
+   messages, and values over time. All data are append-only.
 
-   This file comes first. The others may stand in any order: they name each other when they are called, not before. */
+   This file must be first. The others may be in any order, since they use each other only in later calls. */
 window.Sniffer = {};
 (() => {
   const NONE = 0xffffffff;
@@ -11,7 +11,7 @@ window.Sniffer = {};
   const MESSAGE = [["t", Float64Array], ["clock", Float64Array], ["step", Uint32Array], ["bytes", Uint32Array],
     ["sender", Uint16Array], ["receiver", Uint16Array], ["kind", Uint16Array], ["run", Uint16Array]];
 
-  /* The first index in `sorted`[0, length) whose entry is not less than `value`. */
+  /* The first index in `sorted`[0, length) with an entry not less than `value`. */
   const lowerBound = (sorted, value, length = sorted.length) => {
     let low = 0;
     let high = length;
@@ -23,7 +23,7 @@ window.Sniffer = {};
     return low;
   };
 
-  /* A typed array with room to grow. `fill` is what entries hold before they are written. */
+  /* A growing typed array. `fill`: the initial value of entries. */
   class Growing {
     constructor(Type, fill = 0) {
       this.length = 0;
@@ -64,24 +64,24 @@ window.Sniffer = {};
       this.messageCount = 0;
       this.stepCount = 0;
       this.decisionCount = 0;
-      this._received = new Growing(Uint32Array, NONE); // by message: the step that took it in
-      this._nextSaid = new Growing(Uint32Array, NONE); // by message: the next message of the same step
+      this._received = new Growing(Uint32Array, NONE); // by message: the step that received it
+      this._nextSaid = new Growing(Uint32Array, NONE); // by message: the next message received by the same step
       this._firstSaid = new Growing(Uint32Array, NONE); // by step: its first message
       this._lastSaid = new Growing(Uint32Array, NONE);
-      this._rowOf = new Growing(Uint32Array, NONE); // by step: the first message said in it or in a later one
-      this._placed = 0; // steps below this have their row
-      this._ordinal = new Growing(Uint32Array); // by step: which of its robot's own steps it is
-      this._latest = new Growing(Uint32Array); // by block of messages: the latest step that took one of it in
+      this._rowOf = new Growing(Uint32Array, NONE); // by step: the first message sent in this step or a later one
+      this._placed = 0; // the rows of steps below this are known
+      this._ordinal = new Growing(Uint32Array); // by step: its number among the steps of its robot
+      this._latest = new Growing(Uint32Array); // by block of messages: the latest step that received one of them
       this.ownSteps = [];
       this.decided = [];
-      this.decisionAt = new Map(); // step -> what its robot decided, as text
+      this.decisionAt = new Map(); // step -> its robot's decision, as text
       this.kindCounts = new Uint32Array(65536);
       this._mostKind = -1;
       this._expose();
       this.update(about);
     }
 
-    /* Takes what is known by now of the run as a whole. Robots may turn up late; those that are known keep their place. */
+    /* Sets the present description of the run. Robots may be added later; known robots keep their numbers. */
     update(about) {
       this.about = about;
       this.robots = about.robots.map((robot) => robot.name);
@@ -89,7 +89,7 @@ window.Sniffer = {};
       this._conclude();
     }
 
-    /* Who has found out how the run (or epoch) ends, and in which step, as far as that is known: by robot, the last; by step. */
+    /* The known conclusions on the end of the run or epoch: the last one by robot, and all by step. */
     _conclude() {
       this.concluded = new Map();
       this.concludedIn = new Map();
@@ -102,7 +102,7 @@ window.Sniffer = {};
       }
     }
 
-    /* The step that decided the run: that of its witness, else the last in which somebody concluded something; -1: unknown. */
+    /* The step that decided the run: that of its witness, else the last step with a conclusion; -1: unknown. */
     get deciding() {
       const { outcome } = this.about;
       const witness = outcome && outcome.witness ? this.robots.indexOf(outcome.witness) : -1;
@@ -118,12 +118,12 @@ window.Sniffer = {};
       }
     }
 
-    /* Whether something was loaded of robots or types that `about` does not name yet. */
+    /* Whether the loaded data have robots or types that are missing in `about`. */
     get outgrown() {
       return this.ownSteps.length > this.robots.length || this._mostKind >= this.about.kinds.length;
     }
 
-    /* The names that the other files read. Arrays move when they grow, so this is done after each growth. */
+    /* The arrays for the other files. Arrays are replaced when they grow, so this is called after each growth. */
     _expose() {
       this.messages = Object.fromEntries(Object.entries(this.columns.m).map(([name, column]) => [name, column.all]));
       this.steps = Object.fromEntries(Object.entries(this.columns.s).map(([name, column]) => [name, column.all]));
@@ -209,18 +209,18 @@ window.Sniffer = {};
       this.decisionCount += decisions.length;
     }
 
-    /* The row of a step among all messages, unfiltered: where its first message stands, or the next one after it. */
+    /* The row of a step among all messages, without filters: the row of its first message, or of the next message after it. */
     rowOf(step) {
       const row = step < this._placed ? this._rowOf.all[step] : NONE;
       return row === NONE ? this.messageCount : row;
     }
 
-    /* The first step that stands at message `row` or below. Rows of steps never fall, so halving finds it. */
+    /* The first step at message `row` or below, by binary search, since the rows of steps never decrease. */
     firstStepAt(row) {
       return row >= this.messageCount ? this._placed : lowerBound(this._rowOf.all, row, this._placed);
     }
 
-    /* Where among the steps that share its row a step stands: 1 for the last, which (mostly) says that message. */
+    /* The position of a step among the steps with the same row: 1 for the last one, which usually sends that message. */
     placeOf(step) {
       const row = this.rowOf(step);
       let before = step;
@@ -251,7 +251,7 @@ window.Sniffer = {};
       return step === NONE ? [] : this.saidIn(step);
     }
 
-    /* The latest of `robot`'s own steps that is not after `step`; -1: it has not begun. */
+    /* The number of `robot`'s last step up to `step`; -1: it has not started. */
     ownStepAt(robot, step) {
       const own = this.ownSteps[robot];
       return lowerBound(own.all, step + 1, own.length) - 1;
@@ -262,11 +262,11 @@ window.Sniffer = {};
       return text[lowerBound(steps.all, step + 1, steps.length) - 1] || "";
     }
 
-    /* Messages said before `message` and taken in at `step` or after: whose arrows pass. At most `limit`, nearest first. */
+    /* Messages sent before `message` and received at `step` or later, whose arrows pass; at most `limit`, nearest first. */
     passing(message, step, limit) {
       const found = [];
       const latest = this._latest.all;
-      let looked = 0; // an arrow or two in each block, over a whole long run, must not cost a frame
+      let looked = 0; // a few arrows in each block of a long run must not make a frame slow
       for (let block = (message - 1) >> 8; block >= 0 && message > 0; block--) {
         if (latest[block] < step) continue;
         if (++looked > 400) break;

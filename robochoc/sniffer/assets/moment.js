@@ -1,5 +1,5 @@
 "use strict";
-/* Time: the slider, steps forward and back, and play. The moment is a step; all that is shown is as it was after it. */
+/* Time: the slider, steps forward and back, and play. The moment is a step; the page shows the state after it. */
 (() => {
   Sniffer.Time = class {
     constructor(model, view) {
@@ -13,7 +13,7 @@
       this.whose.addEventListener("change", () => {
         if (this.whose.value === "one" && view.robot < 0) {
           this.whose.value = "all";
-          return Sniffer.say("Choose a robot first: press its name");
+          return Sniffer.say("Choose a robot first: click its name");
         }
         return view.set({ whose: this.whose.value });
       });
@@ -22,7 +22,7 @@
 
     go(step) {
       const last = Math.max(this.model.stepCount - 1, 0);
-      this.touched = true; // from now on the end of the run moves the moment no more
+      this.touched = true; // from now on, the moment does not follow the end of the run
       this.view.set({ moment: Math.min(Math.max(step, 0), last), follow: false });
       this.moved = true;
     }
@@ -39,10 +39,10 @@
       return this.go(steps.all[to]);
     }
 
-    /* The chosen robot's next change of value, or the one before. */
+    /* The next or previous change of the chosen robot's value. */
     change(by) {
       const { model, view } = this;
-      if (view.robot < 0) return Sniffer.say("Choose a robot first: press its name");
+      if (view.robot < 0) return Sniffer.say("Choose a robot first: click its name");
       const { step } = model.decided[view.robot];
       const at = Sniffer.lowerBound(step.all, view.moment + (by > 0 ? 1 : 0), step.length) - (by > 0 ? 0 : 1);
       if (at < 0 || at >= step.length) return Sniffer.say(`${model.nameOf(view.robot)} has no further change of value`);

@@ -1,7 +1,7 @@
 "use strict";
-/* What is to be known about the run as a whole, shown above it: damage, losses, what is missing, what has ended. */
+/* Notices on the run, shown above it: damage, losses, missing data, the end of the server. */
 (() => {
-  const SHOWN = 3; // of one kind; the others are counted
+  const SHOWN = 3; // the maximum number of notices of one kind; others are counted
 
   Sniffer.Notices = class {
     constructor(model, following, handlers) {
@@ -14,13 +14,13 @@
       const { about } = this.model;
       const { following } = this;
       const said = [];
-      if (following.gone) said.push(["gone", "The run's server has ended. What you see stays; what was not loaded can no longer be had."]);
-      else if (following.trouble) said.push(["trouble", `Not all could be loaded: ${following.trouble}`]);
-      if (about.damage) said.push(["damage", `The journal is damaged, and ends early: ${about.damage}`]);
-      if (about.over && !about.outcome && !about.damage) said.push(["broken", "The run broke off: the journal does not say how it ended. All it has is shown."]);
+      if (following.gone) said.push(["gone", "The server of this page has ended. The loaded data remain; other data are not available any more."]);
+      else if (following.trouble) said.push(["trouble", `Not all data could be loaded: ${following.trouble}`]);
+      if (about.damage) said.push(["damage", `The journal is damaged and incomplete: ${about.damage}`]);
+      if (about.over && !about.outcome && !about.damage) said.push(["broken", "The run was interrupted: the journal has no outcome. All its content is shown."]);
       if (about.over && !about.messages) said.push(["empty", "There are no messages in this run."]);
-      if (about.unseen) said.push(["unseen", `${Sniffer.many(about.unseen, "message was", "messages were")} taken in whose sending is not in the journal; they have no arrow.`]);
-      if (about.replay) said.push(["replay", `What robots knew cannot be worked out again: ${about.replay}`]);
+      if (about.unseen) said.push(["unseen", `The sending of ${Sniffer.many(about.unseen, "received message", "received messages")} is not in the journal: there is no arrow.`]);
+      if (about.replay) said.push(["replay", `The robots' states are not available: ${about.replay}`]);
       const kept = [...(about.notes || []), ...(about.losses || []), ...(about.refusals || [])].filter((note) => !note.kind || ["lost", "refused"].includes(note.kind));
       const shown = kept.slice(0, SHOWN);
       for (const note of shown) said.push([`note ${note.step} ${note.text}`, `${note.text} (t = ${Sniffer.moment(note.t)})`, note.step]);

@@ -1,6 +1,6 @@
 "use strict";
-/* Colours. Types of messages differ in hue, lightness and dash, so that colour-blind readers tell them apart too; as
-   text each has a contrast of 4.5 or more on its theme's paper. */
+/* Colours. Types of messages differ in hue, lightness and dash, so that colour-blind readers can distinguish them. As
+   text, each colour has a contrast of at least 4.5 on the background of its theme. */
 (() => {
   const LIGHT = ["#0a5fb8", "#b03a06", "#00714a", "#8a359c", "#6f5a00", "#006c80", "#b01f63", "#4b5763"];
   const DARK = ["#7fb9ff", "#ffa06b", "#56d6a6", "#dba6f3", "#e8cb55", "#66d6e8", "#ff97c4", "#b9c4cf"];
@@ -17,7 +17,7 @@
   const outside = matchMedia("(prefers-color-scheme: dark)");
 
   Sniffer.palette = {
-    theme: "auto", // auto: as the system has it
+    theme: "auto", // auto: the setting of the system
     get dark() {
       return this.theme === "auto" ? outside.matches : this.theme === "dark";
     },
@@ -28,7 +28,7 @@
       const colours = this.dark ? DARK : LIGHT;
       return colours[index % colours.length];
     },
-    count: LIGHT.length, // after so many, colours begin again
+    count: LIGHT.length, // after this number, colours are repeated
     dash: (index) => DASHES[index % DASHES.length],
     apply() {
       document.documentElement.dataset.theme = this.dark ? "dark" : "light";
@@ -38,7 +38,7 @@
     },
   };
 
-  /* Which colour a message has: `by` is kind, performative, run or sender. Equal things have equal colours throughout. */
+  /* The colour of a message; `by`: kind, performative, run or sender. Colours are the same in the whole page. */
   Sniffer.colouring = (model, by) => {
     const { messages, about } = model;
     if (by === "run") return (m) => messages.run[m];

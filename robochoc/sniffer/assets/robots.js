@@ -1,10 +1,10 @@
 "use strict";
-/* The list of robots: who has a lifeline, which groups share one, in which order. */
+/* The list of robots: robots with a lifeline, groups with a common lifeline, and their order. */
 (() => {
   Sniffer.RobotList = class {
     constructor(model, view, lanes, handlers) {
       Object.assign(this, { model, view, lanes, handlers });
-      this.open = new Set(); // groups whose robots are listed
+      this.open = new Set(); // opened groups
       this.wanted = "";
       this.element = Sniffer.byId("robots");
       this._build();
@@ -27,7 +27,7 @@
         this.search,
         make("div", { class: "buttons" },
           button("All", "A lifeline for each robot", () => this._choose(this.view.order, true)),
-          button("None", "Take all lifelines away", () => this._choose(this.view.order, false)),
+          button("None", "Remove all lifelines", () => this._choose(this.view.order, false)),
           this.these,
           this.neighbours,
           this.group),
@@ -36,7 +36,7 @@
         make("div", { class: "buttons" },
           button("Collapse groups", "One lifeline for each row", () => this._collapse(true)),
           button("Expand groups", "One lifeline for each robot", () => this._collapse(false)),
-          button("Reset", "Robots, groups and order as they were at first", () => {
+          button("Reset", "Initial robots, groups and order", () => {
             this.search.value = this.wanted = "";
             this.handlers.begin();
             this.paint();
@@ -65,13 +65,13 @@
     }
 
     _neighbours() {
-      if (this.view.robot < 0) return Sniffer.say("Choose a robot first: press its name");
+      if (this.view.robot < 0) return Sniffer.say("Choose a robot first: click its name");
       return this._only(this.lanes.neighbours(this.view.robot));
     }
 
     _group() {
       const pattern = this.wanted.trim();
-      if (!pattern || !this._found().length) return Sniffer.say("Write a pattern first, such as Robot2.*");
+      if (!pattern || !this._found().length) return Sniffer.say("Enter a pattern first, such as Robot2.*");
       const name = this._found().every((robot) => Sniffer.matcher(pattern)(this.model.nameOf(robot))) ? pattern : `*${pattern}*`;
       if (!this.view.patterns.includes(name)) this.view.patterns.push(name);
       this.view.collapsed.add(name);
@@ -92,7 +92,7 @@
       const whose = view.robot < 0 ? "" : model.nameOf(view.robot);
       this.neighbours.disabled = !whose;
       this.neighbours.textContent = whose ? `Only neighbours of ${whose}` : "Only neighbours";
-      this.neighbours.title = whose ? `Lifelines for ${whose} and those it has spoken with` : "Choose a robot first: press its name";
+      this.neighbours.title = whose ? `Lifelines for ${whose} and the robots that exchange messages with it` : "Choose a robot first: click its name";
       this.summary.textContent = `${Sniffer.count(view.chosen.size)} of ${Sniffer.many(model.robots.length, "robot")} chosen`
         + (this.wanted.trim() ? `, ${Sniffer.count(found.size)} found` : "");
       const held = document.activeElement && this.tree.contains(document.activeElement) ? document.activeElement.dataset.key : null;
@@ -152,7 +152,7 @@
         make("small", {}, model.valueAt(robot, view.moment)));
     }
 
-    /* Alt with up or down moves a robot among the lifelines. */
+    /* Alt with the up or down key moves a robot among the lifelines. */
     _move(event, robot) {
       const step = { ArrowUp: -1, ArrowDown: 1 }[event.key];
       if (!step || !event.altKey) return;
@@ -164,7 +164,7 @@
       if (to < 0 || to >= order.length) return;
       [order[at], order[to]] = [order[to], order[at]];
       this.view.touch("order");
-      Sniffer.say(`${this.model.nameOf(robot)} is number ${to + 1} now`);
+      Sniffer.say(`${this.model.nameOf(robot)} is now number ${to + 1}`);
     }
   };
 })();

@@ -1,5 +1,5 @@
 "use strict";
-/* Saving: one message, what two robots said to each other, or all that is shown; as ACL text or as JSON. */
+/* Saving of a message, the messages between two robots, or all shown messages, as ACL text or JSON. */
 (() => {
   const nameOfFile = (text) => text.replace(/[^A-Za-z0-9._-]+/g, "-").slice(0, 80) || "run";
 
@@ -15,7 +15,7 @@
       this.journal = source.journal;
     }
 
-    /* All that is known of a message, as JSON; numbered as in the table (CSV) that `robochoc journal` makes. */
+    /* All data of a message as JSON, with the same numbers as in the CSV table of `robochoc journal`. */
     entry(m, detail) {
       const { model } = this;
       const { sender, receiver, t, step, bytes, clock, run } = model.messages;
@@ -66,19 +66,19 @@
     panel(m) {
       const { make } = Sniffer;
       const { sender, receiver } = this.model.messages;
-      const scope = make("select", { "aria-label": "What is saved" },
+      const scope = make("select", { "aria-label": "Messages to save" },
         make("option", { value: "message" }, "this message"),
         make("option", { value: "pair" }, `${this.model.nameOf(sender[m])} with ${this.model.nameOf(receiver[m])}`),
-        make("option", { value: "shown" }, "all that is shown"));
+        make("option", { value: "shown" }, "all shown messages"));
       const news = make("span", { class: "soft", role: "status" });
       const button = (format, text) => make("button", { type: "button", onclick: () => {
         this.save(m, scope.value, format, (text) => (news.textContent = text))
-          .catch((trouble) => (news.textContent = `This could not be saved: ${trouble.message}`));
+          .catch((trouble) => (news.textContent = `Saving failed: ${trouble.message}`));
       } }, text);
       return make("section", {},
         make("h3", {}, "Save"),
         make("div", { class: "buttons" }, scope, button("acl", "ACL text"), button("json", "JSON"),
-          this.journal ? make("a", { class: "button", href: this.journal, download: "" }, "Whole journal") : null),
+          this.journal ? make("a", { class: "button", href: this.journal, download: "" }, "Complete journal") : null),
         news);
     }
   };

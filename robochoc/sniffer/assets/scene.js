@@ -1,19 +1,19 @@
 "use strict";
-/* The drones at the page's present moment, by meshcat's viewer: `Sniffer.scene(element, answer) -> {show(step)}`.
+/* The drones at the present moment of the page, in Meshcat's viewer: `Sniffer.scene(element, answer) -> {show(step)}`.
 
-   `answer` is the feed's `scene`; null: there is nothing to see. As a run goes on, more is asked for: `scene?from=N`, with
-   N the `decisions` of the answer before. The viewer is made when the element is first to be seen: it must know how large
-   it is. Without WebGL a sentence stands in its place. */
+   `answer` is the `scene` of the server; null: there is nothing to show. During a run, more is requested by
+   `scene?from=N`; N is `decisions` of the previous answer. The viewer is created when the element is first visible,
+   since it needs its size. Without WebGL, a sentence is shown instead. */
 (() => {
   const FLIGHT_MS = 260;
-  const ASK_MS = 500; // between two questions for more, at least
+  const ASK_MS = 500; // the shortest time between two requests
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   const SKIES = {
     light: [[0.8, 0.88, 0.95], [0.97, 0.97, 0.95]],
     dark: [[0.05, 0.07, 0.1], [0.12, 0.15, 0.2]],
   };
 
-  /* Where a drone is from which step on. */
+  /* The positions of a drone, each from a step on. */
   class Path {
     constructor(ground) {
       this.steps = [];
@@ -60,7 +60,7 @@
       this.show(this.step);
     }
 
-    /* Stand where every robot has decided to by the end of `step`. */
+    /* Moves the drones to the decisions at the end of `step`. */
     show(step) {
       this.step = step;
       this.targets = this.paths.map((path) => path.at(step));
@@ -71,7 +71,7 @@
       this.ask();
     }
 
-    /* What has been decided since, where there is a server that knows. */
+    /* Requests new decisions, if there is a server. */
     ask() {
       const { page } = Sniffer;
       if (this.asking || !page || Sniffer.Embedded.here() || page.model.decisionCount <= this.decisions) return;
@@ -82,7 +82,7 @@
           this.asking = false;
           if (answer.ok) this.add(await answer.json());
         } catch {
-          this.asking = true; // the server is gone: nothing more will come
+          this.asking = true; // the server has ended: there are no further decisions
         }
       }, ASK_MS);
     }
@@ -97,16 +97,16 @@
       this.viewer.set_dirty();
     }
 
-    /* Whether there is a viewer now. Its script is the page's last, and may not have been read yet. */
+    /* Whether the viewer exists. Its script is the last one of the page, and may not be loaded yet. */
     begin() {
       if (typeof MeshCat === "undefined") {
-        if (document.readyState === "complete") this.fail("This page was made without the 3D viewer.");
+        if (document.readyState === "complete") this.fail("This page does not contain the 3D viewer.");
         else addEventListener("load", () => this.fit(), { once: true });
         return false;
       }
       try {
         this.viewer = new MeshCat.Viewer(this.inner);
-        // By itself it takes the height of the whole window, also whenever that is resized.
+        // By default the viewer has the height of the window, also after a change of its size.
         const resize = this.viewer.set_3d_pane_size.bind(this.viewer);
         this.viewer.set_3d_pane_size = () => resize(this.stage.offsetWidth, this.stage.offsetHeight);
         if (this.viewer.gui) this.viewer.gui.domElement.style.display = "none";
@@ -124,7 +124,7 @@
       return true;
     }
 
-    /* Labels that can be read, and do not cover each other, from wherever one looks. */
+    /* Labels that are readable, and do not overlap, from all directions. */
     label() {
       const object = (path) => this.viewer.scene_tree.find(["meshcat", ...path.split("/")]).object;
       const names = this.drones.map((drone) => object(`${drone.path}/name`));
@@ -167,7 +167,7 @@
     }
   }
 
-  /* No robot is known yet: the scene begins with the first decision. */
+  /* No robot is known yet: the scene starts with the first decision. */
   class Waiting {
     constructor(element) {
       this.element = element;

@@ -1,6 +1,6 @@
 "use strict";
-/* Text search through what messages say. Words are made by the feed on demand, a thousand messages at a time, so a
-   search goes through them in the background, from the first on, and can be given up. */
+/* Text search in the words of messages. The server computes words on request, a thousand messages at a time, so a
+   search runs in the background, from the first message, and can be cancelled. */
 (() => {
   const CHUNK = 1024;
 
@@ -19,11 +19,11 @@
       this.looked = 0;
       this.running = false;
       this.trouble = "";
-      this._searched = new Map(); // chunk -> how many of its messages
+      this._searched = new Map(); // chunk -> the number of searched messages
       this._turn = (this._turn || 0) + 1;
     }
 
-    /* Begins anew where the query is another one; goes on where messages have come since. */
+    /* Starts a search if the query has changed; continues with new messages otherwise. */
     async find(query) {
       const wanted = query.trim().toLowerCase();
       if (wanted !== this.query) {
@@ -77,7 +77,7 @@
       this.hits = this.hits.slice(0, at).concat(found, this.hits.slice(at));
     }
 
-    /* The next hit after `message` that passes `shown` (before it: `step` -1), around the end; -1: none. */
+    /* The next hit after `message` (previous: `step` -1) that satisfies `shown`, cyclically; -1: none. */
     next(message, step, shown) {
       const { hits } = this;
       if (!hits.length) return -1;

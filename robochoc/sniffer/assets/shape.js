@@ -1,8 +1,8 @@
 "use strict";
-/* Where things stand on the chart, in pixels of its canvas: lifelines side by side, messages one below the other. */
+/* Positions on the chart, in pixels of its canvas: lifelines are columns, messages are rows. */
 (() => {
   const NARROWEST = 14;
-  const MARGIN = 22; // for what is written left of the first lifeline
+  const MARGIN = 22; // for texts to the left of the first lifeline
   const WIDEST = 230;
 
   Sniffer.Shape = class {
@@ -33,7 +33,7 @@
       return this.height / this.view.rowHeight;
     }
 
-    /* How far down one can go: a little past the last message, where steps that said nothing more stand. */
+    /* The lowest scroll position: a little below the last message, where final steps without messages are. */
     get lowest() {
       return Math.max(this.filter.length + 2 - this.rowsInWindow, 0);
     }
@@ -58,13 +58,13 @@
       return this.top(row + 0.5);
     }
 
-    /* A step stands in the row of its first message; those that say nothing share the upper half of the next row. */
+    /* A step is in the row of its first message; steps without messages share the upper half of the next row. */
     yOfStep(step) {
       const row = this.filter.rowOf(this.model.rowOf(step));
       return this.top(row + 0.5 * this.model.placeOf(step));
     }
 
-    /* The line between what has happened by the moment and what has not. */
+    /* The line after the moment: later events are below it. */
     yOfMoment(step) {
       return Math.max(this.top(this.filter.rowOf(this.model.rowOf(step + 1))), this.yOfStep(step) + 5);
     }
@@ -78,7 +78,7 @@
       return x >= this.gutter && lane >= 0 && lane < this.lanes.list.length ? lane : -1;
     }
 
-    /* Keeps the window within what there is, as far as it has changed. */
+    /* Keeps the window within the chart. */
     clamp() {
       const { view } = this;
       view.set({

@@ -1,12 +1,12 @@
 "use strict";
-/* What is looked at, in both windows: the lifelines' and the table's. It stays in sight whatever is left out or put together. */
+/* The row in view, in both windows: lifelines and table. It remains in view after changes of filters and groups. */
 (() => {
   Sniffer.Sight = class {
     constructor(page) {
       this.page = page;
     }
 
-    /* What is looked at: the chosen message, else the moment, else what stands on top; and how far down it stands. */
+    /* The row in view: of the chosen message, else of the moment, else the top row; and its distance from the top. */
     held() {
       const { filter, view, model, list, chart, time } = this.page;
       const { layout } = view;
@@ -19,7 +19,7 @@
       return { message, chosen, chart: within(view.top, chart.shape.rowsInWindow), list: within(list.top, list.inWindow) };
     }
 
-    /* Puts it there again, after what is shown has changed. */
+    /* Restores the position of the row in view after a change of the shown rows. */
     hold({ message, chosen, chart: down, list: below }) {
       const { filter, view, model, chart, list, lanes } = this.page;
       const row = filter.rowOf(message);
@@ -40,7 +40,7 @@
       }
     }
 
-    /* The table and the lifelines have other sizes now, or were not to be seen before: both show the same. */
+    /* Shows the same rows in both windows, after a change of their sizes or visibility. */
     align() {
       const { filter, view, list } = this.page;
       if (!filter.length) return;
@@ -48,7 +48,7 @@
       this.hold({ ...held, list: view.layout === "table" ? held.chart : Math.min(held.chart, list.inWindow - 1) });
     }
 
-    /* Brings into both windows what has just been chosen: a message, or else a moment. */
+    /* Scrolls both windows to a newly chosen message, or else moment. */
     reveal(changed) {
       const { view, filter, model, chart, list, time, lanes } = this.page;
       const chosen = changed.has("selected") && view.selected >= 0 && view.selected < model.messageCount;

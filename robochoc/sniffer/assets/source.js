@@ -1,10 +1,10 @@
 "use strict";
-/* Where a page's answers come from: a server on this machine, or the page itself (an export that can be mailed). */
+/* The sources of the page's data: a server on this machine, or the page itself (an exported file). */
 (() => {
-  const KEPT = 24; // chunks of details, and of states, that are kept
+  const KEPT = 24; // the number of cached chunks of details, and of states
 
-  /* Remembers the last few answers, lists that may have grown since: one that is shorter than `least`, or that failed,
-     is asked for again. */
+  /* Caches the last answers, which are lists that may grow: an answer shorter than `least`, or a failed request, is
+     requested again. */
   const remembering = (ask) => {
     const kept = new Map();
     const asked = (key) => {
@@ -17,7 +17,7 @@
       const old = kept.get(key);
       if (!old) return asked(key);
       kept.delete(key);
-      kept.set(key, old); // the last one used goes last
+      kept.set(key, old); // most recently used last
       const list = await old;
       return list.length >= least || kept.get(key) !== old ? list : asked(key);
     };
@@ -36,14 +36,14 @@
     constructor(base = ".") {
       super();
       this.base = base;
-      this.span = 1 << 16; // messages or steps a request: 2 MB, so that the first picture comes at once
+      this.span = 1 << 16; // messages or steps of a request: 2 MB, so that the first picture is fast
     }
 
     async _get(what) {
       const answer = await fetch(`${this.base}/${what}`, { cache: "no-store" });
       if (answer.ok) return answer;
-      const trouble = new Error((await answer.text()) || `the server says ${answer.status}`);
-      trouble.early = answer.status === 503; // there is nothing yet, and may be soon
+      const trouble = new Error((await answer.text()) || `the server has answered with status ${answer.status}`);
+      trouble.early = answer.status === 503; // there is nothing yet: try again soon
       throw trouble;
     }
 
@@ -66,7 +66,7 @@
     /* The address of the journal's file. */
     get journal() { return `${this.base}/journal`; }
 
-    /* `news(about's small fields)` as the run goes on; `gone()` when the server has ended. */
+    /* Calls `news(small fields of about)` during the run, and `gone()` when the server has ended. */
     onNews(news, gone) {
       const address = new URL(`${this.base}/news`, location.href);
       address.protocol = address.protocol.replace("http", "ws");
@@ -85,7 +85,7 @@
   Sniffer.Embedded = class extends Answers {
     constructor() {
       super();
-      this.span = Infinity; // columns are there as a whole
+      this.span = Infinity; // columns are complete
     }
 
     static here() {
@@ -94,7 +94,7 @@
 
     async _bytes(name) {
       const element = document.getElementById("feed:" + name);
-      if (!element) throw new Error("this page was made without them");
+      if (!element) throw new Error("this page does not contain them");
       const packed = Uint8Array.from(atob(element.textContent.trim()), (sign) => sign.charCodeAt(0));
       const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
       return new Response(stream).arrayBuffer();

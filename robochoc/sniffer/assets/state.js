@@ -1,12 +1,12 @@
 "use strict";
-/* One robot at the moment: what it knows, which values it has left and why, what it does in this step, and whether it
-   changes its mind. */
+/* The state of a robot at the moment: its agent view, remaining values with reasons, actions of this step, and changes of
+   its value. */
 (() => {
   const CHUNK = 64;
-  const MOST = 200; // entries of a list
-  const BACK = 8; // chunks that are looked through for why there are no more
+  const MOST = 200; // the maximum number of shown entries of a list
+  const BACK = 8; // the number of chunks that are searched for the reason of the end
 
-  /* Why there are no states from this one on; empty: there may be. */
+  /* The reason why there are no states after this one; empty: there may be more. */
   const ending = (state) => {
     const note = state && state.more && state.more.replay;
     return note && note.startsWith("ends here") ? note.replace(/^ends here: */, "") : "";
@@ -25,7 +25,7 @@
       if (robot < 0 || robot >= model.ownSteps.length) {
         this._key = "";
         Sniffer.fill(this.element, Sniffer.make("p", { class: "hint" },
-          "Choose a robot: press its name above its lifeline. Its agent view, domain and nogoods at the moment then stand here."));
+          "Choose a robot: click its name above its lifeline. Its agent view, domain and nogoods at the moment are shown here."));
         return;
       }
       const own = model.ownStepAt(robot, view.moment);
@@ -51,7 +51,7 @@
       const variables = (model.about.robots[robot] || {}).variables || [];
       Sniffer.fill(this.element,
         make("h2", {}, model.nameOf(robot)),
-        make("p", { class: "value" }, own < 0 ? "has not begun" : model.valueAt(robot, step) || "no value"),
+        make("p", { class: "value" }, own < 0 ? "has not started" : model.valueAt(robot, step) || "no value"),
         make("p", { class: "soft" }, own < 0 ? variables.join(", ")
           : `its ${step < this.view.moment ? "last step before this moment:" : "step"} ${count(own + 1)} of ${count(steps.length)}; `
             + `step ${count(step + 1)} of all, t = ${Sniffer.moment(model.steps.t[step])}`),
@@ -68,13 +68,13 @@
       this._states(robot, own);
     }
 
-    /* What the columns tell of a step: it stands here with replay and without. */
+    /* The part of a step that is known from the columns, also without a replay. */
     _doing(step) {
       const { make } = Sniffer;
       const { model, handlers } = this;
       return [
-        make("h3", {}, "Took in"), Sniffer.links(model, model.packetOf(step), handlers, "nothing: this is how it began"),
-        make("h3", {}, "Said"), Sniffer.links(model, model.saidIn(step), handlers, "nothing"),
+        make("h3", {}, "Received"), Sniffer.links(model, model.packetOf(step), handlers, "nothing: this is its start"),
+        make("h3", {}, "Sent"), Sniffer.links(model, model.saidIn(step), handlers, "nothing"),
         make("h3", {}, "Counters"),
         Sniffer.facts([["NCCC clock", Sniffer.count(model.steps.clock[step])], ["Constraint checks", Sniffer.count(model.steps.checks[step])]]),
       ];
@@ -86,7 +86,7 @@
       const target = this.state;
       const { replay } = this.model.about;
       if (own < 0) return void Sniffer.fill(target);
-      if (replay) return void Sniffer.fill(target, make("p", { class: "notice" }, make("span", {}, "What it knew cannot be worked out: ", ...Sniffer.coded(replay))));
+      if (replay) return void Sniffer.fill(target, make("p", { class: "notice" }, make("span", {}, "Its state is not available: ", ...Sniffer.coded(replay))));
       try {
         let chunk = Math.floor(own / CHUNK);
         let states = await this.source.states(robot, chunk, (own % CHUNK) + 1);
@@ -94,11 +94,11 @@
         for (let looked = 0; !states.length && chunk > 0 && looked < BACK && turn === this._turn; looked++) states = await this.source.states(robot, --chunk);
         if (turn !== this._turn) return undefined;
         const end = ending(state || states[states.length - 1]);
-        if (end) Sniffer.fill(target, make("p", { class: "notice" }, make("span", {}, "What it knew cannot be worked out further: ", ...Sniffer.coded(end))));
-        else if (!state) Sniffer.fill(target, make("p", { class: "soft" }, "What it knew after this step has not been worked out yet."));
+        if (end) Sniffer.fill(target, make("p", { class: "notice" }, make("span", {}, "Its later states are not available: ", ...Sniffer.coded(end))));
+        else if (!state) Sniffer.fill(target, make("p", { class: "soft" }, "Its state after this step is not computed yet."));
         else this._fill(target, state);
       } catch (trouble) {
-        if (turn === this._turn) Sniffer.fill(target, make("p", { class: "notice" }, `What it knew cannot be had: ${trouble.message}`));
+        if (turn === this._turn) Sniffer.fill(target, make("p", { class: "notice" }, `Its state cannot be loaded: ${trouble.message}`));
       }
       return undefined;
     }
@@ -114,14 +114,14 @@
       Sniffer.fill(target,
         why.length ? make("div", { class: "why" }, make("h3", {}, "Why"), make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, ...Sniffer.coded(reason))))) : null,
         make("h3", {}, "Agent view"),
-        state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It knows no other robot's value yet."),
+        state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It does not know any other robot's value yet."),
         make("h3", {}, `Domain, ${Sniffer.count(left)} of ${Sniffer.count(state.domain.length)} left`),
         list(state.domain, "none", (value) => make("li", { class: value.ruled_out_by ? "out" : "left" },
           make("b", {}, value.ruled_out_by ? make("s", {}, value.value) : value.value),
           value.ruled_out_by ? make("span", {}, " ruled out by ", ...Sniffer.coded(value.ruled_out_by)) : null)),
         make("h3", {}, `Stored nogoods, ${Sniffer.count(state.nogoods.length)}`),
         list(state.nogoods, "none", (nogood) => make("li", {}, nogood)),
-        Object.keys(state.more).length ? make("h3", {}, "Besides") : null,
+        Object.keys(state.more).length ? make("h3", {}, "Further data") : null,
         Object.keys(state.more).length ? Sniffer.facts(Object.entries(state.more)) : null);
     }
   };

@@ -1,8 +1,8 @@
 "use strict";
-/* What messages say, for those that are shown: asked for a thousand at a time, and the last few of these kept. */
+/* The words of shown messages, loaded in chunks of a thousand messages; the last chunks are cached. */
 (() => {
   const KEPT = 16;
-  const LONGEST = 400; // letters in a row, or a tip; the message's own panel has all
+  const LONGEST = 400; // the maximum number of characters in a row or tooltip; the message panel has the complete text
 
   Sniffer.Texts = class {
     constructor(model, source, changed) {
@@ -41,7 +41,7 @@
       }
     }
 
-    /* Everything about one message: its fields, its content, its words. */
+    /* All data of a message: its fields, content and words. */
     async detail(message) {
       const details = await this.source.details(message >> 10, (message & 1023) + 1);
       return details[message & 1023];

@@ -1,5 +1,5 @@
 "use strict";
-/* What a user has chosen to see. Changes are made by `set`; listeners are called once, afterwards. */
+/* The view chosen by the user. `set` makes changes, and calls the listeners once afterwards. */
 (() => {
   const ROW = 24;
 
@@ -8,17 +8,17 @@
       this._listeners = [];
       this._changed = new Set();
       Object.assign(this, {
-        moment: 0, // the step that was the last one by now
+        moment: 0, // the step that was the last one at that time
         selected: -1, // a message
         robot: -1,
-        chosen: new Set(), // robots that have a lifeline, by number
-        order: [], // all robots, by number, from left to right
-        patterns: [], // groups by pattern, beside those by row
-        collapsed: new Set(), // names of groups that share one lifeline
+        chosen: new Set(), // numbers of robots with a lifeline
+        order: [], // numbers of all robots, from left to right
+        patterns: [], // groups by pattern, in addition to those by row
+        collapsed: new Set(), // names of groups with a common lifeline
         rowHeight: ROW,
-        laneWidth: 0, // 0: all in the window, as far as that is readable
+        laneWidth: 0, // 0: all lifelines in the window, if they are readable
         top: 0, // rows above the window
-        left: 0, // pixels left of it
+        left: 0, // pixels to the left of the window
         layout: "both",
         upper: "message",
         lower: "counters",
@@ -26,7 +26,7 @@
         arrows: "bent", // or straight
         whose: "all",
         follow: false,
-        off: new Set(), // types that are not shown, by number
+        off: new Set(), // numbers of hidden types
         senders: "",
         receivers: "",
         run: -1,
@@ -57,7 +57,7 @@
       }
     }
 
-    /* For sets and lists that were changed in place. */
+    /* For sets and lists changed in place. */
     touch(...names) {
       for (const name of names) this._changed.add(name);
       if (this._told) return;

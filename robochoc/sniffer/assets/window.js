@@ -1,5 +1,5 @@
 "use strict";
-/* The window's parts: sides that can be put away, the table's height, light and dark. */
+/* The parts of the window: foldable sides, the height of the table, light and dark theme. */
 (() => {
   const NARROW = matchMedia("(max-width: 60rem)");
 
@@ -8,7 +8,7 @@
       if (value === undefined) return localStorage.getItem(`sniffer-${name}`);
       localStorage.setItem(`sniffer-${name}`, value);
     } catch {
-      /* pages from files, or without storage, forget it */
+      /* pages from files, or without storage, do not save it */
     }
     return null;
   };
@@ -67,7 +67,7 @@
       palette.theme = palette.dark ? "light" : "dark";
       remembered("theme", palette.theme);
       apply();
-      Sniffer.say(`The page is ${palette.theme} now`);
+      Sniffer.say(`The page is now ${palette.theme}`);
     });
     palette.watch(apply);
     palette.apply();
