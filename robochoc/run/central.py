@@ -35,13 +35,13 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
     """Return the outcome of a run in which the central solver decides the problem of every epoch.
 
     Args:
-        team: the team with its scenario.
-        context: the options, the time and the solver of the run.
-        header: an outcome that says what is run, and nothing else yet.
+        team: The team with its scenario.
+        context: The options, the time and the solver of the run.
+        header: An outcome that describes the run, without an answer.
 
     Raises:
-        RefutedError: when the checker refutes an answer.
-        SolverLostError: when an answer does not cost what the solver says.
+        RefutedError: if the checker refutes an answer.
+        SolverLostError: if the cost of an answer differs from the solver's.
     """
     from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: robots need it seldom
 
@@ -61,14 +61,14 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
 
 
 def _opened_by(team: Team, number: int) -> str:
-    """Return in a few words what has opened the epoch of this `number`."""
+    """Return the cause of the epoch of this `number`, in a few words."""
     if not number:
         return "the start"
     return ", ".join(describe_change(change, team) for change in team.scenario[number - 1].changes) or "nothing"
 
 
 def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
-    """Decide one epoch, and check what was found."""
+    """Decide one epoch, and check the answer."""
     began = time.monotonic()
     solutions = None
     if options.count:
@@ -82,7 +82,7 @@ def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
 
 
 def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
-    """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
+    """Return the solver's answer, with a minimum withdrawal if the options allow it and it is necessary."""
     price = None
     found = None
     if options.withdraw != Withdrawal.MINIMUM or team.kind == ProblemKind.DISCSP:
@@ -103,7 +103,9 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
     if found.cost is not None:
         total = total_cost(team, assignment, price)
         if total != found.cost:
-            raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {found.cost:,}")
+            raise SolverLostError(
+                f"the constraint solver reports a cost of {found.cost:,}, but its answer costs {total:,}"
+            )
     if verdict == Verdict.UNKNOWN and found.bound is not None:
         bound = user_cost(team, found.bound) if price is None else found.bound // price
     if verdict == Verdict.OPTIMAL and team.kind == ProblemKind.DISCSP and not robots_without_values(team, assignment):

@@ -1,4 +1,4 @@
-"""The shared state of one run on this machine: its time, its cache, its constraint solver, its observers."""
+"""The shared state of a run on this machine: time, cache, constraint solver, observers."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class RunContext:
         self.deadline = None if limit_s is None else self.began + limit_s
 
     def left_s(self) -> float | None:
-        """Return how many seconds are left; None without a limit."""
+        """Return the remaining seconds; None without a limit."""
         return None if self.deadline is None else max(0.0, self.deadline - time.monotonic())
 
     def show_stage(self, stage: str) -> None:
@@ -68,25 +68,25 @@ class RunContext:
         return TeamCompiler(self.options.local, self.cache, self.deadline, self.solver, show)
 
     def deciding_solver(self, warm: AceProcess) -> TeamSolver:
-        """Return the solver that decides the merged problem; ACE is `warm` unless the run has one."""
+        """Return the solver of the merged problem. For ACE it uses the process `warm`, unless the run has a process."""
         if self.options.central_with == CentralSolverName.ORTOOLS:
             return self.cp_sat_solver()
         return self.central_solver(warm)
 
     def cp_sat_solver(self) -> CpSatSolver:
-        """Return OR-Tools as a central solver of this run."""
+        """Return a central solver of this run that uses OR-Tools."""
         from robochoc.solver.cp_sat import CpSatSolver  # noqa: PLC0415 - start-up: seldom asked for
 
         return CpSatSolver(self.deadline, partial(self.show_stage, "OR-Tools decides the whole team"))
 
     def second_opinions(self) -> list[TeamSolver]:
-        """Return the solvers that check what robots have proven: the central solver, and OR-Tools where it is."""
+        """Return the solvers that check the proofs of robots: the central solver, and OR-Tools if it is installed."""
         from robochoc.solver.cp_sat import is_installed  # noqa: PLC0415 - start-up: seldom asked for
 
         return [self.central_solver(), *([self.cp_sat_solver()] if is_installed() else [])]
 
     def central_solver(self, warm: AceProcess | None = None) -> CentralSolver:
-        """Return a central solver of this run; it uses the constraint solver `warm` unless the run has one."""
+        """Return a central solver of this run; it uses the process `warm`, unless the run has a process."""
         from robochoc.solver.central import CentralSolver  # noqa: PLC0415 - start-up: seldom asked for
 
         show = partial(self.show_stage, "ACE decides the whole team")

@@ -1,7 +1,7 @@
-"""A distributed run, wherever the robots are: one or two phases, losses, and the reason where there is no verdict.
+"""A distributed run, wherever the robots are: one or two phases, losses, and the reason for a missing verdict.
 
-A `Deployment` is a team of robots that can be told to search. There are two: `run/this_machine.py`, where the files are
-at hand, and `run/networked/machines.py`, where the robots keep them.
+A `Deployment` is a team of robots that search on command. There are two: `run/this_machine.py`, which has the robots'
+files, and `run/networked/machines.py`, whose robots do not disclose their files.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Deployment(ABC):
 
     @property
     def compile_s(self) -> float:
-        """Return the seconds that were spent here on the compilation of the robots' domains."""
+        """Return the seconds spent on this machine on the compilation of the robots' domains."""
         return 0.0
 
     @property
@@ -44,13 +44,13 @@ class Deployment(ABC):
         """Return the kind of the team's problem: with or without costs."""
 
     @abstractmethod
-    def told(self, total: float) -> Cost:
-        """Return `total`, a sum of costs as the robots count them, in the user's numbers."""
+    def in_user_units(self, total: float) -> Cost:
+        """Return `total`, a sum of the robots' internal costs, in the user's units."""
 
     @property
     @abstractmethod
     def lost(self) -> tuple[str, ...]:
-        """The robots that were lost, and did not come back."""
+        """The robots that were lost and did not come back."""
 
     @property
     @abstractmethod
@@ -59,54 +59,54 @@ class Deployment(ABC):
 
     @abstractmethod
     def withdrawal_cost(self) -> float:
-        """Return the withdrawal cost of a robot of weight 1: more than all constraints can charge together."""
+        """Return the withdrawal cost of a robot of weight 1: more than the costs of all constraints together."""
 
     @abstractmethod
     def left_s(self) -> float | None:
-        """Return how many seconds are left; None without a limit."""
+        """Return the remaining seconds; None without a limit."""
 
     @abstractmethod
     def search(self, phase: RunPhase) -> Search:
-        """Search once, from the beginning, with all robots that are there."""
+        """Search once, from the beginning, with all present robots."""
 
     @abstractmethod
     def remove(self, lost: Mapping[str, str]) -> None:
-        """Go on without robots that were lost; `lost` maps their names to the reasons."""
+        """Remove lost robots from the team; `lost` maps their names to the reasons."""
 
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
-        """Return the central solvers that agree. Raises `RefutedError` where one found something else."""
+        """Return the central solvers that confirm `answer`. Raises `RefutedError` if one refutes it."""
         return ()
 
     @property
     def unsettled(self) -> str:
-        """Return the reason why the robots did not finish before a limit was reached, as far as it is known."""
+        """Return the reason why the robots did not finish before a limit was reached; empty if it is not known."""
         return ""
 
     def solve(self, phase: RunPhase) -> PhaseAnswer:
-        """Return the answer of `phase`: search until no robot gets lost, and check what was found.
+        """Return the answer of `phase`: search until a search ends without a loss, and check its result.
 
         Raises:
-            RobotsLostError: when all robots were lost.
-            RefutedError: when the answer does not hold.
+            RobotsLostError: if all robots were lost.
+            RefutedError: if the check refutes the answer.
         """
         search = self._search_without_losses(phase)
         answer = self.evaluated(phase, search)
         return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
 
     def evaluated(self, phase: RunPhase, search: Search) -> PhaseAnswer:
-        """Return the answer of `search`, confirmed by the central solver if that is asked for."""
+        """Return the answer of `search`, confirmed by the central solver if the options require it."""
         deadline = self.options.deadline if self.left_s() == 0 else None
-        answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.told, deadline))
+        answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.in_user_units, deadline))
         if answer.verdict in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
             return answer.confirmed_as(self.confirm(phase, answer))
         return answer
 
     def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - as `confirm`
-        """Return the answer of `search`, or a better one that was found while it went on."""
+        """Return `answer`, the answer of `search`, or a better one found during the search."""
         return answer
 
     def why_unknown(self, phase: RunPhase, answer: PhaseAnswer) -> str | None:
-        """Return why `answer` has no verdict; None if it has one."""
+        """Return the reason why `answer` has no verdict; None if it has a verdict."""
         if answer.verdict != Verdict.UNKNOWN:
             return None
         if answer.witness is not None:
@@ -118,7 +118,7 @@ class Deployment(ABC):
         return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))
 
     def _limit_reached(self, spent: Metrics) -> str:
-        """Return the limit that has ended a search."""
+        """Return the limit that has ended a search, in words."""
         options = self.options
         if stop_requested():
             return STOPPED
@@ -137,18 +137,18 @@ class Deployment(ABC):
         return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
     def outcome(self, header: Outcome, answer: PhaseAnswer) -> Outcome:
-        """Return `header`, which says what was run, with its `answer`."""
+        """Return `header`, which describes the run, with its `answer`."""
         metrics = replace(answer.metrics, compile_s=self.compile_s)
         return replace(answer, metrics=metrics, count=self._count(answer)).as_outcome(header, self.lost)
 
     def _count(self, answer: PhaseAnswer) -> int | None:
-        """Return how many solutions, or optima, there are, if that is asked for and known."""
+        """Return the number of solutions or optima, if the options require it and it is known."""
         if not self.options.count:
             return None
         return 0 if answer.verdict == Verdict.NO_SOLUTION else answer.count
 
     def _search_without_losses(self, phase: RunPhase) -> Search:
-        """Search until a search ends without a loss. Its metrics are those of all searches together."""
+        """Search until a search ends without a loss. Its metrics include those of the searches before."""
         spent = Metrics()
         while True:
             search = self.search(phase)
@@ -165,13 +165,13 @@ def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: 
     """Return the outcome of a run in which robots solve their problem together.
 
     Args:
-        deployment: the robots, and how to run.
-        protocol: the protocol that was asked for.
-        header: an outcome that says what is run, and nothing else yet.
+        deployment: The robots, with the options.
+        protocol: The chosen protocol.
+        header: An outcome that describes the run, without an answer.
 
     Raises:
-        RobotsLostError: when robots were lost, and the run is not to go on without them.
-        RefutedError: when the answer does not hold.
+        RobotsLostError: if robots were lost, and the run is not to continue without them.
+        RefutedError: if a check refutes the answer.
     """
     options = deployment.options
     phase = first_phase(options, protocol, deployment.withdrawal_cost)

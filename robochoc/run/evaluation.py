@@ -17,7 +17,7 @@ from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcom
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
-from robochoc.run.listed_optima import put_together
+from robochoc.run.listed_optima import combined_optima
 from robochoc.run.phases import RunPhase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
@@ -213,7 +213,7 @@ def _checked_optima(
     Raises:
         RefutedError: when one breaks a constraint, or costs something else than `cost`.
     """
-    found = put_together(compiled, result) if is_proven(phase, result) else None
+    found = combined_optima(compiled, result) if is_proven(phase, result) else None
     if found is None:
         return None
     number, listed = found

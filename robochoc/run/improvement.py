@@ -1,7 +1,7 @@
-"""Answers while a search goes on: the best by the deadline is published, and what is better until the time is over.
+"""Answers during a search: the best one at the deadline is published, then each better one until the time is over.
 
-The robots search on. At times they tell what they have (`communication/search_watch.py`); that is checked with the
-files as any answer is. What is published only gets better, and satisfies all hard constraints.
+The robots continue to search. At times they report snapshots (`communication/search_watch.py`), which are checked like
+any answer. Published answers only get better, and satisfy all hard constraints.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from robochoc.run.phases import RunPhase
 from robochoc.verification.checker import RefutedError
 
 PERIOD_S = 0.1
-"""The shortest time between two snapshots. Where they take long, there are fewer: see `_SHARE`."""
+"""The shortest time between two snapshots, in seconds. Slow snapshots are rarer: see `_SHARE`."""
 _SHARE = 10
 """After a snapshot the search continues for at least this many times the snapshot's duration."""
 _FOUND = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
@@ -33,24 +33,24 @@ class Audience(Protocol):
     """Observers that receive each answer during a search."""
 
     def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        """Take in an answer that is better than all before in its epoch. The robots `withdrawn` do not fly.
+        """Receive an answer that is better than all earlier ones of its epoch. The robots `withdrawn` do not fly.
 
-        `epoch` is the epoch as if it had ended now, `team` its team as the files have it.
+        `epoch` is the epoch as if it had ended now, `team` its team in the form of the files.
         """
 
     def has_news(self, team: Team) -> bool:
-        """Return whether the problem has changed, so that nothing better is to be searched for."""
+        """Return whether the problem has changed, so that the search for better answers is to stop."""
 
 
 class Rank:
     """The order of answers: first by the weight of the robots that withdraw, then by the cost."""
 
-    def __init__(self, team: Team, told: Callable[[float], Cost]) -> None:
+    def __init__(self, team: Team, in_user_units: Callable[[float], Cost]) -> None:
         self._weights = {robot.name: robot.weight for robot in team.robots}
-        self._sign = -1 if told(1) < told(0) else 1
+        self._sign = -1 if in_user_units(1) < in_user_units(0) else 1
 
     def of(self, cost: Cost, withdrawn: Sequence[str]) -> tuple[int, Cost]:
-        """Return the rank of an answer of this `cost` without the robots `withdrawn`: the lower, the better."""
+        """Return the rank of an answer of this `cost` without the robots `withdrawn`; lower ranks are better."""
         return sum(self._weights[name] for name in withdrawn), self._signed(cost)
 
     def of_answer(self, answer: PhaseAnswer) -> tuple[int, Cost]:
@@ -58,11 +58,11 @@ class Rank:
         return self.of(answer.cost or 0, answer.withdrawn)
 
     def tightest(self, bounds: Sequence[Cost | None]) -> Cost | None:
-        """Return the bound that says the most; None if there is none."""
+        """Return the tightest bound; None if there is none."""
         return max((bound for bound in bounds if bound is not None), key=self._signed, default=None)
 
     def meets(self, answer: PhaseAnswer, bound: Cost | None) -> bool:
-        """Return whether `answer`, by all robots, is as good as `bound` says that anything is."""
+        """Return whether `answer`, without withdrawals, reaches `bound`."""
         return bound is not None and not answer.withdrawn and self._signed(answer.cost or 0) <= self._signed(bound)
 
     def _signed(self, cost: Cost) -> Cost:
@@ -73,19 +73,19 @@ class Improvements(SearchWatch):
     """The answers of one search, published from its deadline on.
 
     Args:
-        began: When the time of the deadline began, on the monotonic clock.
-        deadline: When the first answer is due, on the same.
+        began: The start of the time of the deadline, on the monotonic clock.
+        deadline: The time at which the first answer is due, on the same clock.
         evaluate: Returns the checked answer of a snapshot.
         rank: The order of answers.
-        has_costs: Whether there are costs. Without them a solution by all robots is as good as any other.
-        bounded: Whether bounds are of costs. (Where robots may withdraw, they are of weights.)
+        has_costs: Whether there are costs. Without them all solutions without withdrawals are equally good.
+        bounded: Whether bounds are of costs. (If robots may withdraw, they are of weights.)
         publish: Publishes an answer.
         has_news: Returns whether the problem has changed.
-        earlier: What was published before, where this is not the first search of an epoch.
-        keep: Is called with each answer that is the best so far, published or not (None: nobody needs to know).
+        earlier: The answers published by earlier searches of the epoch.
+        keep: Called with each best answer so far, published or not (None: not called).
     """
 
-    def __init__(  # noqa: PLR0913 - what differs between runs, by names
+    def __init__(  # noqa: PLR0913 - the parts that differ between runs, by name
         self,
         *,
         began: float,
@@ -118,7 +118,7 @@ class Improvements(SearchWatch):
 
     @property
     def satisfied(self) -> bool:
-        """See `SearchWatch`: nothing can be better than what is published, or the problem has changed."""
+        """See `SearchWatch`: the published answer cannot be improved, or the problem has changed."""
         return self._over or self._outdated
 
     def wait_s(self, now: float) -> float:
@@ -127,7 +127,7 @@ class Improvements(SearchWatch):
         return max(0.0, min(due) - now)
 
     def wants_snapshot(self, now: float) -> bool:
-        """See `SearchWatch`: publish what is due."""
+        """See `SearchWatch`. Publishes an answer that is due."""
         first = self._published is None and self._best is not None
         if now < self._due and (now < self._deadline or not (first or now - self._polled >= PERIOD_S)):
             return False
@@ -141,17 +141,17 @@ class Improvements(SearchWatch):
         return True
 
     def receive(self, snapshot: SearchResult) -> None:
-        """See `SearchWatch`: check it, and publish it if it is better."""
+        """See `SearchWatch`. Checks the snapshot, and publishes it if it is better."""
         came = time.monotonic()
         self._note(self._evaluate(snapshot))
         now = time.monotonic()
         self._publish_if_due(now)
         self._due = now + max(PERIOD_S, came - self._asked, _SHARE * (now - came))
         if now < self._deadline - PERIOD_S:
-            self._due = min(self._due, self._deadline - PERIOD_S)  # so that the answer is there at the deadline
+            self._due = min(self._due, self._deadline - PERIOD_S)  # to have an answer at the deadline
 
     def _note(self, answer: PhaseAnswer) -> None:
-        """Keep `answer` if it is the best so far, and what is proven of the costs of all."""
+        """Store `answer` if it is the best so far, and the proven bound of the cost."""
         if self._bounded:
             self._bound = self._rank.tightest([self._bound, answer.bound])
         if _is_found(answer) and (
@@ -165,18 +165,18 @@ class Improvements(SearchWatch):
             self._best = replace(best, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
 
     def _is_proven(self, best: PhaseAnswer, answer: PhaseAnswer) -> bool:
-        """Return whether nothing is better than the `best`, as `answer` says, or the bound."""
+        """Return whether `answer`, or the bound, proves that `best` is optimal."""
         optimal = answer.verdict == Verdict.OPTIMAL and self._rank.of_answer(answer) == self._rank.of_answer(best)
         return optimal or self._rank.meets(best, self._bound)
 
     def _publish_if_due(self, now: float) -> None:
         if now >= self._deadline and self._best is not None:
-            self._tell(self._best, now)
+            self._publish_gain(self._best, now)
             final = self._best.verdict == Verdict.OPTIMAL or not (self._has_costs or self._best.withdrawn)
             self._over = self._over or final
 
-    def _tell(self, best: PhaseAnswer, now: float) -> None:
-        """Publish the `best`, if that is a gain: robots under way are not sent elsewhere for nothing."""
+    def _publish_gain(self, best: PhaseAnswer, now: float) -> None:
+        """Publish the `best` answer if it is better than the published one: flying robots do not turn for nothing."""
         before = self._published
         if self._outdated or (before is not None and not self._rank.of_answer(best) < self._rank.of_answer(before)):
             return
@@ -186,13 +186,13 @@ class Improvements(SearchWatch):
         self._publish(best, tuple(self.improvements))
 
     def concluded(self, final: PhaseAnswer, *, lost: bool) -> PhaseAnswer:
-        """Return the answer of the search, which has ended with `final`: that, or what is better of those before.
+        """Return the answer of the search: `final`, with which it has ended, or a better one found before.
 
-        It is published if nothing as good is, and the problem has not changed. If robots were `lost`, what was
-        published does not count for the others.
+        It is published unless an equally good one was, or the problem has changed. If robots were `lost`, the published
+        answers do not count for the others.
 
         Raises:
-            RefutedError: when the protocol claims what an answer refutes.
+            RefutedError: if an answer refutes a claim of the protocol.
         """
         if lost:
             return replace(final, improvements=tuple(self.improvements))
@@ -201,7 +201,7 @@ class Improvements(SearchWatch):
         best, now = self._best, time.monotonic()
         if best is None or (now < self._deadline and not _is_found(final)):
             return replace(final, improvements=tuple(self.improvements))
-        self._tell(best, now)
+        self._publish_gain(best, now)
         best = self._published or best
         proven = self._best is not None and self._best.verdict == Verdict.OPTIMAL and not self._outdated
         return replace(
@@ -219,48 +219,52 @@ class Improvements(SearchWatch):
         if best is None:
             return
         if final.verdict == Verdict.NO_SOLUTION:
-            raise RefutedError(f"the protocol claims that there is no solution, but one was found (cost {best.cost})")
+            raise RefutedError(
+                f"the protocol claims that there is no solution, but a solution was found (cost {best.cost})"
+            )
         if final.verdict == Verdict.OPTIMAL and self._rank.of_answer(best) < self._rank.of_answer(final):
-            raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
+            raise RefutedError(f"the protocol claims that {final.cost} is optimal, but {best.cost} was found before")
 
 
-def improvements_of(  # noqa: PLR0913 - what differs between deployments, by names
+def improvements_of(  # noqa: PLR0913 - the parts that differ between deployments, by name
     phase: RunPhase,
     team: Team,
     options: Options,
     *,
     began: float,
-    told: Callable[[float], Cost],
+    in_user_units: Callable[[float], Cost],
     check: Callable[[SearchResult], Answer | None],
     publish: Callable[[PhaseAnswer, tuple[Improvement, ...]], None],
     audience: Audience | None,
     before: Improvements | None,
     keep: Callable[[PhaseAnswer], None] | None = None,
 ) -> Improvements:
-    """Return the best answers of the search of `phase`, of a run with a deadline.
+    """Return the watch for the answers of the search of `phase`, in a run with a deadline.
 
     Args:
         phase: The phase.
-        team: The team as its files have it.
+        team: The team in the form of its files.
         options: The options of the run.
-        began: When the time of the run began, on the monotonic clock, in seconds.
-        told: Turns a cost into the user's numbers.
-        check: Checks what robots had at a snapshot. It may raise `RefutedError`.
+        began: The start of the run's time, on the monotonic clock, in seconds.
+        in_user_units: Converts a cost to the user's units.
+        check: Checks the values of a snapshot. It may raise `RefutedError`.
         publish: Publishes an answer, with all improvements so far.
-        audience: Tells whether the problem has changed.
-        before: Those of the search before this one, if there was one.
-        keep: Gets each best answer when it is found.
+        audience: Reports whether the problem has changed.
+        before: The answers of the previous search, if there was one.
+        keep: Called with each best answer when it is found.
     """
 
     def evaluate(snapshot: SearchResult) -> PhaseAnswer:
-        snapshot = _as_told_one_after_the_other(snapshot, phase, options)
-        return evaluate_search(phase, Search(snapshot, partial(check, snapshot)), team.kind, told, options.deadline)
+        snapshot = _with_possible_loss(snapshot, phase, options)
+        return evaluate_search(
+            phase, Search(snapshot, partial(check, snapshot)), team.kind, in_user_units, options.deadline
+        )
 
     return Improvements(
         began=began,
         deadline=began + (options.deadline or 0.0),
         evaluate=evaluate,
-        rank=Rank(team, told),
+        rank=Rank(team, in_user_units),
         has_costs=team.kind == ProblemKind.DISWCSP,
         bounded=phase.parameters.withdrawal_cost is None,
         publish=publish,
@@ -270,8 +274,8 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
     )
 
 
-def _as_told_one_after_the_other(snapshot: SearchResult, phase: RunPhase, options: Options) -> SearchResult:
-    """Return `snapshot`, of which nothing is known but what can be checked where messages get lost.
+def _with_possible_loss(snapshot: SearchResult, phase: RunPhase, options: Options) -> SearchResult:
+    """Return `snapshot`, marked as spoiled if messages may be lost: then only its checked values count.
 
     Robots report one after the other, so a message may be lost that no robot has missed yet.
     """
@@ -282,6 +286,6 @@ def _as_told_one_after_the_other(snapshot: SearchResult, phase: RunPhase, option
 
 
 def _is_found(answer: PhaseAnswer) -> bool:
-    """Return whether `answer` is one that was checked. That nobody flies is none, unless nothing else is possible."""
+    """Return whether `answer` was checked. Without any robot it counts only if it is optimal."""
     flown = bool(answer.assignment) or not answer.withdrawn or answer.verdict == Verdict.OPTIMAL
     return flown and answer.verdict in _FOUND and answer.verified and answer.cost is not None

@@ -1,8 +1,8 @@
-"""The best that is known of a search that minimises: of one that has ended, or that a limit has cut short.
+"""The best known assignment of a search that minimises, whether it has ended or a limit has cut it short.
 
-Robots report what they know (`protocols/findings.py`): the best assignment of the whole team that one of them has
-received, the values that each has had in every cycle, or just the values that they have now. All of these are
-assignments whose cost can be computed from the files. The cheapest is the answer.
+Robots report findings (`protocols/findings.py`): the best assignment of the whole team that one of them has received,
+the values of each robot in every cycle, or only their present values. All of these are assignments, whose cost is
+computed from the files. The cheapest is the answer.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: fl
     """Return the cheapest assignment in a result.
 
     Args:
-        compiled: The team that the robots have worked on.
-        result: What they have reported.
+        compiled: The team of the search.
+        result: The result of the search.
         withdrawal_cost: The withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
 
     Returns:
-        The assignment, or None if all break hard constraints.
+        The assignment, or None if all violate hard constraints.
     """
     best: BestKnown | None = None
     for own in (
@@ -54,7 +54,7 @@ def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: fl
 def costs_by_cycle(
     compiled: CompiledTeam, trails: Mapping[str, Trail], withdrawal_cost: float | None = None
 ) -> Iterator[float]:
-    """Yield the cost of the values that the robots had in cycle 0, 1, ..., as far as all of them have come."""
+    """Yield the cost of the robots' values in cycle 0, 1, ..., up to the last cycle that all have completed."""
     objective = Objective(compiled.team, withdrawal_cost)
     for changed in _changes(compiled, trails):
         objective.change(changed)
@@ -69,13 +69,13 @@ def lower_bound(findings: Mapping[str, Findings]) -> float | None:
 
 
 def optima(findings: Mapping[str, Findings]) -> int | None:
-    """Return the product of what the roots have counted, each in its tree; None if none has counted."""
+    """Return the product of the counts of all roots; None if there are no counts."""
     counts = [int(found.count, 16) for found in findings.values() if found.count is not None]
     return math.prod(counts) if counts else None
 
 
 def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
-    """Return the pseudo-tree that the robots have built: the robots that have their place in it."""
+    """Return the pseudo-tree that the robots have built, with the robots that have a place in it."""
     return {name: found.place for name, found in findings.items() if found.place is not None}
 
 
@@ -88,7 +88,7 @@ _Own = dict[str, dict[str, int]]
 
 
 def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Iterator[_Own]:
-    """Yield the cheapest assignment of the whole team that some robot has received."""
+    """Yield the cheapest assignment of the whole team that a robot has received."""
     bests = [found.best for found in findings.values() if found.best is not None]
     if bests:
         best = min(bests, key=lambda one: one.cost)
@@ -96,7 +96,7 @@ def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Finding
 
 
 def _best_cycle(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: float | None) -> Iterator[_Own]:
-    """Yield the values that the robots had in the cheapest cycle, the first of several."""
+    """Yield the values of the robots in the first cheapest cycle."""
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return

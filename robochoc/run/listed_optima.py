@@ -1,7 +1,7 @@
-"""The optima that the robots of each tree have listed, put together and checked (see `protocols/inference/list_dpop`).
+"""The optima of the team, combined from those that the robots of each tree have listed, and checked.
 
-Each root has numbered the optima of its tree, and each robot has its value in the first ones. Trees have nothing to do
-with each other, so the optima of the team are all combinations.
+See `protocols/inference/list_dpop`. Each root has numbered the optima of its tree, and each robot has its value in the
+first ones. Trees share no constraint, so the optima of the team are all combinations.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from robochoc.verification.checker import RefutedError
 
 
 class _Tree(NamedTuple):
-    """The robots of a tree with their places in each of its optima that is listed."""
+    """The robots of a tree, with the place of their value in each listed optimum."""
 
     places: dict[str, list[int]]
     listed: int
 
 
-def put_together(compiled: CompiledTeam, result: SearchResult) -> tuple[int, list[dict[str, int]]] | None:
-    """Return how many optima the robots have counted, and the assignments that they have listed; None if they have not.
+def combined_optima(compiled: CompiledTeam, result: SearchResult) -> tuple[int, list[dict[str, int]]] | None:
+    """Return the number of optima and the listed assignments; None if the robots have listed none.
 
     Raises:
-        RefutedError: if the robots of a tree have not listed equally many, or two optima are the same.
+        RefutedError: if the robots of a tree have listed different numbers of optima, or two optima are equal.
     """
     listings = {name: found.listing for name, found in result.findings.items() if found.listing is not None}
     number = optima(result.findings)
@@ -38,12 +38,12 @@ def put_together(compiled: CompiledTeam, result: SearchResult) -> tuple[int, lis
     limit = min(number, *(one.limit for one in listings.values()))
     found = [_combined(compiled, trees, place) for place in range(min(limit, math.prod(one.listed for one in trees)))]
     if len({tuple(sorted(one.items())) for one in found}) < len(found):
-        raise RefutedError(f"two of the optima that were listed for {compiled.team.name} are the same")
+        raise RefutedError(f"two of the optima listed for {compiled.team.name} are equal")
     return number, found
 
 
 def _combined(compiled: CompiledTeam, trees: Sequence[_Tree], number: int) -> dict[str, int]:
-    """Return the assignment with this `number` of all combinations of the optima of the trees."""
+    """Return the assignment with this `number` among all combinations of the optima of the trees."""
     assignment: dict[str, int] = {}
     left = number
     for tree in trees:
@@ -54,7 +54,7 @@ def _combined(compiled: CompiledTeam, trees: Sequence[_Tree], number: int) -> di
 
 
 def _trees(findings: Mapping[str, Findings]) -> Iterator[_Tree]:
-    """Yield the trees. Raises `RefutedError` if its robots have not listed equally many optima."""
+    """Yield the trees. Raises `RefutedError` if the robots of a tree have listed different numbers of optima."""
     trees: dict[str, dict[str, list[int]]] = {}
     for name, found in findings.items():
         if found.listing is not None:

@@ -1,4 +1,4 @@
-"""A run on this machine: a team goes in, an outcome comes out."""
+"""The run of a team on this machine: check the team, choose protocol and order, search, check the answer."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class PreparedRun:
         except (OrderError, UnboundedCostError) as refused:
             raise UnsupportedError(str(refused)) from None
         if counted is not team and environment is None:
-            _check_told_costs(team, outcome)
+            _check_costs(team, outcome)
         return outcome
 
 
@@ -142,11 +142,11 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
     return PreparedRun(team, choice, time.monotonic() - began)
 
 
-def _check_told_costs(team: Team, outcome: Outcome) -> None:
-    """Check what answers cost, in the user's numbers. After losses the files no longer say what an epoch's team is.
+def _check_costs(team: Team, outcome: Outcome) -> None:
+    """Check the costs of answers in the user's units, up to the first loss: then the files differ from the team.
 
     Raises:
-        RefutedError: when a cost is another.
+        RefutedError: if a cost is wrong.
     """
     if not outcome.epochs:
         check_told_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
@@ -201,7 +201,7 @@ def _alternatives(team: Team, options: Options, *, complete: bool, costs: bool =
 
 
 def _header(team: Team, options: Options) -> Outcome:
-    """Return an outcome that says what is run, and nothing else yet."""
+    """Return an outcome that describes the run, without an answer."""
     return Outcome(
         team=team.name,
         protocol=options.protocol,

@@ -1,10 +1,10 @@
 """A problem that changes over time, epoch by epoch (the paper's dynamic DisCSP, Section 3.1).
 
-An epoch ends when its problem is solved, when the scenario's next event comes, or when robots are lost. The next epoch
-begins with the changed problem. A protocol that can (`DynamicProtocol`) goes on with what still holds; any other
-begins anew, so that the two can be compared.
+An epoch ends when its problem is solved, when the scenario's next event happens, or when robots are lost. The next
+epoch begins with the changed problem. A `DynamicProtocol` continues with its knowledge that still holds; any other
+protocol restarts, so that the two can be compared.
 
-The changes are known from the beginning, as a scenario, or come epoch by epoch, from an `Environment`.
+The changes are known from the beginning, as a scenario, or come epoch by epoch from an `Environment`.
 """
 
 from __future__ import annotations
@@ -40,31 +40,31 @@ from robochoc.solver.explanation import Invalidated, invalidated_by
 Compile = Callable[[Team], CompiledTeam]
 
 Prepare = Callable[[], tuple[CompiledTeam, SearchResult | None]]
-"""What the robots do before each epoch's search: returns the team that they search with, as it is compiled.
+"""The preparation before each epoch's search; returns the compiled team of the search.
 
-With a result, that is the epoch's, and there is no search.
+If it also returns a result, that is the result of the epoch, and there is no search.
 """
 
 Environment = Callable[[Team, EpochOutcome, float | None], ScenarioEvent | None]
-"""The robots' surroundings: a function that gets each epoch's answer, and returns the next change of the problem.
+"""The robots' surroundings: a function that receives each epoch's answer and returns the next change of the problem.
 
 Args:
-    Team: the epoch's team.
-    EpochOutcome: how the epoch ended, once the answer was checked against every constraint.
-    float | None: how many seconds are left (None: no limit; 0: what it returns is ignored).
+    Team: The epoch's team.
+    EpochOutcome: The outcome of the epoch, after its answer was checked against every constraint.
+    float | None: The remaining seconds (None: no limit; 0: the returned event is ignored).
 
 Returns:
-    The next event, or None: nothing more happens. It comes after the events of the files; changes in it that are not
-    possible then are left out.
+    The next event, or None: no further event. It happens after the events of the files; changes in it that are
+    impossible then are left out.
 """
 
 
 NOT_SEARCHED = SearchResult.of(Verdict.UNKNOWN, None, {}, (), 0)
-"""The result where there was no time left."""
+"""The result of an epoch without time for a search."""
 
 
 class EpochStart(NamedTuple):
-    """An epoch that begins: its number, and what has opened it in a few words."""
+    """The start of an epoch: its number, and its cause in a few words."""
 
     epoch: Epoch
     number: int = 0
@@ -74,8 +74,8 @@ class EpochStart(NamedTuple):
 class FinishedEpoch(NamedTuple):
     """An epoch whose search is over.
 
-    `team` is its team as the files have it, `epoch` the same as the robots worked on it, with compiled domains. Where
-    the time was over before they could, `epoch` is the one before it.
+    `team` is its team in the form of the files, `epoch` contains the same team with compiled domains, as the robots
+    used it. If the time was over before, `epoch` is the previous one.
     """
 
     team: Team
@@ -85,16 +85,16 @@ class FinishedEpoch(NamedTuple):
 
 
 class ScenarioRun:
-    """A team that goes through its scenario, and through losses.
+    """The run of a team through its scenario and losses, epoch by epoch.
 
     Attributes:
-        team: the team as it is now, in the order of its files.
-        lost_for_good: the robots that were lost and have not come back.
-        failed_returns: why lost robots could not come back, a sentence each.
-        found: the result of the epoch that begins, if what the robots do before the search has settled it.
+        team: The present team, in the order of its files.
+        lost_for_good: The robots that were lost and have not come back.
+        failed_returns: The reasons why lost robots could not come back, one sentence each.
+        found: The result of the new epoch, if its preparation has decided it.
     """
 
-    def __init__(  # noqa: PLR0913 - they are of one run
+    def __init__(  # noqa: PLR0913 - all belong to one run
         self,
         team: Team,
         order: Sequence[str] | None,
@@ -107,19 +107,19 @@ class ScenarioRun:
         prepare: Prepare | None = None,
         with_files: bool = False,
     ) -> None:
-        """Begin with `team` as it is before the first event.
+        """Start with `team` as it is before the first event.
 
         Args:
-            team: the team with its scenario.
-            order: the priority order asked for (None: the files').
-            compile_: compiles the domains of a team.
-            left_s: returns how many seconds are left (None: no limit).
-            messages: how many messages may be sent in all epochs together (None: no limit).
-            spares: how many lost robots come back. Their files are read again, the events that have happened meanwhile
-                happen to them too, and they join at the end of the order.
-            parameters: what all robots are given beside the problem.
-            prepare: what the robots do before each search (None: nothing).
-            with_files: whether the constraints that lost robots hold are lost with them.
+            team: The team with its scenario.
+            order: The priority order of the run (None: that of the files).
+            compile_: Compiles the domains of a team.
+            left_s: Returns the remaining seconds (None: no limit).
+            messages: The limit on messages in all epochs together (None: no limit).
+            spares: The number of lost robots that come back. Their files are read again, past events apply to them,
+                and they join at the end of the order.
+            parameters: The parameters common to all robots.
+            prepare: The preparation before each search (None: no preparation).
+            with_files: Whether the constraints that lost robots hold are lost with them.
         """
         self.team = self._full = team_after_events(team, events=0)
         self.lost_for_good: list[str] = []
@@ -141,26 +141,26 @@ class ScenarioRun:
         self._has_added_events = False
 
     def ordered_team(self) -> Team:
-        """Return the team as the robots see it: in the order of the run. Raises `OrderError`."""
+        """Return the team in the order of the run, as the robots use it. Raises `OrderError`."""
         return self.team if self._order is None else with_priorities(self.team, self._order)
 
     def compiled(self) -> CompiledTeam:
-        """Return the team as the robots see it, compiled. Raises `OrderError`, and what compiling raises."""
+        """Return the team in the order of the run, compiled. Raises `OrderError` and the errors of the compiler."""
         return self._compile(self.ordered_team())
 
     def prepared(self) -> CompiledTeam:
-        """Return the team with which the robots search in the epoch that begins. Raises what `compiled` does."""
+        """Return the compiled team of the new epoch's search. Raises the errors of `compiled`."""
         if self._prepare is None:
             return self.compiled()
         compiled, self.found = self._prepare()
         return compiled
 
     def epochs(self, session: Session, on_start: Callable[[EpochStart], None]) -> Iterator[FinishedEpoch]:
-        """Yield one epoch after the other. The verdict of the last one counts. A limit may end the run earlier.
+        """Yield the epochs one by one. The verdict of the last one counts. A limit may end the run earlier.
 
         Args:
-            session: a session that was opened with the `prepared` team.
-            on_start: is called before each epoch.
+            session: A session that was opened with the `prepared` team.
+            on_start: Called before each epoch.
         """
         opened = "the start"
         epoch = Epoch(session.compiled, parameters=self._parameters)
@@ -187,7 +187,7 @@ class ScenarioRun:
                 return
 
     def _search(self, session: Session) -> SearchResult:
-        if not self.team.robots:  # all have left, and others may come: no constraint is broken
+        if not self.team.robots:  # all have left, and others may join: no constraint is violated
             return SearchResult.of(Verdict.SOLUTION, None, {}, (), 0)
         if self.found is not None:
             return self.found
@@ -202,12 +202,12 @@ class ScenarioRun:
 
     @property
     def _next(self) -> ScenarioEvent | None:
-        """The event that comes next; None where no more is known."""
+        """The next event; None if no further event is known."""
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
     @property
     def events_left(self) -> int:
-        """How many events have not happened."""
+        """The number of events that have not happened."""
         return len(self._files.scenario) - self._happened
 
     @property
@@ -216,7 +216,7 @@ class ScenarioRun:
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
     def add_event(self, event: ScenarioEvent) -> None:
-        """Add `event` to the end of the scenario. Changes in it that are not possible then are left out."""
+        """Add `event` to the end of the scenario. Changes in it that are impossible then are left out."""
         self._files = replace(self._files, scenario=(*self._files.scenario, event))
         self._has_added_events = True
 
@@ -226,7 +226,7 @@ class ScenarioRun:
         self._update_team(())
 
     def _describe(self, event: ScenarioEvent) -> str:
-        """Return in a few words what of `event` can still happen."""
+        """Return the changes of `event` that are still possible, in a few words."""
         out = set(self.lost_for_good)
         changes = apply_possible_changes(self._full, event.changes)[1] if self._has_added_events else event.changes
         words = [
@@ -237,7 +237,7 @@ class ScenarioRun:
         return ", ".join(words) or "nothing"
 
     def _apply(self, event: ScenarioEvent) -> Collection[str]:
-        """Let `event` happen, and return the robots that join. After losses, impossible changes are left out."""
+        """Apply `event`, and return the joining robots. After losses, impossible changes are left out."""
         self._happened += 1
         changes: Sequence[Change] = event.changes
         if self._after_losses:
@@ -249,14 +249,14 @@ class ScenarioRun:
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _lose(self, lost: Mapping[str, str]) -> Collection[str]:
-        """Return those of `lost` that come back; the others are lost for good."""
+        """Return the robots of `lost` that come back; the others are lost for good."""
         self._after_losses = True
         back: list[str] = []
         for name in lost:
             if self._spares:
                 self._spares -= 1
                 try:
-                    self._read_again(name)
+                    self._reread(name)
                     back.append(name)
                 except (InvalidInputError, ChangeError, UnboundedCostError, OSError) as why:
                     self.failed_returns.append(f"{name} could not come back: {why}")
@@ -278,7 +278,7 @@ class ScenarioRun:
     def _remaining(self) -> Team:
         """Return the team without the robots that are lost for good.
 
-        If the constraints that they hold are lost too, the initial order of the run determines which ones they hold.
+        If the constraints that they hold are lost too, the initial order of the run determines these constraints.
         """
         order = self._held_in
         if order is None or not self.lost_for_good:
@@ -287,23 +287,23 @@ class ScenarioRun:
         return with_priorities(left, [name for name in self._full.order if name in left])
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:
-        """Let `session` work on the team as it is now; returns the epoch that begins.
+        """Change the team of `session` to the present one; return the new epoch.
 
-        If that needs no search, the session stays with what it has until one does.
+        If the epoch needs no search, the session is left unchanged until an epoch needs one.
         """
         compiled = self._compile(session.usable_team(self.ordered_team())) if self._prepare is None else self.prepared()
         self._joining.update(joining)
         if self.found is not None:
             return Epoch(compiled, parameters=self._parameters)
-        anew = frozenset(name for name in self._joining if name in compiled.team)
+        fresh = frozenset(name for name in self._joining if name in compiled.team)
         self._joining.clear()
         keys, agents = invalidated_by(session.compiled.team, compiled.team)
-        epoch = Epoch(compiled, Invalidated(keys, agents | anew), anew, self._parameters)
+        epoch = Epoch(compiled, Invalidated(keys, agents | fresh), fresh, self._parameters)
         session.change(epoch)
         return epoch
 
-    def _read_again(self, name: str) -> None:
-        """Replace the robot `name` by what its file says now, as if it had said so from the beginning."""
+    def _reread(self, name: str) -> None:
+        """Replace the robot `name` by the present content of its file, as if it had been the same from the start."""
         symbols = symbol_table(self.team.robots)
         read = read_robot_again(Path(self.team[name].file), symbols, self._files.user_units)
         robot = normalized_joining(self._files, read)
@@ -314,7 +314,7 @@ class ScenarioRun:
 
 
 def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:
-    """Return in a few words which robots were lost, and which of them came `back`."""
+    """Return in a few words the lost robots, and those of them that came `back`."""
     out = [name for name in lost if name not in back]
     words = [f"the loss of {', '.join(out)}"] if out else []
     if back:
@@ -323,6 +323,6 @@ def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:
 
 
 def _with_joining(event: ScenarioEvent, robot: Robot) -> ScenarioEvent:
-    """Return `event`; where a robot of that name joins, it is `robot`."""
+    """Return `event` with `robot` in place of the joining robot of that name."""
     changes = (AddAgent(robot) if isinstance(c, AddAgent) and c.robot.name == robot.name else c for c in event.changes)
     return replace(event, changes=tuple(changes))

@@ -1,4 +1,4 @@
-"""A team whose robots run on this machine, and whose files are at hand: every answer is checked with the files."""
+"""A team whose robots run on this machine. Every answer is checked with the robots' files."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from robochoc.verification.objective import withdrawal_cost
 
 
 class StartEvents:
-    """Reports to `observer`, if there is one, the start of each search, and of each epoch."""
+    """Reports the start of each search and each epoch to `observer`, if there is one."""
 
     def __init__(self, observer: Observer | None) -> None:
         self._observer = observer
@@ -43,9 +43,9 @@ class StartEvents:
         """Report that a search begins.
 
         Args:
-            protocol: the protocol that searches.
-            start: the epoch that begins.
-            session: the session in which it is searched; None if that is opened later.
+            protocol: The protocol of the search.
+            start: The start of the epoch.
+            session: The session of the search; None if it is opened later.
         """
         if self._observer is None:
             return
@@ -62,7 +62,7 @@ class StartEvents:
 class ThisMachine(Deployment):
     """A team on this machine, in the runtime that the options name. See `Deployment`.
 
-    `epochs` are those that are over; the list grows while the run goes on.
+    `epochs` are the finished epochs; the list grows during the run.
     """
 
     def __init__(
@@ -93,18 +93,18 @@ class ThisMachine(Deployment):
             with_files=options.runtime == Runtime.NETWORK,
         )
         self._searched = CompiledTeam(team, only=())
-        """The team of the last `search`; of none, before the first."""
-        self._done: list[Preprocessing] = []
+        """The team of the last `search`, compiled; before the first search, none of its robots is compiled."""
+        self._preprocessings: list[Preprocessing] = []
         self._cut_short = ""
-        """Why the robots could not end the last preprocessing."""
+        """The reason why the last preprocessing did not end."""
 
     @property
     def kind(self) -> ProblemKind:
         """See `Deployment.kind`."""
         return self._scenario.team.kind
 
-    def told(self, total: float) -> Cost:
-        """See `Deployment.told`."""
+    def in_user_units(self, total: float) -> Cost:
+        """See `Deployment.in_user_units`."""
         return user_cost(self._scenario.team, total)
 
     @property
@@ -135,7 +135,7 @@ class ThisMachine(Deployment):
         self._scenario.remove(lost.keys())
 
     def solve(self, phase: RunPhase) -> PhaseAnswer:
-        """See `Deployment.solve`. The problem may change, but not while it is decided which robots withdraw."""
+        """See `Deployment.solve`. The problem may change in the first phase only."""
         if not phase.withdrawal:
             return self._solve_epochs(phase)
         answer = replace(super().solve(phase), witness=None)  # `witness` is for the whole team's no-solution
@@ -167,15 +167,15 @@ class ThisMachine(Deployment):
         return self._confirmed(total=total, withdrawal_cost=cost)
 
     def limit_reached(self, why: str) -> PhaseAnswer:
-        """Return the answer of a run that a limit has ended before the robots could search."""
+        """Return the answer of a run that a limit has ended before the search."""
         reason = "; ".join([why, *self._scenario.failed_returns])
-        before = total_preprocessing(self._done)
+        before = total_preprocessing(self._preprocessings)
         return self._with_epochs(PhaseAnswer(Verdict.UNKNOWN, reason=reason, preprocessing=before))
 
     # Epochs
 
     def _solve_epochs(self, phase: RunPhase) -> PhaseAnswer:
-        """Return the answer of the last epoch, with what all of them have cost."""
+        """Return the answer of the last epoch, with the metrics of all epochs."""
         scenario = self._scenario
         answer, lost = PhaseAnswer(Verdict.UNKNOWN), dict[str, str]()
         try:
@@ -188,7 +188,7 @@ class ThisMachine(Deployment):
             if scenario.found is not None and not self._dynamic:
                 return self._settled(phase, scenario.found)
         with self._session(phase, compiled) as session:
-            for epoch in scenario.epochs(session, partial(self._begin, phase, session)):
+            for epoch in scenario.epochs(session, partial(self._start_epoch, phase, session)):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
                 self.epochs.append(answer.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
                 if self._dynamic or lost:
@@ -198,13 +198,15 @@ class ThisMachine(Deployment):
         if lost:
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
-        missed = self._events_missed(answer)
+        missed = self._missed_events(answer)
         why = self._cut_short or missed or self.why_unknown(phase, answer) or answer.reason
         why = why or self._absence_reason(answer, withdrawal=phase.withdrawal)
-        if missed:  # an answer to a problem that was to change
+        if missed:  # an answer to a problem that was going to change
             answer = replace(answer, verdict=Verdict.UNKNOWN, deadline=None)
         reasons = filter(None, [why, *scenario.failed_returns])
-        return replace(answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._done))
+        return replace(
+            answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._preprocessings)
+        )
 
     def _absence_reason(self, answer: PhaseAnswer, *, withdrawal: bool) -> str | None:
         """Return the reason for a missing solution: constraints that the remaining robots cannot satisfy."""
@@ -214,27 +216,27 @@ class ThisMachine(Deployment):
 
         return absence_reason(self._scenario.team, withdrawal=withdrawal) or None
 
-    def _events_missed(self, answer: PhaseAnswer) -> str:
-        """Return in words that a limit came before all events, with an answer; empty: it did not."""
+    def _missed_events(self, answer: PhaseAnswer) -> str:
+        """Return in words that a limit was reached before some events, although there is an answer; else empty."""
         left = self._scenario.events_left
         if not left or answer.verdict == Verdict.UNKNOWN:
             return ""
         missed = f"{left} event{'s' * (left != 1)} had not happened"
         return f"{self._limit_reached(answer.metrics)}, and {missed}"
 
-    def _begin(self, phase: RunPhase, session: Session, start: EpochStart) -> None:
+    def _start_epoch(self, phase: RunPhase, session: Session, start: EpochStart) -> None:
         """Report that an epoch begins, and watch it."""
         self._start_events.report(phase.protocol, start, session)
         self._watch(phase, start, session)
 
     def _restart(self) -> None:
-        """Let the time begin again, where there is a deadline: each epoch has its own."""
+        """Restart the time if there is a deadline: each epoch has its own deadline."""
         if self.options.deadline is not None:
             self._context.restart()
             self._compiler.deadline = self._context.deadline
 
     def _watch(self, phase: RunPhase, start: EpochStart, session: Session) -> None:
-        """Have what is found in the epoch that starts published while the search goes on, if that is asked for."""
+        """Publish answers during the search of the new epoch, if the options require it."""
         before, self._improvements = self._improvements, None
         options, audience = self.options, self._audience
         if options.deadline is None or options.improve is None:
@@ -251,7 +253,7 @@ class ThisMachine(Deployment):
             team,
             options,
             began=self._context.began,
-            told=self.told,
+            in_user_units=self.in_user_units,
             check=lambda snapshot: check_with_files(phase, snapshot, team, compiled),
             publish=publish,
             audience=audience,
@@ -264,9 +266,9 @@ class ThisMachine(Deployment):
         return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
 
     def _preprocessed(self) -> tuple[CompiledTeam, SearchResult | None]:
-        """Let the robots make their domains consistent, and return the team that is left. See `scenario.Prepare`.
+        """Let the robots make their domains consistent; return the remaining team. See `scenario.Prepare`.
 
-        They begin with the domains of the files: what rests on a constraint that is gone comes back.
+        They begin with the domains of the files: values that a removed constraint had excluded come back.
         """
         self._cut_short = ""
         if self.is_empty:
@@ -275,7 +277,9 @@ class ThisMachine(Deployment):
         result = self._search_without_losses(phase).result
         whole = self._searched
         values = sum(len(robot.domain.values) for robot in whole.robots.values())
-        self._done.append(Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values))
+        self._preprocessings.append(
+            Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values)
+        )
         if result.verdict == Verdict.SOLUTION:
             return self._compile(restricted(whole, result.findings)), None
         if result.verdict == Verdict.UNKNOWN:
@@ -283,8 +287,8 @@ class ThisMachine(Deployment):
         return whole, SearchResult.of(result.verdict, result.witness, {}, (), 0)
 
     def _settled(self, phase: RunPhase, found: SearchResult) -> PhaseAnswer:
-        """Return the answer of a run that has ended before the protocol began."""
-        before = total_preprocessing(self._done)
+        """Return the answer of a run that the preprocessing has decided."""
+        before = total_preprocessing(self._preprocessings)
         answer = PhaseAnswer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
         return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict == Verdict.NO_SOLUTION else answer
 
@@ -296,7 +300,7 @@ class ThisMachine(Deployment):
         return answer
 
     def _ask_environment(self) -> None:
-        """Give the environment, if there is one, the last epoch's answer; it may add an event."""
+        """Give the last epoch's answer to the environment, if there is one; it may add an event."""
         if self._environment is None:
             return
         left_s = 0 if self._scenario.is_over else None if self.options.deadline is not None else self.left_s()
@@ -305,19 +309,19 @@ class ThisMachine(Deployment):
             self._scenario.add_event(normalized_event(self._scenario.team, event))
 
     def _with_epochs(self, answer: PhaseAnswer) -> PhaseAnswer:
-        """Return the last epoch's `answer`, with what all epochs have cost."""
+        """Return the last epoch's `answer`, with the metrics of all epochs."""
         spent = sum((epoch.metrics for epoch in self.epochs), Metrics())
         several = len(self.epochs) > 1 or self._dynamic
         return replace(answer, metrics=spent, epochs=tuple(self.epochs) if several else ())
 
-    # What an epoch needs
+    # Parts of an epoch
 
     @property
     def _order_requested(self) -> bool:
         return self.options.order is not None and "order" not in self.options.chosen
 
     def _compile(self, team: Team) -> CompiledTeam:
-        """Compile `team` for its next epoch; in a static problem one robot without a local solution decides."""
+        """Compile `team` for its next epoch. In a static problem a robot without a local solution ends the run."""
         return self._compiler.compile(team, every=self._dynamic or bool(self.epochs))
 
     def _session(self, phase: RunPhase, compiled: CompiledTeam) -> Session:
@@ -338,7 +342,7 @@ class ThisMachine(Deployment):
     def _confirmed(
         self, alone: str | None = None, *, total: float = INFINITE, withdrawal_cost: float | None = None
     ) -> tuple[str, ...]:
-        """Return the central solvers that agree, if they are asked. For the arguments see `confirmed`."""
+        """Return the central solvers that confirm an answer, if required. For the arguments see `confirmed`."""
         if not self.options.verify:
             return ()
         from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for

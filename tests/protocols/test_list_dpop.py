@@ -21,7 +21,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.settings import equip
 from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, solve
-from robochoc.run.listed_optima import put_together
+from robochoc.run.listed_optima import combined_optima
 from robochoc.run.options import Preprocess, Withdrawal
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import RefutedError
@@ -228,7 +228,7 @@ def test_of_a_robot_that_nobody_sees_one_value_is_listed() -> None:
 
 
 @looped(
-    ("places", "why"), [({"RA": [0], "RB": [0, 1]}, "listed 1 to 2 optima"), ({"RA": [0, 0], "RB": [1, 1]}, "the same")]
+    ("places", "why"), [({"RA": [0], "RB": [0, 1]}, "listed 1 to 2 optima"), ({"RA": [0, 0], "RB": [1, 1]}, "are equal")]
 )
 def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]], why: str) -> None:
     pair = team_of({"A": [1, 2], "B": [1, 2]}, [differ("A", "B")])
@@ -239,14 +239,14 @@ def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]],
     }
     result = SearchResult(Verdict.SOLUTION, None, {}, Metrics(), findings=findings)
     with pytest.raises(RefutedError, match=why):
-        put_together(CompiledTeam(pair), result)
+        combined_optima(CompiledTeam(pair), result)
 
 
 def test_each_listed_optimum_is_checked(monkeypatch: pytest.MonkeyPatch) -> None:
     pair = team_of({"A": [1, 2], "B": [1, 2]}, [differ("A", "B")])
     for wrong, why in (({"A": 1, "B": 1}, "broken by"), ({"A": 1}, "B has no value")):
         listed = [{"A": 1, "B": 2}, wrong]
-        monkeypatch.setattr("robochoc.run.evaluation.put_together", lambda *_, listed=listed: (2, listed))
+        monkeypatch.setattr("robochoc.run.evaluation.combined_optima", lambda *_, listed=listed: (2, listed))
         with pytest.raises(RefutedError, match=why):
             solve(pair, IN_SIMULATOR)
 

@@ -1,5 +1,5 @@
-"""Runs on several machines from their ends: what `robochoc master`, `robot` and `directory` do, and the API with them.
+"""Runs on several machines: the work of `robochoc master`, `robot` and `directory`, and of their functions in Python.
 
-`lead.py` is the master's side of a whole run, `join.py` a robot's, `consult.py` a question to the Directory
-Facilitator. The network itself is `communication/network/`.
+`master_run.py` is the master's side of a run, `join.py` a robot's side, `directory_query.py` a query to the Directory
+Facilitator. The network itself is in `communication/network/`.
 """

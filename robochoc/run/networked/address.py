@@ -9,7 +9,7 @@ from typing import NamedTuple
 from robochoc.system.errors import RobochocError
 
 DEFAULT_PORT = 7447
-"""Zenoh's own."""
+"""The default port of Zenoh."""
 LOOPBACK = "127.0.0.1"
 _LARGEST_PORT = 65_534
 _BRACKETED = re.compile(r"\[([^]]*)](?::(.+))?")
@@ -45,7 +45,7 @@ class Address(NamedTuple):
 
     @property
     def anywhere(self) -> bool:
-        """Return whether this means all addresses of a machine. Robots cannot connect to such an address."""
+        """Return whether this is the address for all addresses of a machine. Robots cannot connect to it."""
         try:
             return ipaddress.ip_address(self.host).is_unspecified
         except ValueError:

@@ -1,4 +1,4 @@
-"""Queries to the Directory Facilitator of a running master: which agents there are, and what they offer."""
+"""Queries to the Directory Facilitator of a running master: the agents and their services."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ class NoAnswerError(RobochocError):
 
 
 class TemplateError(RobochocError, ValueError):
-    """A template that nothing can be searched by."""
+    """An invalid template of a search."""
 
 
 def search_template(slots: Sequence[str]) -> AgentDescription:
-    """Return the template that `slot=value` words describe: all of them have to match. Raises `TemplateError`.
+    """Return the template of `slot=value` words, all of which must match. Raises `TemplateError`.
 
-    Names need not have their platform: it may call itself otherwise than here.
+    Names may omit the platform, since it may have another name on its machine.
     """
     given: dict[str, list[str]] = {slot: [] for slot in SLOTS}
     for word in slots:
@@ -58,12 +58,12 @@ def search_template(slots: Sequence[str]) -> AgentDescription:
 
 
 def platform_at(place: Address) -> str:
-    """Return the name of the platform whose master is at `place`: agents' names end with it."""
+    """Return the name of the platform whose master is at `place`. Agents' names end with it."""
     return f"{place}/robochoc"
 
 
 def search_request(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
-    """Return a search as the directory reads it: an action in SL0. Raises `TemplateError`."""
+    """Return a search as an action in SL0. Raises `TemplateError`."""
     platform = platform_at(place)
     return request(df_on(platform), Function.SEARCH, search_template(slots), at_most)
 
@@ -75,11 +75,11 @@ def query_directory(place: Address, identity: Identity, words: str, patience_s: 
 
 
 def watch_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
-    """Subscribe to what `words` search for; yield the directory's notices in SL0, now and whenever something changes.
+    """Subscribe to the search `words`; yield the directory's notices in SL0, now and at each change.
 
     Raises:
-        CannotConnectError: when no master answers.
-        NoAnswerError: when the directory refuses, or the master is gone for `patience_s` seconds.
+        CannotConnectError: if no master answers.
+        NoAnswerError: if the directory refuses, or the master is absent for `patience_s` seconds.
     """
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
         query = _Query(place, identity, transport)
@@ -95,7 +95,7 @@ def watch_directory(place: Address, identity: Identity, words: str, patience_s: 
 
 
 class _Query:
-    """One query, or subscription. Answers to others, and to earlier queries, are passed over."""
+    """One query or subscription. Answers to other queries are ignored."""
 
     def __init__(self, place: Address, identity: Identity, transport: Transport) -> None:
         self._place = place
@@ -105,8 +105,8 @@ class _Query:
         self._number = secrets.randbits(_NUMBER_BITS)
         self._early: list[DirectoryAnswer] = []
 
-    def ask(self, words: str, wanted: Performative, *, subscribe: bool = False) -> str:
-        """Ask until there is an answer, and return its content. Raises `NoAnswerError`."""
+    def ask(self, words: str, expected: Performative, *, subscribe: bool = False) -> str:
+        """Repeat the query until there is an answer, and return its content. Raises `NoAnswerError`."""
         until, asked = time.monotonic() + ANSWER_S, 0.0
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -117,7 +117,7 @@ class _Query:
             answer = self._next()
             if answer is None:
                 continue
-            if answer.performative == wanted:
+            if answer.performative == expected:
                 return answer.content
             if answer.performative != Performative.INFORM:
                 raise NoAnswerError(

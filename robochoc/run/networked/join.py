@@ -1,4 +1,4 @@
-"""A robot's side of a run across machines: show its identity, compile its domain, register, search."""
+"""A robot's side of a run across machines: load its identity, compile its domain, register, search."""
 
 from __future__ import annotations
 
@@ -29,22 +29,22 @@ _TRY_AGAIN_S = 0.5
 def identity_of(
     name: str, place: Address, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
 ) -> Identity:
-    """Return the identity of a robot. It is enrolled now if there is a token, and renewed if half of its life is over.
+    """Return the identity of a robot. With a token it is enrolled now; after half of its lifetime it is renewed.
 
     Args:
         name: The robot's name.
         place: The address of the master.
         folder: The folder of the identity (None: the default).
         token: A token with which the robot enrols.
-        patience_s: How many seconds to wait, with a token, for a master that does not listen yet.
+        patience_s: The seconds to wait, with a token, for a master that does not listen yet.
 
     Raises:
-        InvalidNameError: when the name cannot be a robot's.
-        IdentityError: when the folder has no identity, or that of another robot.
-        TokenError: when the token is none.
-        NotTrustedError: when the master's Authority is not the one that the token is from.
-        EnrolmentError: when the robot is not enrolled.
-        OSError: when the identity cannot be written.
+        InvalidNameError: if the name is not a valid robot's name.
+        IdentityError: if the folder has no identity, or that of another robot.
+        TokenError: if the token is invalid.
+        NotTrustedError: if the master's Authority has not issued the token.
+        EnrolmentError: if the robot is not enrolled.
+        OSError: if the identity cannot be written.
     """
     check_member_name(name)
     folder = folder or default_identity_folder(name)
@@ -52,13 +52,15 @@ def identity_of(
         return _enrolled(name, place, folder, token, patience_s)
     identity = Identity.load(folder)
     if identity.name != name:
-        raise IdentityError(f"{folder} is the identity of {identity.name}, not of {name}; say --identity")
+        raise IdentityError(
+            f"{folder} is the identity of {identity.name}, not of {name}; choose another folder by --identity"
+        )
     if not identity.is_due():
         return identity
     try:
         return renew(identity, place.host, place.enrolment_port)
     except EnrolmentError:
-        return identity  # it is good for a while yet
+        return identity  # it is still valid
 
 
 def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: float) -> Identity:
@@ -73,7 +75,7 @@ def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: f
 
 
 def _normalized(robot: Robot) -> Robot:
-    """Return `robot` with costs as protocols count them. Raises `UnsupportedError`."""
+    """Return `robot` with costs in the protocols' units. Raises `UnsupportedError`."""
     try:
         return normalized_robot(robot, robot.costs, {one.name: one.domain for one in robot.variables})
     except UnboundedCostError as error:
@@ -81,29 +83,29 @@ def _normalized(robot: Robot) -> Robot:
 
 
 def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettings, compiler: Compiler) -> Ending:
-    """Take part as `robot` in one run of a master.
+    """Participate as `robot` in one run of a master.
 
     Args:
-        robot: The robot, as its file says.
+        robot: The robot of a file.
         place: The address of the master.
         identity: The robot's identity.
-        settings: How the robot takes part.
+        settings: The settings of the robot.
         compiler: Compiles the robot's domain.
 
     Returns:
-        How the run ended for the robot.
+        The end of the run for the robot.
 
     Raises:
-        InvalidInputError: when the robot is not valid by itself.
-        CannotConnectError: when no master answers.
-        UnsupportedError: when nothing bounds the cost of one of its functions.
-        CompileError: when its domain cannot be compiled, and the others of `Compiler.compile`.
+        InvalidInputError: if the robot is invalid.
+        CannotConnectError: if no master answers.
+        UnsupportedError: if the cost of one of its functions is unbounded.
+        CompileError: if its domain cannot be compiled; also the other errors of `Compiler.compile`.
     """
     check_robot(robot)
     robot = _normalized(robot)
     settings.stage("compiling")
     settings = replace(settings, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, settings.compiled)
-    settings.stage(f"looking for the master at {place}")
+    settings.stage(f"searching for the master at {place}")
     with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as transport:
         return NetworkRobot(own, identity, transport, protocol_or_stage, settings).run()

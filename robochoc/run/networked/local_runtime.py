@@ -1,4 +1,7 @@
-"""The runtime `network`: robots in processes of this machine that talk through a master, by mutual TLS."""
+"""The runtime `network`: robots in processes of this machine, connected through a master by mutual TLS.
+
+A separate module, as the network is an extra: `run/runtimes.py` imports it by name on first use.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from robochoc.run.runtimes import SessionRequest
 
 
 def open_network(request: SessionRequest) -> Session:
-    """Open a session in which each robot is an OS process that is joined by a network."""
+    """Open a session in which each robot is an OS process on a network."""
     options = request.options
     settings = NetworkSettings(
         filters=options.filters, survive=options.survives_losses, patience_s=options.patience or PATIENCE_S

@@ -1,7 +1,7 @@
-"""A team whose robots run on several machines, and keep their files: the robots themselves check the answer.
+"""A team whose robots run on several machines and do not disclose their files: the robots check the answer.
 
-The master sees of each robot what its neighbours may see. What only the robots could check is said to rest on their
-word (`claimed`).
+The master sees of each robot the same as its neighbours. The outcome names the robots whose claims only they could
+check (`claimed`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from robochoc.verification.checker import RefutedError
 
 
 class TeamSnapshot(NamedTuple):
-    """A snapshot by its `number`: the `values` of all variables, and those by the robots' names."""
+    """A snapshot with its `number`: the `values` of all variables, and the `assignments` by robot."""
 
     number: int
     values: Mapping[str, int]
@@ -40,18 +40,18 @@ class TeamSnapshot(NamedTuple):
 
 NO_SNAPSHOT = TeamSnapshot(0, {}, {})
 _NAMED = 5
-"""No more robots than these are named in a message."""
+"""The maximum number of robots named in a message."""
 
 
 class Machines(Deployment):
-    """The robots that have registered with `master`. See `Deployment`. Its time starts when it is made.
+    """The robots that have registered with `master`. See `Deployment`. Its time starts with its creation.
 
     Args:
-        master: a master whose team is complete.
-        options: how to run.
-        name: the team's name.
-        observer: gets the events of the run.
-        audience: gets each answer that is published while the robots search.
+        master: A master whose team is complete.
+        options: How to run.
+        name: The team's name.
+        observer: Receives the events of the run.
+        audience: Receives each answer that is published during the search.
     """
 
     def __init__(
@@ -78,8 +78,8 @@ class Machines(Deployment):
         """See `Deployment.kind`."""
         return registered_team(self._master, self._name).kind
 
-    def told(self, total: float) -> Cost:
-        """See `Deployment.told`."""
+    def in_user_units(self, total: float) -> Cost:
+        """See `Deployment.in_user_units`."""
         units = common_units(member.profile.units for member in self._master.members.robots.values())
         return units.in_user_units(-int(total) if units.maximize else int(total))
 
@@ -112,12 +112,12 @@ class Machines(Deployment):
         members = self._master.members
         self._gone += [members.robots[name].robot for name in lost if name in members.robots]
         members.remove(lost)
-        if self.options.deadline is not None:  # those who are left have a deadline of their own
+        if self.options.deadline is not None:  # the remaining robots have a new deadline
             self._begin_time()
             self._improvements = None
 
     def search(self, phase: RunPhase) -> Search:
-        """See `Deployment.search`. Raises `RefutedError` when robots contradict each other."""
+        """See `Deployment.search`. Raises `RefutedError` if robots contradict each other."""
         if self._observer:
             self._observer(Began(t=0, protocol=phase.name, minimises=True if phase.traits.costs else UNSET))
         left_s, checked = self.left_s(), self.options.deadline is not None
@@ -132,7 +132,7 @@ class Machines(Deployment):
     # Answers while the robots search
 
     def _watch(self, phase: RunPhase) -> Improvements:
-        """Return the object that stores the best answer of a search, and publishes it from the deadline on."""
+        """Return the watch that stores the best answer of a search, and publishes it from the deadline on."""
         team = registered_team(self._master, self._name)
         options, audience = self.options, self._audience
         self._snapshot = self._kept = NO_SNAPSHOT
@@ -153,7 +153,7 @@ class Machines(Deployment):
             team,
             options,
             began=self._began,
-            told=self.told,
+            in_user_units=self.in_user_units,
             check=partial(self._check_snapshot, phase),
             publish=publish,
             audience=audience,
@@ -181,20 +181,20 @@ class Machines(Deployment):
         return Answer(
             Verdict.UNKNOWN,
             assignment=values,
-            cost=self.told(cost),
+            cost=self.in_user_units(cost),
             withdrawn=without,
             verified=True,
             checked=thoroughness(found.checks),
         )
 
     def _adopt(self, answer: PhaseAnswer) -> None:
-        """Tell the robots that `answer` is their decision until they hear otherwise."""
+        """Order the robots to use `answer` as their decision until a further order."""
         withdrawn = f", {len(answer.withdrawn)} withdraw" if answer.withdrawn else ""
         number = self._kept.number if answer.assignment is self._kept.values else 0
         self._master.adopt(number, f"{answer.verdict}{withdrawn}")
 
     def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
-        """See `Deployment.concluded`. The best that robots have checked may be what they had at a snapshot."""
+        """See `Deployment.concluded`. The best checked answer may be that of a snapshot."""
         improvements = self._improvements
         if improvements is None:
             return answer
@@ -206,7 +206,7 @@ class Machines(Deployment):
     # The end
 
     def team_seen(self) -> Team:
-        """Return the team as the outcome shows it: with lost robots, and variables that only the robots knew before."""
+        """Return the team for the outcome, with lost robots, and with the variables reported at the end."""
         robots = []
         for robot in registered_team(self._master, self._name).robots:
             known = {variable.name for variable in robot.variables}
@@ -219,12 +219,12 @@ class Machines(Deployment):
         """Return the values that robots have reported, once every robot has checked its own constraints.
 
         Raises:
-            RefutedError: when a robot objects to what the protocol claims, or robots contradict each other.
-            RobotsLostError: when a robot has values and does not report them.
+            RefutedError: if a robot refutes a claim of the protocol, or robots contradict each other.
+            RobotsLostError: if a robot has values and does not report them.
         """
         state, members = self._master.state, self._master.members
         if self.options.deadline is not None and not state.assigned.keys() >= set(members.order):
-            return None  # one has not said in time what it has: neither that it flies, nor that it withdraws
+            return None  # a robot has not reported in time whether it has values or withdraws
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
             withdrawn = without if phase.withdrawal and result.verdict == Verdict.SOLUTION else ()
@@ -238,14 +238,14 @@ class Machines(Deployment):
             return Answer(
                 Verdict.UNKNOWN,
                 assignment=values,
-                cost=self.told(cost),
+                cost=self.in_user_units(cost),
                 withdrawn=without,
                 verified=True,
                 checked=state.thoroughness,
             )
         if is_proven(phase, result):
             against = "; ".join(state.objections) or f"{first_names(without)} has no value"
-            source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
+            source = f"{result.witness} claims that" if result.witness else "no message is left, so that"
             raise RefutedError(f"{source} {phase.name} has a solution for {self._name}, but {against}")
         return None
 
@@ -263,19 +263,19 @@ class Machines(Deployment):
     def _refuse(self, doubts: Iterable[str]) -> None:
         """Raise `RefutedError` if there are `doubts`."""
         if why := "; ".join(doubts):
-            raise RefutedError(f"{self._name} has no answer that can be believed: {why}")
+            raise RefutedError(f"the answer for {self._name} is not credible: {why}")
 
 
 def registered_team(master: Master, name: str) -> Team:
-    """Return the team that has registered with `master`, as far as the master sees it."""
+    """Return the team that has registered with `master`, with the parts of it that the master sees."""
     members = master.members
     return Team(name, tuple(members.robots[robot].robot for robot in members.order))
 
 
 def claimed(outcome: Outcome) -> Outcome:
-    """Return `outcome` with the robots on whose word it rests (docs/guides/security.md, "One traitor").
+    """Return `outcome` with the robots whose unchecked claims it contains (docs/guides/security.md, "One traitor").
 
-    `no-solution` is the claim of one robot. Optimality, and unreported values, rest on all robots.
+    `no-solution` is the claim of one robot. Optimality, and unreported values, are claims of all robots.
     """
     by: str | None = None
     match outcome.verdict:
@@ -293,5 +293,5 @@ def claimed(outcome: Outcome) -> Outcome:
 
 
 def first_names(names: Sequence[str]) -> str:
-    """Return a few of `names`, and how many others there are."""
+    """Return a few of `names`, and the number of the others."""
     return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} others" * (len(names) > _NAMED)

@@ -1,4 +1,4 @@
-"""A whole run from the master's side: listen, wait for the team, search, check, report the outcome.
+"""A run from the master's side: listen, wait for the team, search, check, report the outcome.
 
 Section 5.2: "The master waits for the confirmation of creation all agents before ordering the start of the search."
 """
@@ -41,7 +41,7 @@ from robochoc.system.errors import RobochocError
 from robochoc.verification.checker import RefutedError
 
 LOOPBACK_ADDRESS = Address(LOOPBACK)
-"""Anything but loopback must be asked for."""
+"""The default: other addresses must be chosen explicitly."""
 
 
 @dataclass(frozen=True)
@@ -50,22 +50,22 @@ class MasterPlan:
 
     Attributes:
         authority: The folder of the Authority.
-        place: The address at which it listens.
-        hosts: Other names and addresses by which robots may call its machine.
+        place: The address at which the master listens.
+        hosts: Further names and addresses of its machine that robots may use.
         name: The team's name.
-        names: The robots of the team. Without these, and without a `number`, the team is complete when every neighbour
-            that a robot names has come.
-        number: How many robots the team has.
-        protocol: The protocol's name (None, or `auto`: one that suits what the robots declare).
+        names: The robots of the team. Without `names` and `number`, the team is complete when every neighbour that a
+            robot names has registered.
+        number: The number of robots of the team.
+        protocol: The protocol's name (None, or `auto`: chosen by the data that the robots declare).
         settings: The protocol's settings, as text.
-        seed: The seed of protocols that draw lots.
-        withdraw: Which robots withdraw when the team has no solution (None: none).
-        gather_s: How many seconds to wait for the team (None: no limit).
-        timeout: A limit in seconds, from when the team is complete (None: no limit).
-        deadline: The same, when the best assignment that is known counts as an answer (None: there is none).
-        improve: For how many seconds after the deadline the robots search on for what is better (None: not at all).
+        seed: The seed of protocols with random decisions.
+        withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
+        gather_s: The seconds to wait for the team (None: no limit).
+        timeout: A limit in seconds, from the time at which the team is complete (None: no limit).
+        deadline: The same; the best assignment known at the deadline is the answer (None: no deadline).
+        improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
         messages: A limit on the number of messages (None: no limit).
-        message_loss: The probability with which robots drop what they receive.
+        message_loss: The probability with which robots drop received messages.
         conditions: The settings of the network.
     """
 
@@ -88,7 +88,7 @@ class MasterPlan:
     conditions: NetworkSettings = NetworkSettings()
 
     def options(self, protocol: str) -> Options:
-        """Return how robots are to search by `protocol`."""
+        """Return the options of the run by `protocol`."""
         return Options(
             protocol=protocol,
             runtime=Runtime.NETWORK,
@@ -111,7 +111,7 @@ class TeamIncompleteError(RobochocError):
 
 
 class MasterResult(NamedTuple):
-    """The outcome, and the team as far as the master knows it: without any constraint."""
+    """The outcome, and the team as the master sees it: without constraints."""
 
     outcome: Outcome
     team: Team
@@ -128,35 +128,35 @@ def run_master(
     publication: Publication | None = None,
     concluded: Callable[[Outcome | None], None] = lambda _outcome: None,
 ) -> MasterResult:
-    """Be the master of one run.
+    """Run as the master of one run.
 
     Args:
-        plan: What to do.
-        observer: Gets all events of the master.
-        audience: Gets each answer that is published while the robots search (`plan.improve`).
-        watched: Whether the observer gets the robots' events too.
-        progress: Gets the number of messages so far, now and then.
-        listening: Is called once robots can come.
-        publication: What is written to it is given to those who may sniff, until a moment after `concluded`.
-        concluded: Is called with the outcome (None: the run was broken off); it writes the last of the publication.
+        plan: The plan of the run.
+        observer: Receives all events of the master.
+        audience: Receives each answer that is published during the search (`plan.improve`).
+        watched: Whether the observer also receives the robots' events.
+        progress: Receives the number of messages so far, now and then.
+        listening: Called once robots can connect.
+        publication: The journal for members that may sniff; it is served until a moment after `concluded`.
+        concluded: Called with the outcome (None: the run was broken off); it writes the end of the publication.
 
     Raises:
-        AuthorityError: when the folder has no Authority.
-        HostNameError: when a host has no valid name.
-        RouterError: when the master cannot listen.
-        TeamIncompleteError: when the team is not complete in time.
-        RobotsLostError: when robots were lost, and the run is not to go on without them.
-        UnsupportedError: when the options do not go together, or with the team.
-        UnknownProtocolError: when the protocol is not installed.
-        RefutedError: when the answer does not hold.
+        AuthorityError: if the folder has no Authority.
+        HostNameError: if the name of a host is invalid.
+        RouterError: if the master cannot listen.
+        TeamIncompleteError: if the team is not complete in time.
+        RobotsLostError: if robots were lost, and the run is not to continue without them.
+        UnsupportedError: if the options cannot be combined with each other or with the team.
+        UnknownProtocolError: if the protocol is not installed.
+        RefutedError: if a check refutes the answer.
     """
     _refuse_early(plan)
     authority = Authority.open(plan.authority)
     hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
     called = [host for host in hosts if ":" not in host]
     if not called:
-        why = "every address and the name of none" if plan.place.anywhere else "an address that zenoh checks no name of"
-        raise UnsupportedError(f"{plan.place} is {why}; say how robots call it: --host NAME")
+        why = "means all addresses" if plan.place.anywhere else "has no name that zenoh can check"
+        raise UnsupportedError(f"{plan.place} {why}; name the host by which robots connect: --host NAME")
     endpoint = str(plan.place._replace(host=called[0]))
     identity = authority.master_identity(hosts)
     conditions = replace(
@@ -176,7 +176,7 @@ def run_master(
 
 @contextmanager
 def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iterator[None]:
-    """Serve robots that redeem tokens. Raises `RouterError`."""
+    """Serve robots that redeem their tokens. Raises `RouterError`."""
     with ExitStack() as stack:
         try:
             stack.enter_context(EnrolmentServer(authority, identity, place.host, place.enrolment_port))
@@ -193,7 +193,7 @@ def _run(
     observers: tuple[Observer | None, Audience | None],
     concluded: Callable[[Outcome | None], None],
 ) -> MasterResult:
-    """Let the robots solve their problem, once the master listens, and send them the outcome."""
+    """Run the search once the master listens, and send the outcome to the robots."""
     try:
         led = _solve(plan, master, *observers)
     except BaseException as error:
@@ -207,7 +207,7 @@ def _run(
 
 
 def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience: Audience | None) -> MasterResult:
-    """Wait for the team, and let it solve its problem."""
+    """Wait for the team, and run its search."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = first_names(master.members.waited_for) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
@@ -232,7 +232,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
 
 
 def _refuse_early(plan: MasterPlan) -> None:
-    """Refuse what can be refused before any robot has come. Raises `UnsupportedError`."""
+    """Check the options and settings before any robot registers. Raises `UnsupportedError`."""
     asked = plan.protocol or AUTO
     refuse_options(plan.options(asked), private=plan.conditions.private)
     try:
@@ -245,7 +245,7 @@ def _refuse_early(plan: MasterPlan) -> None:
 
 
 def _in_words(outcome: Outcome) -> str:
-    """Return the outcome in a few words, as robots get it."""
+    """Return the outcome in a few words, for the robots."""
     withdrawn = f", {len(outcome.withdrawn_alive)} withdraw" if outcome.withdrawn_alive else ""
     claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
     return f"{outcome.verdict}{withdrawn}{claim}"

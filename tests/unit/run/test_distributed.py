@@ -49,7 +49,7 @@ class MadeUp(Deployment):
     def kind(self) -> ProblemKind:
         return ProblemKind.DISCSP
 
-    def told(self, total: float) -> Cost:
+    def in_user_units(self, total: float) -> Cost:
         return int(total)
 
     @property

@@ -34,5 +34,5 @@ def test_tables_that_no_machine_holds_cannot_be_asked_for() -> None:
     for protocol, field, most in [("p2-dpop", "ciphers", 10**6), ("p-dpop", "cells", 10**8)]:
         assert getattr(read_settings(protocol_named(protocol), {field: str(most)}), field) == most
         for wrong in (0, most + 1):
-            with pytest.raises(SettingsError, match=f"{field} is a number of {field} from 1 to {most:,}, not {wrong}"):
+            with pytest.raises(SettingsError, match=f"{field} is {wrong}; it must be from 1 to {most:,}"):
                 read_settings(protocol_named(protocol), {field: str(wrong)})

@@ -158,7 +158,7 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
     team = coloring(3, 2, 2)
     wrong = CentralAnswer(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
     monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: wrong)
-    with pytest.raises(SolverLostError, match="costs 3, and it says 1"):
+    with pytest.raises(SolverLostError, match="reports a cost of 1, but its answer costs 3"):
         solve(team, CENTRAL)
 
 
