@@ -118,7 +118,7 @@ class PostEnd:
     """robochoc's post: mutual TLS, access control, advanced publishers and subscribers."""
 
     def __init__(self, endpoint: str, texts: IdentityTexts, other: str) -> None:
-        self._post = Transport(endpoint, Identity.of(texts), watch=())
+        self._post = Transport(endpoint, Identity.from_texts(texts), watch=())
         self._other = other
 
     def send(self, content: bytes) -> None:

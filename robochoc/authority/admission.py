@@ -1,4 +1,4 @@
-"""Admission: what the master asks an Authority. And an Authority in memory, for one run on one machine."""
+"""The master's interface to an Authority, and an Authority in memory for one run on one machine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import Protocol
 
-from robochoc.authority.certificates import MASTER, ca_certificate, leaf_certificate, moment, new_key
+from robochoc.authority.certificates import MASTER, ca_certificate, leaf_certificate, new_key, utc_time
 from robochoc.authority.identity import Identity
 from robochoc.authority.registry import Right, Role
 
@@ -19,12 +19,12 @@ class Admission(Protocol):
     """Decides which names may take part. `Authority` is one."""
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
-        """Return the names that have a certificate in force now, sorted.
+        """Return the names with a certificate in force now, sorted.
 
         Args:
             role: Only names in this role.
             right: Only names with this right.
-            invited: Names as well that have a token and never had a certificate.
+            invited: Include names that have a token and never had a certificate.
         """
 
     def is_revoked(self, who: str | int) -> bool:
@@ -32,12 +32,12 @@ class Admission(Protocol):
 
 
 class InMemoryAuthority:
-    """An Authority for robots that one process starts on its own machine: no folder, no tokens, nothing to clean up."""
+    """An Authority without folder and tokens, for robots that one process starts on its machine."""
 
     def __init__(self, robots: Iterable[str]) -> None:
         self._key = new_key()
         self._now = time.time()
-        self._certificate = ca_certificate(self._key, moment(self._now))
+        self._certificate = ca_certificate(self._key, utc_time(self._now))
         self._robots = tuple(sorted(robots))
         self._revoked: set[str] = set()
         self._sniffers: set[str] = set()
@@ -57,7 +57,7 @@ class InMemoryAuthority:
         *,
         invited: bool = False,  # noqa: ARG002 - there are no tokens
     ) -> tuple[str, ...]:
-        """Return all robots that were not revoked, or those of them that have the right."""
+        """Return all robots that were not revoked, or those with the right."""
         there = tuple(n for n in self._robots if n not in self._revoked) if role in {None, Role.ROBOT} else ()
         return there if right is None else tuple(n for n in there if n in self._sniffers)
 
@@ -72,11 +72,11 @@ class InMemoryAuthority:
         self._robots = tuple(sorted({*self._robots, name}))
 
     def revoke(self, name: str) -> None:
-        """Refuse `name` from now on."""
+        """Revoke `name`."""
         self._revoked.add(name)
 
     def _identity(self, name: str, hosts: tuple[str, ...] | None) -> Identity:
         key = new_key()
-        times = (moment(self._now), moment(self._now + _LIFETIME.total_seconds()))
+        times = (utc_time(self._now), utc_time(self._now + _LIFETIME.total_seconds()))
         certificate = leaf_certificate((self._certificate, self._key), key.public_key(), name, hosts, times)
         return Identity(Path(), name, key, certificate, self._certificate)

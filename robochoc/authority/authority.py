@@ -1,7 +1,7 @@
 """The Authority: a small certification authority, and the registry of the names that may take part.
 
-A person enrols a name and carries the token to the robot; the robot makes a key of its own and shows the token once;
-the Authority signs a certificate that is valid for a day and is renewed before. A revocation is kept until the
+A person enrols a name and carries the token to the robot. The robot creates a key and uses the token once. The
+Authority signs a certificate, which is valid for a day and renewed before. A revocation is recorded until the
 certificate would have expired. The holder of the folder's `ca.key` is the Authority.
 """
 
@@ -25,16 +25,16 @@ from robochoc.authority.certificates import (
     fingerprint,
     key_pem,
     leaf_certificate,
-    moment,
     new_key,
     pem,
     read_certificate,
     read_key,
     read_request,
+    utc_time,
 )
 from robochoc.authority.events import AuthorityEvent, AuthorityObserver, Granted, Refused, unobserved
 from robochoc.authority.identity import Identity, private_folder, save
-from robochoc.authority.names import InvalidNameError, UnknownNameError, check_member_name, describe_enrolled
+from robochoc.authority.names import InvalidNameError, NotEnrolledError, check_member_name, describe_enrolled
 from robochoc.authority.registry import (
     PRIVATE,
     AuthorityError,
@@ -60,21 +60,21 @@ _OTHERS = 0o077
 
 
 class NotGrantedError(RobochocError):
-    """The Authority refuses. The message says why, and may be sent to the one that asked."""
+    """The Authority refuses a request. The message gives the reason, and may be sent to the requester."""
 
 
 class Authority:
-    """The Authority in `folder`; `create` and `open` make one.
+    """The Authority in `folder`, constructed by `create` and `open`.
 
     Several threads and processes may use the same folder at once.
 
     Args:
-        folder: Where its files are.
+        folder: The folder of its files.
         key: Its private key.
         certificate: Its certificate.
-        observer: Receives what is granted and refused.
+        observer: Receives grants and refusals.
         clock: Returns Unix time.
-        lifetime: How long certificates are valid.
+        lifetime: The validity period of certificates.
     """
 
     def __init__(
@@ -104,19 +104,19 @@ class Authority:
         clock: Callable[[], float] = time.time,
         lifetime: timedelta = CERTIFICATE_LIFETIME,
     ) -> Authority:
-        """Return a new Authority in `folder`, which is closed to other users.
+        """Create an Authority in `folder`, which other users cannot access.
 
-        Raises `AuthorityError` where one is already.
+        Raises `AuthorityError` if the folder already has an Authority.
         """
         folder = Path(folder)
         private_folder(folder)
         with locked(folder):
             if (folder / _KEY).exists() or (folder / _CERTIFICATE).exists():
                 raise AuthorityError(
-                    f"there is an Authority in {folder} already; keep it, or all robots must enrol again"
+                    f"there is already an Authority in {folder}; without it, all robots would have to enrol again"
                 )
             key = new_key()
-            certificate = ca_certificate(key, moment(clock()))
+            certificate = ca_certificate(key, utc_time(clock()))
             write_atomically(folder / _KEY, key_pem(key), PRIVATE)
             write_atomically(folder / _CERTIFICATE, pem(certificate))
         return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
@@ -130,7 +130,7 @@ class Authority:
         clock: Callable[[], float] = time.time,
         lifetime: timedelta = CERTIFICATE_LIFETIME,
     ) -> Authority:
-        """Return the Authority in `folder`. Raises `AuthorityError` where there is none that can be used."""
+        """Return the Authority in `folder`. Raises `AuthorityError` if it is missing or unusable."""
         folder = Path(folder)
         try:
             content, mode = (folder / _KEY).read_bytes(), (folder / _KEY).stat().st_mode
@@ -147,14 +147,14 @@ class Authority:
             )
         if certificate.public_key() != key.public_key():
             raise AuthorityError(f"the Authority in {folder} is damaged: {_KEY} is not the key of {_CERTIFICATE}")
-        if not certificate.not_valid_before_utc <= moment(clock()) < certificate.not_valid_after_utc:
+        if not certificate.not_valid_before_utc <= utc_time(clock()) < certificate.not_valid_after_utc:
             raise AuthorityError(f"the Authority in {folder} has expired, or the clock is wrong")
         return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
 
     def enrol(
         self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME, may: Iterable[Right] = ()
     ) -> EnrolmentToken:
-        """Return a token for `name`, which works once, within `ttl`. See `enrol_all`."""
+        """Return a token for `name`, which can be used once, within `ttl`. See `enrol_all`."""
         return self.enrol_all([name], role, ttl, may)[name]
 
     def enrol_all(
@@ -164,11 +164,11 @@ class Authority:
         ttl: timedelta = TOKEN_LIFETIME,
         may: Iterable[Right] = (),
     ) -> dict[str, EnrolmentToken]:
-        """Return a token for each of `names`, or for none of them. Raises `InvalidNameError`.
+        """Return a token for each of `names`. Raises `InvalidNameError`, and then enrols none of them.
 
-        A name that is enrolled gets a new token as well; when that is redeemed, its certificates so far are revoked:
-        a name has one key. One that was revoked is readmitted then. The role, and the rights that it has from now on
-        (`may`, and no others), hold at once.
+        A name that is already enrolled gets a new token, too. When the token is redeemed, the name's previous
+        certificates are revoked, because a name has one key, and a revoked name is readmitted. The role and the rights
+        `may`, which replace previous rights, are valid at once.
         """
         rights = tuple(sorted(set(may)))
         names = list(names)
@@ -183,20 +183,20 @@ class Authority:
         return tokens
 
     def redeem(self, secret: bytes, request: bytes, origin: str = "") -> bytes:
-        """Return the certificate (PEM) that `request` (PKCS 10, PEM) asks for, against the secret of a token.
+        """Return the certificate (PEM) for `request` (PKCS 10, PEM) in exchange for the secret of a token.
 
         Args:
             secret: The token's secret.
             request: The request.
-            origin: Where the request came from, for the observer.
+            origin: The origin of the request, for the observer.
 
         Raises:
             NotGrantedError: when the secret is unknown, used or expired, or the request is not in the token's name.
         """
         what = "redeem a token"
-        with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
+        with self._reported_refusals(what, request, origin) as (name, holder), self._registry.change() as members:
             now = self.clock()
-            member, invitation = _invited(members, digest(secret), name, now)
+            member, invitation = _redeemable(members, digest(secret), name, now)
             certificate, issued = self._issue(holder, name)
             members[name] = EnrolledName(
                 name,
@@ -205,35 +205,35 @@ class Authority:
                 (issued,),
                 (*member.withdrawn, *member.certificates),
                 may=member.may,
-            ).since(now)
+            ).without_expired(now)
         self.report(Granted(t=now, who=name, what=what, origin=origin))
         return certificate
 
     def renew(self, request: bytes, current: Certificate, origin: str = "") -> bytes:
         """Return a new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
 
-        The caller has made sure, by TLS, that the request comes from the holder of the key of `current`. That
-        certificate stays in force until it expires. `origin` says where the request came from, for the observer.
+        The caller has verified by TLS that the request comes from the holder of the key of `current`. That certificate
+        stays in force until it expires. `origin` is the origin of the request, for the observer.
 
         Raises:
             NotGrantedError: when `current` is not in force, or the request is in another name.
         """
         what = "renew a certificate"
-        with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
+        with self._reported_refusals(what, request, origin) as (name, holder), self._registry.change() as members:
             now = self.clock()
             try:
-                proven = check_issued(current, self.certificate, moment(now))
+                proven = check_issued(current, self.certificate, utc_time(now))
             except CertificateError as error:
                 raise NotGrantedError(str(error)) from error
             if proven != name:
                 raise NotGrantedError("the request is in another name than the certificate")
             if name == MASTER:
-                raise NotGrantedError(f"{MASTER} is certified where the Authority is, not from afar")
+                raise NotGrantedError(f"the certificate of {MASTER} can only be renewed on the Authority's machine")
             if self.is_revoked(current.serial_number):
                 raise NotGrantedError("the certificate has been revoked")
-            member = members[name].since(now)
+            member = members[name].without_expired(now)
             if len(member.certificates) >= IN_FORCE_AT_MOST:
-                raise NotGrantedError(f"{IN_FORCE_AT_MOST} certificates of this name are in force, and no more may be")
+                raise NotGrantedError(f"{IN_FORCE_AT_MOST} certificates of this name are in force: no more are allowed")
             certificate, issued = self._issue(holder, name)
             members[name] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
         self.report(Granted(t=now, who=name, what=what, origin=origin))
@@ -242,14 +242,14 @@ class Authority:
     def master_identity(self, hosts: Sequence[str], folder: Path | None = None) -> Identity:
         """Return a new identity of the master, for servers that are reached at `hosts` (names or addresses).
 
-        It is written to `folder` (the Authority's own `master` if None) and needs no token: only who has the
-        Authority's key can make one. Raises `HostNameError`.
+        It is written to `folder` (`master` in the Authority's folder if None). No token is needed, because this
+        requires the Authority's key. Raises `HostNameError`.
         """
         key = new_key()
         with self._registry.change() as members:
             now = self.clock()
             content, issued = self._issue(key.public_key(), MASTER, hosts)
-            member = (members.get(MASTER) or EnrolledName(MASTER, Role.MASTER)).since(now)
+            member = (members.get(MASTER) or EnrolledName(MASTER, Role.MASTER)).without_expired(now)
             members[MASTER] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
             place = folder or self.folder / _MASTER
             save(place, key, read_certificate(content), self.certificate)
@@ -259,26 +259,25 @@ class Authority:
         """Revoke the certificates, the unused token and the rights of `name`.
 
         Raises:
-            UnknownNameError: when the name is not enrolled; the message lists names that are.
+            NotEnrolledError: when the name is not enrolled; the message lists names that are.
             InvalidNameError: for the master, as robots would not learn of it.
         """
         if name == MASTER:
             raise InvalidNameError(
-                f"{MASTER} cannot be revoked, for robots would not learn of it: make a new Authority"
+                f"{MASTER} cannot be revoked, because robots would not learn of it: create a new Authority"
             )
         with self._registry.change() as members:
             member = members.get(name)
             if member is None:
-                what = f"no '{on_one_line(shortened(name))}' is enrolled"
-                raise UnknownNameError(f"{what} ({describe_enrolled(name, members)})")
+                problem = f"no '{on_one_line(shortened(name))}' is enrolled"
+                raise NotEnrolledError(f"{problem} ({describe_enrolled(name, members)})")
             withdrawn = (*member.withdrawn, *member.certificates)
-            members[name] = EnrolledName(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
+            members[name] = EnrolledName(name, member.role, None, (), withdrawn, revoked=True).without_expired(
+                self.clock()
+            )
 
     def is_revoked(self, who: str | int) -> bool:
-        """Return whether the name or the certificate's serial number `who` is refused.
-
-        It is when it was revoked, and when this Authority does not know it: what is not granted is denied.
-        """
+        """Return whether the name or the certificate's serial number `who` is revoked or unknown."""
         members = self._registry.members()
         if isinstance(who, str):
             return who not in members or members[who].revoked
@@ -286,7 +285,7 @@ class Authority:
         return not any(one.serial == serial for member in members.values() for one in member.certificates)
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
-        """Return the names that have a certificate in force now, sorted. See `Admission.names`."""
+        """Return the names with a certificate in force now, sorted. See `Admission.names`."""
         now = self.clock()
         return tuple(
             member.name
@@ -294,7 +293,7 @@ class Authority:
             if not member.revoked
             and role in (None, member.role)
             and right in (None, *member.may)
-            and (member.since(now).certificates or (invited and member.never_certified))
+            and (member.without_expired(now).certificates or (invited and member.never_certified))
         )
 
     def members(self) -> tuple[EnrolledName, ...]:
@@ -309,14 +308,16 @@ class Authority:
         self, holder: ec.EllipticCurvePublicKey, name: str, hosts: Sequence[str] | None = None
     ) -> tuple[bytes, Issued]:
         now = self.clock()
-        times = (moment(now), moment(now + self.lifetime.total_seconds()))
+        times = (utc_time(now), utc_time(now + self.lifetime.total_seconds()))
         certificate = leaf_certificate((self.certificate, self._key), holder, name, hosts, times)
         issued = Issued(f"{certificate.serial_number:x}", certificate.not_valid_after_utc.timestamp())
         return pem(certificate), issued
 
     @contextmanager
-    def _answering(self, what: str, request: bytes, origin: str) -> Iterator[tuple[str, ec.EllipticCurvePublicKey]]:
-        """Yield the name and the key in `request`; a refusal within is reported."""
+    def _reported_refusals(
+        self, what: str, request: bytes, origin: str
+    ) -> Iterator[tuple[str, ec.EllipticCurvePublicKey]]:
+        """Yield the name and the key in `request`, and report a refusal in the block."""
         who = "unknown"
         try:
             try:
@@ -330,27 +331,29 @@ class Authority:
             raise
 
 
-def _invited(members: Mapping[str, EnrolledName], known: str, name: str, now: float) -> tuple[EnrolledName, Invitation]:
-    """Return the entry and the invitation of the token with the digest `known`, if it can be redeemed for `name` now.
+def _redeemable(
+    members: Mapping[str, EnrolledName], known: str, name: str, now: float
+) -> tuple[EnrolledName, Invitation]:
+    """Return the entry and the invitation of the token with the digest `known`.
 
-    Raises `NotGrantedError`.
+    Raises `NotGrantedError` if the token cannot be redeemed for `name` now.
     """
     for member in members.values():
         invitation = member.invitation
         if invitation is None or invitation.digest != known:
             continue
         if invitation.used:
-            raise NotGrantedError("the token has been used already")
+            raise NotGrantedError("the token has already been used")
         if now >= invitation.expires:
             raise NotGrantedError("the token has expired")
         if member.name != name:
             raise NotGrantedError("the token is not for this name")
         return member, invitation
-    raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
+    raise NotGrantedError("the token is unknown, or was replaced by a newer one")
 
 
 def default_authority_folder() -> Path:
     """Return the Authority's default folder, in the user's data folder."""
-    from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
+    from platformdirs import user_data_path  # noqa: PLC0415 - only needed without a given folder
 
     return user_data_path("robochoc") / "authority"

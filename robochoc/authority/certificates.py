@@ -1,9 +1,9 @@
-"""Keys and X.509 certificates (RFC 5280): how the Authority makes them, and how anybody checks them.
+"""Keys and X.509 certificates (RFC 5280): issued by the Authority, and checked by all participants.
 
-All keys are on P-256. The Authority's own certificate signs leaves only (pathlen 0). A robot's certificate is for
-clients: its common name is the robot's name, which zenoh's access control looks at, and it bears no host name, so
-that no robot can pose as the machine that others connect to. The master's is for servers as well, with `MASTER` and
-the hosts it listens on as subject alternative names, which rustls (zenoh's TLS) looks at.
+All keys are on P-256. The Authority's certificate signs leaves only (pathlen 0). A robot's certificate is for clients:
+its common name is the robot's name, which zenoh's access control uses, and it has no host name, so that no robot can
+impersonate a server. The master's certificate is for servers as well. Its subject alternative names, which rustls
+(zenoh's TLS) checks, are `MASTER` and the master's hosts.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.system.errors import RobochocError
 
 MASTER = "MASTER"
-"""The master's name. No robot may have it, in whatever capitals: host names know no capitals."""
+"""The master's name, forbidden for robots in any capitalization, because host names ignore it."""
 SKEW = timedelta(minutes=5)
 """The tolerated difference between the clocks of two machines."""
 CA_LIFETIME = timedelta(days=3650)
 LONGEST_NAME = 64
-"""Characters of a common name (RFC 5280, ub-common-name)."""
+"""The most characters of a common name (RFC 5280, ub-common-name)."""
 _DIGITAL_SIGNATURE = x509.KeyUsage(
     digital_signature=True,
     content_commitment=False,
@@ -54,15 +54,15 @@ _SIGNING_CERTIFICATES = x509.KeyUsage(
 
 
 class CertificateError(RobochocError, ValueError):
-    """A certificate, a request for one, or a key that is malformed, or not what it would have to be."""
+    """A certificate, a certificate request, or a key is malformed or unsuitable."""
 
 
 class HostNameError(RobochocError, ValueError):
-    """No certificate can name this host."""
+    """A certificate cannot contain this host."""
 
 
-def moment(t: float) -> datetime:
-    """Unix time as certificates have it: UTC, whole seconds."""
+def utc_time(t: float) -> datetime:
+    """Return a Unix time as in certificates: UTC, whole seconds."""
     return datetime.fromtimestamp(int(t), UTC)
 
 
@@ -72,26 +72,26 @@ def new_key() -> ec.EllipticCurvePrivateKey:
 
 
 def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
-    """`key` as PKCS 8, not encrypted: the file's permissions protect it."""
+    """Return `key` as PKCS 8, unencrypted: it is protected by the file's permissions."""
     pem, pkcs8 = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
     return key.private_bytes(pem, pkcs8, serialization.NoEncryption())
 
 
 def pem(certificate: x509.Certificate) -> bytes:
-    """`certificate` as text."""
+    """Return `certificate` as text."""
     return certificate.public_bytes(serialization.Encoding.PEM)
 
 
 def fingerprint(certificate: x509.Certificate) -> bytes:
-    """SHA-256 of `certificate`: 32 bytes."""
+    """Return the SHA-256 of `certificate`, 32 bytes."""
     return certificate.fingerprint(hashes.SHA256())
 
 
 def ca_certificate(key: ec.EllipticCurvePrivateKey, now: datetime) -> x509.Certificate:
-    """Return the Authority's own certificate, signed by itself."""
-    # The key's own identifier is a part of the name, so that no two Authorities are taken for each other.
+    """Return the Authority's self-signed certificate."""
+    # The key's identifier is a part of the name, so that Authorities have different names.
     own = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
-    name = _named(f"robochoc authority {own.digest.hex()[:16]}")
+    name = _subject(f"robochoc authority {own.digest.hex()[:16]}")
     return (
         _builder(name, name, key.public_key(), (now - SKEW, now + CA_LIFETIME))
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
@@ -108,9 +108,9 @@ def leaf_certificate(
     hosts: Sequence[str] | None,
     times: tuple[datetime, datetime],
 ) -> x509.Certificate:
-    """Return a certificate that says that `holder` is the key of `name`, within `times`. Raises `HostNameError`.
+    """Return a certificate for the key `holder` of `name`, valid within `times`. Raises `HostNameError`.
 
-    `hosts`: the names and addresses at which a server is to be believed; None: it is for a client only.
+    `hosts`: the names and addresses of a server; None for a client only.
     """
     issuer, key = ca
     usages = [ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -120,7 +120,7 @@ def leaf_certificate(
         usages.append(ExtendedKeyUsageOID.SERVER_AUTH)
         names = [x509.DNSName(name), *map(_host, hosts)]
     return (
-        _builder(_named(name), issuer.subject, holder, (times[0] - SKEW, min(times[1], issuer.not_valid_after_utc)))
+        _builder(_subject(name), issuer.subject, holder, (times[0] - SKEW, min(times[1], issuer.not_valid_after_utc)))
         .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
         .add_extension(_DIGITAL_SIGNATURE, critical=True)
         .add_extension(x509.ExtendedKeyUsage(usages), critical=False)
@@ -132,13 +132,13 @@ def leaf_certificate(
 
 
 def signing_request(key: ec.EllipticCurvePrivateKey, name: str) -> bytes:
-    """Return a request (PKCS 10) for a certificate that says that `key` is the key of `name`, as PEM."""
-    request = x509.CertificateSigningRequestBuilder().subject_name(_named(name)).sign(key, hashes.SHA256())
+    """Return a request (PKCS 10, PEM) for a certificate for `key` and `name`."""
+    request = x509.CertificateSigningRequestBuilder().subject_name(_subject(name)).sign(key, hashes.SHA256())
     return request.public_bytes(serialization.Encoding.PEM)
 
 
 def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
-    """Name and key of a request, whose maker has shown to hold the key. Raises `CertificateError`."""
+    """Return the name and the key of a request signed with this key. Raises `CertificateError`."""
     try:
         request = x509.load_pem_x509_csr(content)
         holder, genuine = request.public_key(), request.is_signature_valid
@@ -146,7 +146,7 @@ def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
     except (ValueError, TypeError, UnsupportedAlgorithm, x509.InvalidVersion) as error:
         raise CertificateError("the request for a certificate is malformed") from error
     if not genuine:
-        raise CertificateError("the request for a certificate is not signed by the key that it names")
+        raise CertificateError("the request for a certificate is not signed by its key")
     return name, _on_p256(holder)
 
 
@@ -178,11 +178,11 @@ def holder_of(certificate: x509.Certificate) -> ec.EllipticCurvePublicKey:
     try:
         return _on_p256(certificate.public_key())
     except (ValueError, UnsupportedAlgorithm) as error:
-        raise CertificateError("the certificate's key is of a kind that robochoc does not use") from error
+        raise CertificateError("the certificate's key has an unsupported type") from error
 
 
 def common_name(subject: x509.Name) -> str:
-    """Return the name in a subject that is nothing but a name. Raises `CertificateError`."""
+    """Return the name in a subject with a single common name. Raises `CertificateError`."""
     attributes = list(subject)
     if len(attributes) != 1 or attributes[0].oid != NameOID.COMMON_NAME or not isinstance(attributes[0].value, str):
         raise CertificateError("its subject is not one common name")
@@ -190,9 +190,9 @@ def common_name(subject: x509.Name) -> str:
 
 
 def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datetime) -> str:
-    """Return the name that `certificate` proves: `ca` has issued it, and it is valid `now`. Raises `CertificateError`.
+    """Check that `ca` has issued `certificate`, and that it is valid `now`; return its name. Raises `CertificateError`.
 
-    X.509 path validation as `cryptography` does it, for a client's certificate (the master's is one too).
+    X.509 path validation by `cryptography`, for a client's certificate (the master's is one, too).
     """
     try:
         name = common_name(certificate.subject)
@@ -206,12 +206,12 @@ def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datet
     try:
         PolicyBuilder().store(Store([ca])).time(now).build_client_verifier().verify(certificate, [])
     except VerificationError as error:
-        raise CertificateError("this Authority would not have issued such a certificate") from error
+        raise CertificateError("the certificate is not valid for a client of this Authority") from error
     return name
 
 
 def hosts_of(certificate: x509.Certificate) -> tuple[str, ...]:
-    """Return the host names and addresses of `certificate`, without the holder's own name."""
+    """Return the host names and addresses of `certificate`, without the holder's name."""
     try:
         names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except x509.ExtensionNotFound:
@@ -227,7 +227,7 @@ def _host(host: str) -> x509.DNSName | x509.IPAddress:
         address = ipaddress.ip_address(host)
     except ValueError:
         try:
-            # RFC 5280 has internationalised names in their ASCII form.
+            # RFC 5280 requires the ASCII form of internationalised names.
             name = host.encode("idna").decode("ascii")
         except ValueError:
             name = ""
@@ -245,7 +245,7 @@ def _on_p256(key: object) -> ec.EllipticCurvePublicKey:
     return key
 
 
-def _named(name: str) -> x509.Name:
+def _subject(name: str) -> x509.Name:
     return x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, name)])
 
 

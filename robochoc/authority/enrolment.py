@@ -1,8 +1,8 @@
-"""Enrolment as a robot does it: a token for a first certificate, a certificate for the next one.
+"""The robot's side of enrolment: the first certificate requires a token, each further one the previous certificate.
 
-A new robot trusts no one yet. It requests the Authority's certificate from the service, compares that with the
-fingerprint in its token, and hangs up. Only then, on a second connection which OpenSSL verifies against that very
-certificate, and whose other end has to be the master, does it show the token's secret.
+A new robot trusts no server yet. It requests the Authority's certificate from the service, compares it with the
+fingerprint in its token, and closes the connection. It sends the token's secret only on a second connection, after
+OpenSSL has verified by this certificate that the other end is the master.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from robochoc.authority.certificates import (
     check_issued,
     fingerprint,
     holder_of,
-    moment,
     new_key,
     pem,
     read_certificate,
     signing_request,
+    utc_time,
 )
 from robochoc.authority.frames import (
     Answer,
@@ -47,57 +47,57 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 PATIENCE_S = 30.0
-"""The longest time for a question, with its wait at the service, in seconds."""
+"""The longest time for a request, including its wait at the service, in seconds."""
 
 
 class EnrolmentError(RobochocError):
-    """There is no certificate; the message says why, and what to do."""
+    """No certificate was obtained. The message gives the reason and a hint."""
 
 
-class NobodyThereError(EnrolmentError):
-    """There is no service at that address (yet). Nothing was sent, so the same token can be tried again."""
+class NotReachableError(EnrolmentError):
+    """No service listens at that address (yet). Nothing was sent, so the same token can be used again."""
 
 
 class NotTrustedError(EnrolmentError):
-    """The server is not the one that the token, or the identity, comes from. Nothing secret was sent."""
+    """The server does not belong to the Authority of the token or identity. Nothing secret was sent."""
 
 
 def enrol(
     host: str, port: int, token: EnrolmentToken | str, folder: Path | str, name: str, patience_s: float = PATIENCE_S
 ) -> Identity:
-    """Make a key in `folder`, and have the Authority at `host` and `port` certify that it is the key of `name`.
+    """Create a key in `folder`, and have the Authority at `host` and `port` certify it as the key of `name`.
 
-    An identity in `folder` is replaced when the Authority has said yes. Raises `TokenError`, `NotTrustedError`,
-    `NobodyThereError`, `EnrolmentError` (refused), `OSError` (the folder).
+    An identity in `folder` is replaced after the certificate was granted. Raises `TokenError`, `NotTrustedError`,
+    `NotReachableError`, `EnrolmentError` (refused), `OSError` (the folder).
     """
     token = token if isinstance(token, EnrolmentToken) else EnrolmentToken.parse(token)
     folder = Path(folder)
     private_folder(folder)
     place = (host, port)
-    ca = _introduced(place, token, patience_s)
+    ca = _request_ca(place, token, patience_s)
     key = new_key()
     question = Redeem(token.secret, signing_request(key, name))
-    certificate = _certified(_ask(place, question, _believing(ca), patience_s), ca, key, name)
+    certificate = _checked_certificate(_ask(place, question, _tls_context(ca), patience_s), ca, key, name)
     save(folder, key, certificate, ca)
     return Identity.load(folder)
 
 
 def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE_S) -> Identity:
-    """Return the same identity with a new certificate, which is in its folder as well.
+    """Return the identity with a new certificate, which is also written to its folder.
 
-    The key stays: so one file is replaced, and no crash can part a key from its certificate. Raises `NotTrustedError`,
-    `EnrolmentError`.
+    The key does not change: only one file is replaced, so no crash can separate a key from its certificate. Raises
+    `NotTrustedError`, `EnrolmentError`.
     """
-    context = _believing(identity.ca)
+    context = _tls_context(identity.ca)
     context.load_cert_chain(identity.certificate_file, identity.key_file)
     answer = _ask((host, port), Renew(signing_request(identity.key, identity.name)), context, patience_s)
-    certificate = _certified(answer, identity.ca, identity.key, identity.name)
+    certificate = _checked_certificate(answer, identity.ca, identity.key, identity.name)
     write_atomically(identity.folder / CERTIFICATE, pem(certificate))
     return Identity.load(identity.folder)
 
 
-def _introduced(place: tuple[str, int], token: EnrolmentToken, patience_s: float) -> x509.Certificate:
-    """Return the certificate of the Authority of `token`, as the server at `place` shows it."""
+def _request_ca(place: tuple[str, int], token: EnrolmentToken, patience_s: float) -> x509.Certificate:
+    """Return the certificate of the Authority of `token` from the server at `place`."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.check_hostname = False
@@ -109,13 +109,13 @@ def _introduced(place: tuple[str, int], token: EnrolmentToken, patience_s: float
         ca = None
     if ca is None or not hmac.compare_digest(fingerprint(ca), token.fingerprint):
         raise NotTrustedError(
-            f"who answers at {_shown(place)} is not the Authority that the token is from: it is the address of "
-            "another one, or somebody is in between; the token was not shown"
+            f"the server at {_as_text(place)} does not belong to the Authority of the token: it is the address of "
+            "another one, or the connection is intercepted; the token was not sent"
         )
     return ca
 
 
-def _believing(ca: x509.Certificate) -> ssl.SSLContext:
+def _tls_context(ca: x509.Certificate) -> ssl.SSLContext:
     """Return a TLS context that accepts only the master certified by `ca`."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # verifies the certificate, and its name
     context.minimum_version = ssl.TLSVersion.TLSv1_3
@@ -129,7 +129,7 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
     try:
         raw = socket.create_connection(place, patience_s)
     except OSError as error:
-        raise NobodyThereError(_unanswered(place, error)) from error
+        raise NotReachableError(_no_answer_message(place, error)) from error
     try:
         with raw:
             Exchange(raw, patience_s).wait()
@@ -140,40 +140,42 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
                 return exchange.answer()
     except ssl.SSLCertVerificationError as error:
         raise NotTrustedError(
-            f"who answers at {_shown(place)} is not the master of this Authority ({error.verify_message}); "
+            f"the server at {_as_text(place)} is not the master of this Authority ({error.verify_message}); "
             "check the address, and the clocks of both machines"
         ) from error
     except ssl.SSLError as error:
         raise EnrolmentError(
-            f"the Authority at {_shown(place)} has ended the connection ({error.reason or error}); "
-            "is the certificate that was shown still good?"
+            f"the Authority at {_as_text(place)} has ended the connection ({error.reason or error}); "
+            "is the robot's certificate still valid?"
         ) from error
     except (OSError, FrameError) as error:
-        raise EnrolmentError(_unanswered(place, error)) from error
+        raise EnrolmentError(_no_answer_message(place, error)) from error
 
 
-def _unanswered(place: tuple[str, int], error: Exception) -> str:
+def _no_answer_message(place: tuple[str, int], error: Exception) -> str:
     why = error.strerror if isinstance(error, OSError) and error.strerror else error
-    return f"no answer from the Authority at {_shown(place)}: {why}; is 'robochoc master' running there?"
+    return f"no answer from the Authority at {_as_text(place)}: {why}; is 'robochoc master' running there?"
 
 
-def _certified(answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivateKey, name: str) -> x509.Certificate:
-    """Return the certificate in `answer`, if `ca` says there that `key` is the key of `name`."""
+def _checked_certificate(
+    answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivateKey, name: str
+) -> x509.Certificate:
+    """Return the certificate in `answer` after checking that `ca` has issued it for `name` and `key`."""
     match answer:
         case EnrolmentDenied():
             raise EnrolmentError(f"the Authority refuses: {on_one_line(answer.why)}")
         case Certified():
             try:
                 certificate = read_certificate(answer.certificate)
-                proven = check_issued(certificate, ca, moment(time.time()))
+                proven = check_issued(certificate, ca, utc_time(time.time()))
             except CertificateError as error:
                 raise EnrolmentError(f"the Authority issued an invalid certificate: {error}") from error
             if proven == name and holder_of(certificate) == key.public_key():
                 return certificate
             raise EnrolmentError("the Authority issued a certificate for another name or key")
         case _:
-            raise EnrolmentError("the Authority answered another question")
+            raise EnrolmentError("the Authority sent an answer of the wrong kind")
 
 
-def _shown(place: tuple[str, int]) -> str:
+def _as_text(place: tuple[str, int]) -> str:
     return f"{place[0]}:{place[1]}"

@@ -1,8 +1,8 @@
 """The enrolment service of the Authority on a TLS port, which the master runs.
 
-Everything goes over TLS 1.3 with the master's certificate. A robot that comes with a token has no certificate yet and
-need show none. Renewal goes by mutual TLS: the robot shows its certificate in the handshake, where OpenSSL checks
-chain, time, purpose and possession of the key, so that no signature format of our own is needed.
+All connections use TLS 1.3 with the master's certificate. A robot with a token has no certificate yet and needs none.
+Renewal uses mutual TLS: in the handshake, OpenSSL checks the robot's certificate (chain, time, purpose) and its
+possession of the key, so no additional signature format is needed.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ _BACKLOG = 256
 
 
 class EnrolmentServer:
-    """Serves `authority` at `host` and `port` (0: any that is free; see `address`) within its context.
+    """Serves `authority` at `host` and `port` (0: any free one; see `address`) within its context.
 
-    `identity` is the master's; when half of its life is over, the Authority makes a new one for the same hosts.
-    Refusals are reported to the Authority's observer, from the threads of this server, one at a time.
+    `identity` is the master's. After half of its validity, the Authority creates a new one for the same hosts. Refusals
+    are reported to the Authority's observer from the threads of this server, one at a time.
     """
 
     def __init__(
@@ -73,17 +73,17 @@ class EnrolmentServer:
 
     @property
     def address(self) -> tuple[str, int]:
-        """Host and port, once within the context."""
+        """The host and port; available within the context."""
         host, port = self._listener.getsockname()[:2]
         return host, port
 
     def __enter__(self) -> Self:
-        """Begin to listen. Raises `OSError`."""
+        """Start listening. Raises `OSError`."""
         family = socket.AF_INET6 if ":" in self._place[0] else socket.AF_INET
         self._listener = socket.create_server(self._place, family=family, backlog=_BACKLOG)
-        self._bell, self._door = socket.socketpair()
-        self._porter = threading.Thread(target=self._receive_visitors, name="robochoc enrolment", daemon=True)
-        self._porter.start()
+        self._wake_sender, self._wake_receiver = socket.socketpair()
+        self._acceptor = threading.Thread(target=self._accept_connections, name="robochoc enrolment", daemon=True)
+        self._acceptor.start()
         return self
 
     def __exit__(
@@ -95,20 +95,20 @@ class EnrolmentServer:
             for connection in self._open:
                 _hang_up(connection)
             threads = list(self._open.values())
-        self._bell.send(b"!")
-        for thread in (self._porter, *threads):
+        self._wake_sender.send(b"!")
+        for thread in (self._acceptor, *threads):
             thread.join()
-        for each in (self._listener, self._bell, self._door):
+        for each in (self._listener, self._wake_sender, self._wake_receiver):
             each.close()
 
-    def _receive_visitors(self) -> None:
+    def _accept_connections(self) -> None:
         with selectors.DefaultSelector() as selector:
             selector.register(self._listener, selectors.EVENT_READ)
-            selector.register(self._door, selectors.EVENT_READ)
+            selector.register(self._wake_receiver, selectors.EVENT_READ)
             while True:
                 self._free.acquire()
                 ready = {key.fileobj for key, _ in selector.select()}
-                if self._door in ready:
+                if self._wake_receiver in ready:
                     return
                 self._admit()
 
@@ -118,7 +118,7 @@ class EnrolmentServer:
             raw, peer = self._listener.accept()
             origin = f"{peer[0]}:{peer[1]}"
             try:
-                self._keep_fresh()
+                self._renew_identity()
                 connection = self._context.wrap_socket(raw, server_side=True, do_handshake_on_connect=False)
             except BaseException:
                 raw.close()
@@ -137,7 +137,7 @@ class EnrolmentServer:
             self._open[connection] = thread
             thread.start()
 
-    def _keep_fresh(self) -> None:
+    def _renew_identity(self) -> None:
         if self._identity.is_due(self._authority.clock()):
             self._identity = self._authority.master_identity(self._identity.hosts)
             self._context = _server_context(self._identity)
@@ -148,7 +148,7 @@ class EnrolmentServer:
                 exchange = Exchange(connection, self._patience_s)
                 exchange.wait()
                 connection.do_handshake()
-                exchange.send(self._answered(exchange, connection, origin))
+                exchange.send(self._answer_or_denial(exchange, connection, origin))
         except ssl.SSLError as error:
             why = error.verify_message if isinstance(error, ssl.SSLCertVerificationError) else error.reason
             self._refuse(origin, f"TLS failed: {why or error}")
@@ -157,20 +157,20 @@ class EnrolmentServer:
         except OSError as error:
             self._refuse(origin, f"the connection broke: {error.strerror or error}")
 
-    def _answered(self, exchange: Exchange, connection: ssl.SSLSocket, origin: str) -> Answer:
+    def _answer_or_denial(self, exchange: Exchange, connection: ssl.SSLSocket, origin: str) -> Answer:
         try:
             return self._answer(exchange.question(), connection.getpeercert(binary_form=True), origin)
-        except NotGrantedError as refusal:  # which the Authority has reported
+        except NotGrantedError as refusal:  # reported by the Authority
             return EnrolmentDenied(str(refusal))
         except FrameError as error:
             self._refuse(origin, str(error))
             return EnrolmentDenied(str(error))
         except AuthorityError as error:
             self._refuse(origin, str(error))
-            return EnrolmentDenied("the Authority cannot answer at the moment; ask whoever runs it")
+            return EnrolmentDenied("the Authority cannot answer now; ask its operator")
 
     def _answer(self, question: Question, shown: bytes | None, origin: str) -> Answer:
-        """Return the answer to a robot that has `shown` a certificate (DER) in the handshake, or none."""
+        """Return the answer to a robot that has `shown` a certificate (DER) or None in the handshake."""
         match question:
             case Introduce():
                 return Introduction(pem(self._authority.certificate))
@@ -178,7 +178,7 @@ class EnrolmentServer:
                 return Certified(self._authority.redeem(question.secret, question.request, origin))
             case Renew():
                 if shown is None:
-                    raise FrameError("a certificate is renewed over a connection that shows it")
+                    raise FrameError("the connection to renew a certificate must use this certificate")
                 current = x509.load_der_x509_certificate(shown)
                 return Certified(self._authority.renew(question.request, current, origin))
             case _:
@@ -195,7 +195,7 @@ class EnrolmentServer:
             self._free.release()
 
     def _refuse(self, origin: str, why: str) -> None:
-        """Report the error, unless it follows from our own closing of the connection."""
+        """Report the error, unless the server is closing."""
         with self._lock:
             if self._closing:
                 return
@@ -211,11 +211,11 @@ def _server_context(identity: Identity) -> ssl.SSLContext:
     context.load_cert_chain(identity.certificate_file, identity.key_file)
     context.load_verify_locations(cadata=pem(identity.ca).decode())
     context.verify_mode = ssl.CERT_OPTIONAL
-    context.num_tickets = 0  # a resumed session would show no certificate
+    context.num_tickets = 0  # a resumed session would contain no certificate
     return context
 
 
 def _hang_up(connection: socket.socket) -> None:
-    """End whatever waits for `connection`. Not by `SSLSocket.shutdown`, which would go on without TLS."""
+    """End all waits for `connection`. `SSLSocket.shutdown` is not used, because it would continue without TLS."""
     with suppress(OSError):
         socket.socket.shutdown(connection, socket.SHUT_RDWR)

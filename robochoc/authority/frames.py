@@ -1,7 +1,7 @@
 """The messages between robots and the enrolment service: one question, one answer, each a length and msgpack.
 
-The length is 4 bytes, most significant first. Whatever comes is read within a deadline and a size, and decoded into
-one of these structs or refused.
+The length is 4 bytes, most significant first. Input is read up to a deadline and a size, and decoded into one of these
+structs or rejected.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 from robochoc.system.errors import RobochocError
 
 LARGEST_BYTES = 16384
-"""A request for a certificate has about 350 bytes, a certificate 800."""
+"""The largest frame. A request for a certificate has about 350 bytes, a certificate 800."""
 _LENGTH_BYTES = 4
 
 
@@ -27,18 +27,18 @@ class _Frame(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True):
 
 
 class Introduce(_Frame, frozen=True):
-    """Asks for the certificate of the server's Authority."""
+    """Requests the certificate of the server's Authority."""
 
 
 class Redeem(_Frame, frozen=True):
-    """A certificate for `request` (PKCS 10, PEM), against the secret of a token."""
+    """Requests a certificate for `request` (PKCS 10, PEM) in exchange for the secret of a token."""
 
     secret: bytes
     request: bytes
 
 
 class Renew(_Frame, frozen=True):
-    """A new certificate for `request` (PKCS 10, PEM), by right of the one that this connection was made with."""
+    """Requests a new certificate for `request` (PKCS 10, PEM), authorized by the certificate of this connection."""
 
     request: bytes
 
@@ -50,13 +50,13 @@ class Introduction(_Frame, frozen=True):
 
 
 class Certified(_Frame, frozen=True):
-    """The certificate (PEM) that was asked for."""
+    """The requested certificate (PEM)."""
 
     certificate: bytes
 
 
 class EnrolmentDenied(_Frame, frozen=True, tag="Denied"):
-    """There is none, and why."""
+    """A refusal with its reason."""
 
     why: str
 
@@ -86,14 +86,14 @@ def decode_answer(content: bytes) -> Answer:
 
 
 class Exchange:
-    """Frames on a connected socket, all of them within `seconds` from now, however slowly their bytes come."""
+    """Frames on a connected socket, all within `seconds` from now, even if their bytes arrive slowly."""
 
     def __init__(self, connection: socket.socket, seconds: float) -> None:
         self._connection = connection
         self._deadline = time.monotonic() + seconds
 
     def wait(self) -> None:
-        """Let the socket's next operation take as long as is left. Raises `TimeoutError` when nothing is."""
+        """Limit the socket's next operation to the remaining time. Raises `TimeoutError` if none remains."""
         left = self._deadline - time.monotonic()
         if left <= 0:
             raise TimeoutError("it took too long")
@@ -116,7 +116,7 @@ class Exchange:
     def _receive(self) -> bytes:
         length = int.from_bytes(self._exactly(_LENGTH_BYTES), "big")
         if length > LARGEST_BYTES:
-            raise FrameError(f"{length} bytes were announced, and {LARGEST_BYTES} are allowed")
+            raise FrameError(f"{length} bytes were announced, but at most {LARGEST_BYTES} are allowed")
         return self._exactly(length)
 
     def _exactly(self, size: int) -> bytes:
@@ -125,6 +125,6 @@ class Exchange:
             self.wait()
             part = self._connection.recv(size - len(content))
             if not part:
-                raise FrameError("the other side has hung up in the middle")
+                raise FrameError("the other side has closed the connection within a frame")
             content += part
         return bytes(content)

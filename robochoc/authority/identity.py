@@ -1,7 +1,7 @@
 """An identity: the proof of a machine's name, as a folder of three files.
 
-`key.pem` is made on the machine itself and never leaves it; `cert.pem` names its holder; `ca.pem` is the certificate of
-the Authority that issued it, and the only one that this machine accepts.
+`key.pem` is created on the machine and never leaves it; `cert.pem` contains the holder's name; `ca.pem` is the
+certificate of the issuing Authority, the only one that this machine accepts.
 """
 
 from __future__ import annotations
@@ -22,10 +22,10 @@ from robochoc.authority.certificates import (
     holder_of,
     hosts_of,
     key_pem,
-    moment,
     pem,
     read_certificate,
     read_key,
+    utc_time,
 )
 from robochoc.authority.registry import PRIVATE
 from robochoc.system.errors import RobochocError
@@ -37,7 +37,7 @@ _LARGEST_BYTES = 65536
 
 
 class IdentityError(RobochocError):
-    """A folder that holds no identity, or one that cannot be used; the message says what to do."""
+    """The folder has no identity, or an unusable one. The message suggests a solution."""
 
 
 class IdentityTexts(NamedTuple):
@@ -50,7 +50,7 @@ class IdentityTexts(NamedTuple):
 
 @dataclass(frozen=True, repr=False)
 class Identity:
-    """A private key, the certificate that names its holder, and the Authority's. `load` has checked them."""
+    """A private key, its certificate, and the Authority's certificate, checked by `load`."""
 
     folder: Path
     name: str
@@ -62,14 +62,14 @@ class Identity:
     def load(cls, folder: Path | str, now: float | None = None) -> Identity:
         """Return the identity in `folder`. `now`: Unix time, if not the clock's.
 
-        Raises `IdentityError` when something is missing or malformed, others may read the key, the key is not the
-        certificate's, or the certificate is not the Authority's or not valid now.
+        Raises `IdentityError` if a file is missing or malformed, if others may read the key, if the key does not belong
+        to the certificate, or if the certificate was not issued by the Authority or is not valid now.
         """
         folder = Path(folder)
         try:
             key = read_key(_secret(folder / KEY))
             certificate, ca = read_certificate(_read(folder / CERTIFICATE)), read_certificate(_read(folder / CA))
-            name = check_issued(certificate, ca, moment(time.time() if now is None else now))
+            name = check_issued(certificate, ca, utc_time(time.time() if now is None else now))
             if holder_of(certificate) != key.public_key():
                 raise IdentityError(f"{folder}: {KEY} is not the key of {CERTIFICATE}; enrol again, with a new token")
         except CertificateError as error:
@@ -77,14 +77,14 @@ class Identity:
         return cls(folder, name, key, certificate, ca)
 
     @classmethod
-    def of(cls, texts: IdentityTexts) -> Identity:
-        """Return the identity that `texts` was made of, in this same program."""
+    def from_texts(cls, texts: IdentityTexts) -> Identity:
+        """Return the identity of `texts`, which are trusted, as they come from this program."""
         key, certificate, ca = read_key(texts.key), read_certificate(texts.certificate), read_certificate(texts.ca)
         return cls(Path(), common_name(certificate.subject), key, certificate, ca)
 
     @property
     def texts(self) -> IdentityTexts:
-        """Return the whole identity as PEM: for zenoh, and for processes that this one starts."""
+        """The identity as PEM texts, for zenoh and for child processes."""
         return IdentityTexts(key_pem(self.key), pem(self.certificate), pem(self.ca))
 
     @property
@@ -104,17 +104,17 @@ class Identity:
 
     @property
     def expires(self) -> datetime:
-        """Until when the certificate is valid."""
+        """The expiry of the certificate."""
         return self.certificate.not_valid_after_utc
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """The host names and addresses that the certificate names (the master's)."""
+        """The host names and addresses in the certificate; only the master's has any."""
         return hosts_of(self.certificate)
 
     def is_due(self, now: float | None = None) -> bool:
-        """Return whether more than half of the certificate's life is over at Unix time `now`: time to renew it."""
-        left = self.expires - moment(time.time() if now is None else now)
+        """Return whether the certificate should be renewed: more than half of its validity has passed at `now`."""
+        left = self.expires - utc_time(time.time() if now is None else now)
         return left < (self.expires - self.certificate.not_valid_before_utc) / 2
 
     def __repr__(self) -> str:
@@ -132,22 +132,22 @@ def save(folder: Path, key: ec.EllipticCurvePrivateKey, certificate: Certificate
 
 
 def private_folder(folder: Path) -> None:
-    """Create `folder` with access for its owner only. An existing empty one is restricted likewise.
+    """Create `folder` with access for its owner only. An existing empty folder is restricted as well.
 
-    Raises `OSError`, also for a folder with something in it that is open to others: it serves another purpose.
+    Raises `OSError`, also for a folder with content that others can access, as it has another purpose.
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     mode = folder.stat().st_mode
     if not mode & _OTHERS:
         return
     if any(folder.iterdir()):
-        raise PermissionError(f"{folder} is open to others (mode {mode & 0o777:o}); give keys a folder of their own")
+        raise PermissionError(f"{folder} is open to others (mode {mode & 0o777:o}); use a separate folder for keys")
     folder.chmod(0o700)
 
 
 def default_identity_folder(name: str) -> Path:
-    """Return the folder where the identity of `name` is kept by default: in the user's data folder."""
-    from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
+    """Return the default folder for the identity of `name`, in the user's data folder."""
+    from platformdirs import user_data_path  # noqa: PLC0415 - only needed without a given folder
 
     return user_data_path("robochoc") / "identities" / name
 
@@ -165,7 +165,7 @@ def _read(path: Path) -> bytes:
         with path.open("rb") as file:
             content = file.read(_LARGEST_BYTES + 1)
     except FileNotFoundError:
-        raise IdentityError(f"{path} is missing: there is no identity here yet, enrol with a token") from None
+        raise IdentityError(f"{path} is missing: there is no identity yet, enrol with a token") from None
     except OSError as error:
         raise IdentityError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) > _LARGEST_BYTES:

@@ -1,9 +1,9 @@
 """Key cards and key rings, by which robots authenticate each other's messages end to end.
 
-For each run a robot makes two fresh key pairs, which never leave its memory: Ed25519 (RFC 8032) to sign with, X25519
-(RFC 7748) to agree on secrets. It signs their public halves with the key of its certificate: its card. Everyone with
-the Authority's certificate can check a card, regardless of its path. After the run the private halves are gone, so
-that recorded messages cannot be decrypted later, not even with the key of a certificate.
+For each run, a robot creates two new key pairs, which never leave its memory: Ed25519 (RFC 8032) to sign, X25519
+(RFC 7748) to agree on secrets. Its card contains the public keys, signed with the key of its certificate. Everyone with
+the Authority's certificate can check a card, however it was transferred. After the run the private keys are deleted, so
+recorded messages cannot be decrypted later, not even with the key of a certificate.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey,
 from cryptography.hazmat.primitives.asymmetric.x25519 import X25519PrivateKey, X25519PublicKey
 from cryptography.hazmat.primitives.kdf.hkdf import HKDF
 
-from robochoc.authority.certificates import CertificateError, check_issued, holder_of, moment, pem, read_certificate
+from robochoc.authority.certificates import CertificateError, check_issued, holder_of, pem, read_certificate, utc_time
 from robochoc.authority.identity import Identity
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.system.errors import RobochocError
@@ -31,11 +31,11 @@ _SECRET_BYTES = 32
 
 
 class KeyCardError(RobochocError, ValueError):
-    """A key card that does not prove what it says."""
+    """The key card is not valid."""
 
 
 class UnknownPeerError(RobochocError, LookupError):
-    """No card of this robot was admitted."""
+    """No card of the robot was admitted."""
 
 
 class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -57,7 +57,7 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def decode(cls, content: bytes) -> Self:
-        """Return the card in `content`, not checked yet: `KeyRing.admit` does that. Raises `KeyCardError`."""
+        """Return the card in `content`, which is checked later by `KeyRing.admit`. Raises `KeyCardError`."""
         if len(content) > _LARGEST_CARD_BYTES:
             raise KeyCardError(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
         try:
@@ -66,15 +66,15 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise KeyCardError(f"not a valid key card: {error}") from error
 
     def signed_part(self) -> bytes:
-        """Return the bytes that the signature is over."""
+        """Return the signed bytes of the card."""
         return bound(b"robochoc key card 1", self.name.encode(), self.run.encode(), self.signing, self.sealing)
 
 
 class KeyRing:
-    """The robot `own`'s keys for `run`, and the cards of its peers.
+    """The keys of the robot `own` for `run`, and the cards of its peers.
 
-    It belongs to one process: a copy would repeat numbers that must be unique. So it cannot be copied, and
-    refuses to serve in a forked child.
+    It belongs to one process: a copy would repeat numbers that must be unique. So it cannot be copied, or used in a
+    forked child.
     """
 
     def __init__(self, own: Identity, run: str) -> None:
@@ -92,34 +92,34 @@ class KeyRing:
         self.card = msgspec.structs.replace(unsigned, signature=signature)
 
     def admit(self, card: KeyCard, now: float) -> None:
-        """Accept `card` at the Unix time `now`. It replaces an older one of that robot.
+        """Accept `card` at the Unix time `now`. It replaces an older card of that robot.
 
-        Raises `KeyCardError`: when the Authority has not issued its certificate, or that is not valid now or names
-        somebody else, the signature is wrong, or the card is from another run.
+        Raises `KeyCardError` if its certificate was not issued by the Authority, is not valid now or has another name,
+        if the signature is wrong, or if the card is from another run.
         """
         who = on_one_line(shortened(card.name))
         try:
             certificate = read_certificate(card.certificate)
-            proven = check_issued(certificate, self._ca, moment(now))
+            proven = check_issued(certificate, self._ca, utc_time(now))
             holder_of(certificate).verify(card.signature, card.signed_part(), ec.ECDSA(hashes.SHA256()))
         except CertificateError as error:
             raise KeyCardError(f"the key card of {who}: {error}") from error
         except (InvalidSignature, UnicodeEncodeError) as error:
             raise KeyCardError(f"the key card of {who} is not signed with the key of its certificate") from error
         if proven != card.name:
-            raise KeyCardError(f"the key card of {who} comes with the certificate of {on_one_line(shortened(proven))}")
+            raise KeyCardError(f"the key card of {who} has the certificate of {on_one_line(shortened(proven))}")
         if card.run != self.run:
             raise KeyCardError(f"the key card of {who} is from another run")
         if {len(card.signing), len(card.sealing)} != {_PUBLIC_BYTES}:
             raise KeyCardError(f"the keys on the card of {who} do not have {_PUBLIC_BYTES} bytes")
         try:
             self._sealing.exchange(X25519PublicKey.from_public_bytes(card.sealing))
-        except ValueError as error:  # a point of small order: whatever is agreed on, everybody knows it
-            raise KeyCardError(f"the sealing key on the card of {who} is not a key") from error
+        except ValueError as error:  # a point of small order: the agreed secret would be public
+            raise KeyCardError(f"the sealing key on the card of {who} is not a valid key") from error
         self._peers[card.name] = card
 
     def dismiss(self, name: str) -> None:
-        """Accept no card of `name` any more: its robot was revoked, or has left."""
+        """Remove the card of `name`: its robot was revoked, or has left."""
         self._peers.pop(name, None)
 
     def card_of(self, name: str) -> KeyCard:
@@ -143,10 +143,10 @@ class KeyRing:
         return True
 
     def shared_secret(self, sender: str, receiver: str, purpose: bytes) -> bytes:
-        """Return 32 bytes that only `sender` and `receiver` can know, one of which is this robot; the same for both.
+        """Return the 32 secret bytes shared by `sender` and `receiver`, one of which is this robot.
 
-        X25519, then HKDF with SHA-256 (RFC 5869) over all that the two have agreed on: run, names, public keys and
-        `purpose`. The way back has another secret. Raises `UnknownPeerError`.
+        X25519, then HKDF with SHA-256 (RFC 5869) over the run, names, public keys and `purpose`. The opposite direction
+        has another secret. Raises `UnknownPeerError`.
         """
         peer = self.card_of(receiver if sender == self.name else sender)
         cards = (self.card, peer) if sender == self.name else (peer, self.card)
@@ -157,18 +157,18 @@ class KeyRing:
         return HKDF(hashes.SHA256(), _SECRET_BYTES, salt=None, info=agreed).derive(secret)
 
     def next_number(self) -> int:
-        """Return a number that this key ring has not given before, for nonces.
+        """Return a new number of this key ring, for nonces.
 
-        Raises `RuntimeError` in a forked child, whose numbers its parent gives as well.
+        Raises `RuntimeError` in a forked child, where numbers would be repeated.
         """
         if os.getpid() != self._process:
-            raise RuntimeError("a key ring serves the process that made it: make one in the child")
+            raise RuntimeError("a key ring can only be used in the process that created it: create one in the child")
         return next(self._numbers)
 
     def __reduce_ex__(self, _protocol: SupportsIndex) -> NoReturn:
-        raise TypeError("a key ring cannot be copied: numbers would be given twice")
+        raise TypeError("a key ring cannot be copied: its numbers would be repeated")
 
 
 def bound(*parts: bytes) -> bytes:
-    """Return an injective encoding of `parts`: two different lists never give the same string."""
+    """Return an injective encoding of `parts`: different lists never have the same encoding."""
     return b"".join(len(part).to_bytes(8, "big") + part for part in parts)

@@ -1,4 +1,4 @@
-"""Names that the Authority enrols: the allowed and the known ones."""
+"""Checks of the names of members, and descriptions of the enrolled names."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ _MOST_NAMED = 10
 
 
 class InvalidNameError(RobochocError, ValueError):
-    """A name that no robot can have, or that is reserved."""
+    """The name is invalid or reserved."""
 
 
-class UnknownNameError(RobochocError, LookupError):
-    """A name that is not enrolled."""
+class NotEnrolledError(RobochocError, LookupError):
+    """The name is not enrolled."""
 
 
 def describe_enrolled(name: str, members: Collection[str]) -> str:
-    """Return in words which names are enrolled, and which of them may have been meant instead of `name`."""
+    """Return a list of the enrolled names as text, with the most similar one to `name`."""
     known = sorted(known for known in members if known != MASTER)
     if not known:
-        return "nobody is; next: robochoc authority enrol NAME"
+        return "there are no enrolled names; run: robochoc authority enrol NAME"
     hint = suggestion(name, known, "names")
     near = f"{hint} " if hint.startswith("did") else ""
     more = len(known) - _MOST_NAMED
@@ -43,5 +43,5 @@ def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
         raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
     if name.upper() == MASTER or role == Role.MASTER:
         raise InvalidNameError(
-            f"the name {MASTER} is the master's own, which needs no token; choose another name, or role"
+            f"the name {MASTER} is reserved for the master, which needs no token; choose another name or role"
         )

@@ -1,8 +1,8 @@
-"""The Authority's registry: enrolled names and their certificates. One JSON file, safe between processes.
+"""The Authority's registry: enrolled names and their certificates, in a JSON file that processes can share.
 
-A change reads the file, and replaces it, while it holds the lock (flock(2)) of a file beside it: `robochoc authority
-enrol` and a running master do not lose each other's changes. Readers take no lock: they see the old file or the new
-one, and what they have read is kept until the file is another.
+A change reads and replaces the file while it holds the lock (flock(2)) of another file in the folder: `robochoc
+authority enrol` and a running master do not lose each other's changes. Readers need no lock: they see the old file or
+the new one, and cache its content until the file changes.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ _FILE, _LOCK = "registry.json", "lock"
 
 
 class AuthorityError(RobochocError):
-    """The Authority's folder is not there, or what is in it cannot be used."""
+    """The Authority's folder is missing, or its content is unusable."""
 
 
 class Role(StrEnum):
-    """The role in which a name takes part."""
+    """The role of a name."""
 
     ROBOT = "robot"
     OBSERVER = "observer"
@@ -37,22 +37,22 @@ class Role(StrEnum):
 
 
 class Right(StrEnum):
-    """A right besides taking part in the role. It has to be given."""
+    """A right besides those of the role. It must be granted."""
 
-    SNIFF = "sniff"  # follow runs: have the master's journal, with what robots say to each other
+    SNIFF = "sniff"  # follow runs: receive the master's journal with the robots' messages
 
 
 class EnrolmentState(StrEnum):
     """The state of an enrolment."""
 
-    INVITED = "invited"  # it has a token that works
+    INVITED = "invited"  # it has a valid token
     IN_FORCE = "in force"
-    EXPIRED = "expired"  # its last certificate, or its token unused
+    EXPIRED = "expired"  # its last certificate or its unused token has expired
     REVOKED = "revoked"
 
 
 class Invitation(msgspec.Struct, frozen=True):
-    """The token of a name: the digest of its secret, and until when (Unix time) it works."""
+    """The token of a name: the digest of its secret, and its expiry (Unix time)."""
 
     digest: str
     expires: float
@@ -60,14 +60,14 @@ class Invitation(msgspec.Struct, frozen=True):
 
 
 class Issued(msgspec.Struct, frozen=True):
-    """A certificate that was given: its serial number (hexadecimal), and when (Unix time) it expires."""
+    """An issued certificate: its serial number (hexadecimal), and its expiry (Unix time)."""
 
     serial: str
     expires: float
 
 
 class EnrolledName(msgspec.Struct, frozen=True):
-    """The Authority's record of one name. Expired certificates are forgotten."""
+    """The Authority's record of a name. Expired certificates are removed."""
 
     name: str
     role: Role
@@ -91,25 +91,25 @@ class EnrolledName(msgspec.Struct, frozen=True):
 
     @property
     def never_certified(self) -> bool:
-        """Return whether no certificate in this name can exist."""
+        """Whether no certificate of this name can exist."""
         return not self.certificates and not self.withdrawn
 
     def expires(self, now: float) -> float:
-        """Return when (Unix time) its token, if it is invited, or its last certificate expires; 0 if it has neither."""
+        """Return the expiry (Unix time) of its token if it is invited, else of its last certificate; 0 if none."""
         token = self.invitation.expires if self.invitation and not self.invitation.used else 0
         if self.state(now) == EnrolmentState.INVITED:
             return token
         return max((one.expires for one in self.certificates), default=token)
 
-    def since(self, now: float) -> EnrolledName:
-        """Return the same, without the certificates that have expired."""
+    def without_expired(self, now: float) -> EnrolledName:
+        """Return the record without expired certificates."""
         certificates = tuple(one for one in self.certificates if now < one.expires)
         withdrawn = tuple(one for one in self.withdrawn if now < one.expires)
         return msgspec.structs.replace(self, certificates=certificates, withdrawn=withdrawn)
 
 
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The file."""
+    """The content of the file."""
 
     members: dict[str, EnrolledName]
     version: Literal[1] = 1
@@ -123,7 +123,7 @@ class Registry:
         self._known: tuple[tuple[int, ...], dict[str, EnrolledName]] = ((), {})
 
     def members(self) -> Mapping[str, EnrolledName]:
-        """Return all names, as they stand now. Raises `AuthorityError`."""
+        """Return the present records of all names. Raises `AuthorityError`."""
         path = self._folder / _FILE
         try:
             status = path.stat()
@@ -131,7 +131,7 @@ class Registry:
             known = self._known
             if known[0] != seen:
                 known = (seen, msgspec.json.decode(path.read_bytes(), type=_Content).members)
-                # What was read may be newer than `seen`; then the next call reads it again.
+                # The content may be newer than `seen`; then the next call reads it again.
                 self._known = known
         except FileNotFoundError:
             return {}
@@ -143,10 +143,7 @@ class Registry:
 
     @contextmanager
     def change(self) -> Iterator[dict[str, EnrolledName]]:
-        """Yield the entries for an exclusive change.
-
-        They are written at the end, unless that raises.
-        """
+        """Yield the records for an exclusive change, which is written after the block unless it raises."""
         with locked(self._folder):
             members = dict(self.members())
             before = dict(members)
@@ -158,7 +155,7 @@ class Registry:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Exclude all other processes and threads from `folder` for the duration."""
+    """Exclude all other processes and threads from `folder` during the block."""
     descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)

@@ -1,8 +1,8 @@
-"""Tokens: a person carries one from the Authority to a new robot, so that each can recognise the other.
+"""Tokens: a person carries one from the Authority to a new robot, so that they can authenticate each other.
 
-A token holds a secret, which the robot shows once, and the fingerprint of the Authority's certificate, by which the
-robot recognises the Authority before it has any certificate. Its text is base32 in lower case (RFC 4648): it
-survives being read aloud, and no letter is taken for a digit.
+A token contains a secret, which the robot uses once, and the fingerprint of the Authority's certificate, by which the
+robot recognises the Authority before it has a certificate. Its text is base32 in lower case (RFC 4648), which can be
+read aloud, and in which no letter resembles a digit.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class TokenError(RobochocError, ValueError):
 
 @dataclass(frozen=True, repr=False)
 class EnrolmentToken:
-    """A secret that works once, and the SHA-256 fingerprint of the certificate of the Authority that knows it."""
+    """A secret for one use, and the SHA-256 fingerprint of the Authority's certificate."""
 
     secret: bytes
     fingerprint: bytes
@@ -37,26 +37,26 @@ class EnrolmentToken:
 
     @classmethod
     def parse(cls, text: str) -> EnrolmentToken:
-        """Return the token in `text`; surrounding blanks and the case of letters are ignored. Raises `TokenError`."""
+        """Parse a token, ignoring surrounding blanks and the case of letters. Raises `TokenError`."""
         secret, dot, fingerprint = text.strip().partition(".")
         try:
             token = cls(_decoded(secret), _decoded(fingerprint))
         except (ValueError, binascii.Error):
             token = cls(b"", b"")
         if not dot or (len(token.secret), len(token.fingerprint)) != (SECRET_BYTES, FINGERPRINT_BYTES):
-            raise TokenError("this is not a complete token: copy everything that 'robochoc authority enrol' printed")
+            raise TokenError("the token is incomplete: copy the whole output of 'robochoc authority enrol'")
         return token
 
     def __str__(self) -> str:
         return f"{_encoded(self.secret)}.{_encoded(self.fingerprint)}"
 
     def __repr__(self) -> str:
-        """Without the secret: a token may stand in a traceback or a log."""
+        """Return a text without the secret: a token may appear in a traceback or a log."""
         return f"<Token of the Authority {self.fingerprint.hex()[:16]}>"
 
 
 def digest(secret: bytes) -> str:
-    """Return the digest of a secret that the Authority keeps. Nothing can be redeemed with it."""
+    """Return the digest of a secret, which the Authority stores. The digest cannot be redeemed."""
     return hashlib.sha256(b"robochoc token\0" + secret).hexdigest()
 
 

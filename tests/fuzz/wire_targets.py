@@ -15,12 +15,12 @@ from robochoc.authority.certificates import (
     holder_of,
     hosts_of,
     leaf_certificate,
-    moment,
     new_key,
     pem,
     read_certificate,
     read_request,
     signing_request,
+    utc_time,
 )
 from robochoc.authority.frames import (
     Certified,
@@ -319,9 +319,11 @@ def check_act(content: bytes) -> bool:
 
 @cache
 def _authority() -> tuple[bytes, bytes, bytes]:
-    key, own, now = new_key(), new_key(), moment(LATEST)
+    key, own, now = new_key(), new_key(), utc_time(LATEST)
     ca = ca_certificate(key, now)
-    leaf = leaf_certificate((ca, key), own.public_key(), "R1", ["localhost", "10.0.0.1"], (now, moment(LATEST + 3600)))
+    leaf = leaf_certificate(
+        (ca, key), own.public_key(), "R1", ["localhost", "10.0.0.1"], (now, utc_time(LATEST + 3600))
+    )
     return pem(ca), pem(leaf), signing_request(own, "R1")
 
 
@@ -363,7 +365,7 @@ def check_question(content: bytes) -> bool:
 
 def _look_at(content: bytes) -> None:
     certificate = read_certificate(content)
-    check_issued(certificate, read_certificate(_authority()[0]), moment(LATEST))
+    check_issued(certificate, read_certificate(_authority()[0]), utc_time(LATEST))
     hosts_of(certificate)
     holder_of(certificate)
 

@@ -39,10 +39,10 @@ def test_tokens_that_do_not_work(site: Deployment) -> None:
     assert "expired" in refused(site.folder / "other" / "Late.xml", expired)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
     master.wait_to_say("RA has registered")
-    assert "used already" in refused(files / "RA.xml", tokens["RA"], "--identity", site.folder / "second")
+    assert "already been used" in refused(files / "RA.xml", tokens["RA"], "--identity", site.folder / "second")
     with Deployment(site.folder / "elsewhere") as elsewhere:
         foreign = elsewhere.enrol("RB")["RB"]
-    assert "not the Authority that the token is from" in refused(files / "RB.xml", foreign)
+    assert "does not belong to the Authority of the token" in refused(files / "RB.xml", foreign)
     second = site.robot(files / "RB.xml", "--token", tokens["RB"])
     assert master.status() == 0, master.errors
     ended({"RA": first, "RB": second})

@@ -14,7 +14,7 @@ import msgspec
 import pytest
 
 from robochoc.authority.admission import InMemoryAuthority
-from robochoc.authority.certificates import leaf_certificate, moment, new_key
+from robochoc.authority.certificates import leaf_certificate, new_key, utc_time
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Conclusion
 from robochoc.communication.network.access import frame_key
@@ -97,7 +97,7 @@ def test_a_certificate_that_has_expired(run: NetworkRun) -> None:
 
 def out_of_date(household: InMemoryAuthority, name: str) -> Identity:
     key, now = new_key(), time.time()
-    times = (moment(now - 2 * A_DAY_S), moment(now - A_DAY_S))
+    times = (utc_time(now - 2 * A_DAY_S), utc_time(now - A_DAY_S))
     issuer = (household._certificate, household._key)  # noqa: SLF001
     identity = household.identity(name)
     return replace(identity, key=key, certificate=leaf_certificate(issuer, key.public_key(), name, None, times))

@@ -53,7 +53,8 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.journal_server import question
 
 texts, endpoint, run = json.loads(sys.stdin.readline())
-transport = Transport(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=(), lease_ms=3_600_000)
+identity = Identity.from_texts(IdentityTexts(*map(str.encode, texts)))
+transport = Transport(endpoint, identity, watch=(), lease_ms=3_600_000)
 while not transport.ask(journal_key("Eye"), question(run, 0), 1):
     time.sleep(0.1)
 waited_for = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME}

@@ -10,12 +10,12 @@ import pytest
 from robochoc.authority.certificates import (
     CertificateError,
     ca_certificate,
-    moment,
     new_key,
     pem,
     read_certificate,
     read_request,
     signing_request,
+    utc_time,
 )
 from robochoc.formats.result import ResultError, read_result
 from robochoc.ros.message_types import types_of
@@ -86,7 +86,7 @@ def of_version(pem_text: bytes, mark: bytes, version: int) -> bytes:
 def test_requests_and_certificates_of_other_versions_are_malformed() -> None:
     """`cryptography` says so by an exception that is no `ValueError`."""
     key = new_key()
-    request, certificate = signing_request(key, "R1"), pem(ca_certificate(key, moment(1_800_000_000.0)))
+    request, certificate = signing_request(key, "R1"), pem(ca_certificate(key, utc_time(1_800_000_000.0)))
     version = b"\x02\x01\x00"
     assert read_request(of_version(request, version, 0))[0] == "R1"
     with pytest.raises(CertificateError, match="malformed"):

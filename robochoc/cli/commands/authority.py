@@ -166,7 +166,7 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 def _errors_as_failures() -> Iterator[None]:
     """Turn the Authority's errors into `Failure`: one line and an exit status."""
     try:
-        from robochoc.authority.names import InvalidNameError, UnknownNameError
+        from robochoc.authority.names import InvalidNameError, NotEnrolledError
         from robochoc.authority.registry import AuthorityError
     except ModuleNotFoundError as missing:
         if missing.name is None or missing.name.partition(".")[0] != "cryptography":
@@ -177,7 +177,7 @@ def _errors_as_failures() -> Iterator[None]:
 
     try:
         yield
-    except (InvalidNameError, UnknownNameError) as error:
+    except (InvalidNameError, NotEnrolledError) as error:
         raise Failure(USAGE, on_one_line(str(error))) from error
     except AuthorityError as error:
         raise Failure(INVALID, on_one_line(str(error))) from error

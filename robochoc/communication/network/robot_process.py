@@ -45,7 +45,7 @@ def network_robot_process(given: NetworkRobotStart) -> None:
         libc = ctypes.CDLL(None)
         libc.prctl(_PR_SET_NAME, given.own.robot.name.encode())
     threading.Thread(target=_end_with_the_parent, daemon=True).start()
-    identity = Identity.of(given.identity)
+    identity = Identity.from_texts(given.identity)
 
     def set_niceness(rank: int, size: int) -> None:
         """Let the scheduler favour robots that come earlier in the order, as `processes/robot_process.py` does."""

@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol, renew
+from robochoc.authority.enrolment import EnrolmentError, NotReachableError, enrol, renew
 from robochoc.authority.identity import Identity, IdentityError, default_identity_folder
 from robochoc.authority.names import check_member_name
 from robochoc.communication.network.robot import Ending, NetworkRobot
@@ -68,7 +68,7 @@ def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: f
     while True:
         try:
             return enrol(place.host, place.enrolment_port, token, folder, name, max(patience_s, _TRY_AGAIN_S))
-        except NobodyThereError:
+        except NotReachableError:
             if time.monotonic() + _TRY_AGAIN_S > until:
                 raise
             time.sleep(_TRY_AGAIN_S)

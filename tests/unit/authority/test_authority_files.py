@@ -81,7 +81,7 @@ def test_the_registry_holds_no_secret(authority: Authority) -> None:
 def test_a_folder_that_serves_another_purpose_is_left_alone(tmp_path: Path) -> None:
     tmp_path.chmod(0o755)
     (tmp_path / "thesis.txt").touch()
-    with pytest.raises(PermissionError, match="a folder of their own"):
+    with pytest.raises(PermissionError, match="a separate folder"):
         Authority.create(tmp_path)
     assert mode(tmp_path) == 0o755
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
@@ -182,7 +182,7 @@ def test_tokens_survive_being_copied_by_people(authority: Authority) -> None:
 
 @given(st.text(string.printable, max_size=120))
 def test_no_text_makes_reading_a_token_fail_otherwise(text: str) -> None:
-    with pytest.raises(TokenError, match="copy everything"):
+    with pytest.raises(TokenError, match="copy the whole output"):
         EnrolmentToken.parse(text)
 
 
