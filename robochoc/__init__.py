@@ -10,6 +10,8 @@ Names:
     from_cpmpy: Splits a CPMpy model over robots (the extra `cpmpy`).
     Outcome: The result of a run; `solve()` returns its subclass `Solution`.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
+    register: Makes a protocol of this program known under a name.
+    read_result: Reads a JSON result of `robochoc solve --json` as an `Outcome`.
     AgentsContainer: The master or robots on one of several machines.
     journal: Journals of runs; `journal.rows(path)` are for pandas or polars.
     RobochocError: The base class of all exceptions: InvalidInputError, ModelError, OptionError, UnsupportedError,
@@ -31,6 +33,7 @@ if TYPE_CHECKING:
     from robochoc.api import AgentsContainer, Problem, load
     from robochoc.communication.search_result import RobotsLostError
     from robochoc.formats.diagnostics import InvalidInputError
+    from robochoc.formats.result import read_result
     from robochoc.model.outcome import Outcome, Verdict
     from robochoc.modelling.array_problem import ArrayProblem
     from robochoc.modelling.cpmpy_models import from_cpmpy
@@ -50,7 +53,7 @@ if TYPE_CHECKING:
     from robochoc.modelling.model import Model
     from robochoc.modelling.solution import Solution
     from robochoc.modelling.terms import all_of, any_of
-    from robochoc.run.registry import UnknownProtocolError
+    from robochoc.run.registry import UnknownProtocolError, register
     from robochoc.solver.compile import CompileError
     from robochoc.solver.errors import UnsupportedError
     from robochoc.system.errors import OptionError, RobochocError
@@ -89,6 +92,8 @@ __all__ = [
     "load",
     "maximum",
     "minimum",
+    "read_result",
+    "register",
 ]
 
 __version__ = "0.1.0"
@@ -112,6 +117,8 @@ _PLACES = {
     "CompileError": "robochoc.solver.compile",
     "InvalidInputError": "robochoc.formats.diagnostics",
     "OptionError": "robochoc.system.errors",
+    "read_result": "robochoc.formats.result",
+    "register": "robochoc.run.registry",
     "RefutedError": "robochoc.verification.checker",
     "RobochocError": "robochoc.system.errors",
     "RobotsLostError": "robochoc.communication.search_result",

@@ -14,12 +14,13 @@ from typing import Any, Self
 from robochoc import __version__
 from robochoc.communication.search_result import RobotsLostError
 from robochoc.experiments.digests import digest_of_files, digest_of_team
-from robochoc.experiments.observers import CostOverTime, RobotLoads, combined, journal_bytes, journal_of
+from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_bytes, journal_of
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 from robochoc.formats.problems import read_problem
 from robochoc.generators.families import FAMILIES
 from robochoc.generators.scenario import random_scenario
+from robochoc.journal.events import combined
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team

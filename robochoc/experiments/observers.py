@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from operator import itemgetter
 
 from robochoc.communication.search_result import Progress
 from robochoc.experiments.task import CostPoint, RobotLoad, Task, options_of
-from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Observer, Sent
+from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Sent
 from robochoc.journal.recorder import JournalRecorder, improvements
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
@@ -98,16 +98,3 @@ def journal_bytes(journal: JournalRecorder, outcome: Outcome) -> bytes:
     journal.outcome = outcome
     content = journal.content()
     return content if len(content) <= LARGEST_JOURNAL else b""
-
-
-def combined(*observers: Callable[[AnyEvent], None] | None) -> Observer | None:
-    """Return one observer that passes events on to all `observers`; None if there are none."""
-    there = [one for one in observers if one is not None]
-    if not there:
-        return None
-
-    def observe(event: AnyEvent) -> None:
-        for one in there:
-            one(event)
-
-    return observe

@@ -202,6 +202,19 @@ AnyEvent = (
 Observer = Callable[[AnyEvent], None]
 
 
+def combined(*observers: Observer | None) -> Observer | None:
+    """Return one observer that passes events on to all `observers`; None if there are none."""
+    there = [one for one in observers if one is not None]
+    if not there:
+        return None
+
+    def observe(event: AnyEvent) -> None:
+        for one in there:
+            one(event)
+
+    return observe
+
+
 def actor(event: AnyEvent) -> str | None:
     """Return the robot whose step contains `event`; None if the event is not part of a step."""
     match event:

@@ -3,26 +3,34 @@
 from __future__ import annotations
 
 import inspect
+import threading
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Never
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Never
 
-from robochoc.journal.events import Observer
+from robochoc.journal.events import Observer, combined
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
+from robochoc.modelling.option_names import errors_in_python, in_python
+from robochoc.modelling.run_journal import recorded
 from robochoc.modelling.solution import Solution
+from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import CentralSolverName, Options, Runtime, ScheduleName
-from robochoc.run.orchestrator import solve
+from robochoc.run.orchestrator import prepare
 from robochoc.run.scenario import Environment
 from robochoc.solver.compile import CompileLimits
 from robochoc.system.errors import OptionError, OptionTypeError
+from robochoc.system.stopping import stopped_by
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
+    from robochoc.communication.search_result import Progress
     from robochoc.communication.simulator.channel import ChannelModel
+    from robochoc.protocols.protocol import Protocol
 
 NO_LIMITS = CompileLimits()
 """The default limits on the compilation of domains."""
@@ -34,11 +42,11 @@ class Solvable(ABC):
 
     def solve(  # noqa: PLR0913 - options of a run, by their names
         self,
-        protocol: str | None = None,
-        runtime: str = Runtime.PROCESSES,
+        protocol: str | type[Protocol] | None = None,
+        runtime: str = Runtime.SIMULATOR,
         *,
         order: str | Sequence[str] | None = None,
-        withdraw: str | None = None,
+        withdraw: str | bool | None = None,
         settings: Mapping[str, object] = {},
         observer: Observer | None = None,
         environment: Environment | None = None,
@@ -65,20 +73,27 @@ class Solvable(ABC):
         filters: Sequence[str] = (),
         bounds: bool = False,
         preprocess: str | None = None,
+        journal: Path | str | None = None,
+        html: Path | str | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        stop: threading.Event | None = None,
         **unknown: Never,
     ) -> Solution:
         """Let the robots solve the problem together.
 
-        Processes of the runtime `network` import the main program, which must call this below
-        `if __name__ == "__main__":`. Those of the runtime `processes` do not.
+        The simulator runs all robots in this thread. With `runtime="processes"` each robot has a process, as on the
+        command line. Processes of the runtime `network` import the main program, which must call this below
+        `if __name__ == "__main__":`.
 
         Args:
-            protocol: The name of the protocol, in upper or lower case. None, or `auto`: one that suits the problem.
-            runtime: `processes`, `simulator`, `network` or `arrays`.
+            protocol: The name of the protocol, in upper or lower case, or its class. None, or `auto`: one that suits
+                the problem.
+            runtime: `simulator`, `processes`, `network` or `arrays`.
             order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
                 first. None: the order that suits an automatically chosen protocol; otherwise the team's order, or
                 `max-degree` if the team has none. `given`: the team's order.
-            withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: no robot.
+            withdraw: Which robots may withdraw if there is no solution for all: `minimum` (or True) or `maximal`. None,
+                or False: no robot.
             settings: Settings of the protocol, by name.
             observer: Called with every event of the run.
             environment: Receives each answer, and returns the next changes.
@@ -106,6 +121,11 @@ class Solvable(ABC):
             filters: The names of the channel filters of messages on a network, in the order of application.
             bounds: Whether events report the proven lower bound of the cost (processes and simulator).
             preprocess: Preprocessing before the protocol: `ac`, making domains arc consistent. None: nothing.
+            journal: A file for the journal of the run: all messages and decisions.
+            html: A file for the page with the scene of the drones' flight.
+            progress: Called with the number of messages and the elapsed time, about ten times a second.
+            stop: An event that another thread sets to end the search. The answer is then the best one known. The
+                central solver does not notice it.
             **unknown: No other options are allowed.
 
         Returns:
@@ -127,9 +147,42 @@ class Solvable(ABC):
         given = {name: value for name, value in locals().items() if name in _OPTIONS}
         _refuse(unknown)
         team = self._team_to_solve()
-        options = _with_team_names(Options(**given | {"protocol": protocol or AUTO}), self._robots_called(team))
-        outcome = solve(team, options, observer=observer, environment=environment, ordered=self._is_ordered)
-        return self._solution(outcome, team)
+        with errors_in_python(ARGUMENTS), stopped_by(stop):
+            options = _with_team_names(Options(**given | {"protocol": protocol or AUTO}), self._robots_called(team))
+            refuse_options(options, environment=environment is not None)
+            run = prepare(team, options, environment=environment is not None, ordered=self._is_ordered)
+            with recorded(journal, run) as recorder:
+                observers = combined(observer, recorder)
+                outcome = run.solve(observer=observers, progress=progress, environment=environment)
+                if recorder is not None:
+                    recorder.outcome = outcome
+        if outcome.reason:
+            outcome = replace(outcome, reason=in_python(outcome.reason, ARGUMENTS))
+        solution = self._solution(outcome, team)
+        if html is not None:
+            solution.scene().save(html)
+        return solution
+
+    async def solve_async(self, *arguments: Any, **options: Any) -> Solution:  # noqa: ANN401 - those of `solve`
+        """Solve the problem in a thread, while other tasks go on. If the task is cancelled, the search ends.
+
+        Args:
+            *arguments: As of `solve`.
+            **options: As of `solve`, except `stop`.
+
+        Returns:
+            The solution, as `solve`. Raises as `solve`.
+        """
+        import asyncio  # noqa: PLC0415 - start-up
+
+        stop = threading.Event()
+        running = asyncio.create_task(asyncio.to_thread(self.solve, *arguments, **options, stop=stop))
+        try:
+            return await asyncio.shield(running)
+        except asyncio.CancelledError:
+            stop.set()
+            await asyncio.wait([running])
+            raise
 
     def _repr_html_(self) -> str:
         from robochoc.modelling.team_html import team_html  # noqa: PLC0415 - notebooks only
@@ -156,8 +209,7 @@ class Solvable(ABC):
 def _refuse(unknown: Iterable[str]) -> None:
     """Raise `OptionTypeError` for unknown options."""
     for name in unknown:
-        known = [one for one in inspect.signature(Solvable.solve).parameters if one not in {"self", "unknown"}]
-        hint = did_you_mean(name, known, f"its options: {', '.join(known)}")
+        hint = did_you_mean(name, ARGUMENTS, f"its options: {', '.join(sorted(ARGUMENTS))}")
         raise OptionTypeError(f"solve() has no option {name!r}; {hint}")
 
 
@@ -176,3 +228,7 @@ def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
         order = tuple(called[name] for name in order)
     kill = tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in options.kill)
     return replace(options, order=order, kill=kill)
+
+
+ARGUMENTS = frozenset(inspect.signature(Solvable.solve).parameters) - {"self", "unknown"}
+"""The names of the arguments of `solve`."""

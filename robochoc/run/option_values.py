@@ -53,13 +53,15 @@ def text(name: str, value: object) -> str:
 
 
 def protocol_name(name: str, value: object) -> str:
-    """Convert the name of a protocol, in any case, to the spelling of its package."""
-    if not isinstance(value, str):
-        raise OptionTypeError(_refusal(name, value, "the name of an installed protocol, such as 'abt'"))
+    """Convert the name of a protocol, in any case, to the spelling of its package; or its class to its name."""
     if value == AUTO:
-        return value
-    from robochoc.run.registry import installed_spelling  # noqa: PLC0415 - start-up: few options name a protocol
+        return AUTO
+    from robochoc.run.registry import installed_spelling, name_of_class  # noqa: PLC0415 - start-up
 
+    if isinstance(value, type) and hasattr(value, "traits"):
+        return name_of_class(value)
+    if not isinstance(value, str):
+        raise OptionTypeError(_refusal(name, value, "the name of a protocol, such as 'abt', or its class"))
     return installed_spelling(value)
 
 

@@ -199,6 +199,13 @@ class Options:
         return self.on_loss == OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)
 
 
+def _withdrawal(name: str, value: object) -> object:
+    """Convert the name of a withdrawal; True is `minimum`, None and False are none."""
+    if value is None or value is False:
+        return None
+    return Withdrawal.MINIMUM if value is True else one_of(Withdrawal)(name, value)
+
+
 _CONVERTERS = MappingProxyType(
     {
         "protocol": protocol_name,
@@ -207,7 +214,7 @@ _CONVERTERS = MappingProxyType(
         "timeout": optional(seconds),
         "deadline": optional(seconds),
         "improve": optional(seconds),
-        "withdraw": optional(one_of(Withdrawal)),
+        "withdraw": _withdrawal,
         "schedule": one_of(ScheduleName),
         "delay": count,
         "local": instance_of(CompileLimits),

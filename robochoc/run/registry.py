@@ -1,11 +1,12 @@
-"""Protocols by name, as installed packages offer them under the entry point group `robochoc.protocols`."""
+"""Protocols by name: those of installed packages (entry points `robochoc.protocols`), and of the running program."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import cast
+from typing import NamedTuple, cast
 
 from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.protocol import Protocol
@@ -15,7 +16,7 @@ from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
 from robochoc.system.entry_points import EntryPoint
-from robochoc.system.errors import RobochocError
+from robochoc.system.errors import OptionError, OptionTypeError, RobochocError
 from robochoc.system.installed import (
     all_entry_points,
     entry_point_names,
@@ -25,6 +26,7 @@ from robochoc.system.installed import (
 )
 
 GROUP = "robochoc.protocols"
+_NAME = re.compile(r"[A-Za-z0-9]+(-[A-Za-z0-9]+)*")
 _STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
 """Protocols of single stages of a run. Users cannot choose them."""
 
@@ -55,12 +57,83 @@ class InstalledProtocol:
     @property
     def package(self) -> str:
         """Name and version of the package."""
-        return f"{self.entry.dist.name} {self.entry.dist.version}" if self.entry.dist else "unknown"
+        return f"{self.entry.dist.name} {self.entry.dist.version}" if self.entry.dist else "this program"
+
+
+class _Registered(NamedTuple):
+    """A protocol that the running program has registered, in the form of an entry point."""
+
+    name: str
+    protocol: type[Protocol]
+
+    @property
+    def value(self) -> str:
+        return _place(self.protocol)
+
+    @property
+    def dist(self) -> None:
+        return None
+
+    def load(self) -> object:
+        return self.protocol
+
+
+_REGISTERED: dict[str, _Registered] = {}
+
+
+def register(name: str, protocol: type[Protocol]) -> None:
+    """Make a protocol of this program known under a name, as if an installed package offered it.
+
+    The runtimes `simulator` and `processes` can use it; programs started by the runtime `network` do not know it.
+    Registering another class under the same name replaces the first, as notebooks need it.
+
+    Args:
+        name: Its name in `solve`: letters, digits and hyphens.
+        protocol: A subclass of `robochoc.protocols.Protocol`.
+
+    Raises:
+        OptionError: if the class cannot be used, the name is invalid, or an installed package offers the name.
+    """
+    if fault := _fault(protocol):
+        raise OptionTypeError(f"{getattr(protocol, '__qualname__', repr(protocol))} {fault}")
+    if not _NAME.fullmatch(name):
+        raise OptionError(f"{name!r} is not a valid name of a protocol; use letters, digits and hyphens")
+    if name in {CENTRAL, AUTO, *_STAGES} or entry_points_named(GROUP, name):
+        raise OptionError(f"the name {name!r} is taken by an installed protocol; register it under another name")
+    _REGISTERED[name] = _Registered(name, protocol)
+
+
+def name_of_class(protocol: type[Protocol]) -> str:
+    """Return the name of a protocol's class. A class that no package offers is registered under its name in lower case.
+
+    Raises:
+        OptionError: as `register`.
+    """
+    installed = [entry.name for entry, _ in all_entry_points(GROUP) if entry.value == _place(protocol)]
+    registered = [one.name for one in _REGISTERED.values() if one.protocol is protocol]
+    if names := installed + registered:
+        return names[0]
+    name = protocol.__name__.lower().replace("_", "-")
+    register(name, protocol)
+    return name
+
+
+def is_registered(name: str) -> bool:
+    """Return whether the running program has registered a protocol of that name."""
+    return name in _REGISTERED
+
+
+def _place(protocol: type[Protocol]) -> str:
+    return f"{protocol.__module__}:{protocol.__qualname__}"
+
+
+def _entries(name: str) -> Sequence[EntryPoint]:
+    return [_REGISTERED[name]] if name in _REGISTERED else entry_points_named(GROUP, name)
 
 
 def protocol_names() -> tuple[str, ...]:
-    """Return the names of all protocols that are installed, ours and others', sorted."""
-    return entry_point_names(GROUP)
+    """Return the names of all protocols, sorted: ours, those of other packages, and registered ones."""
+    return tuple(sorted({*entry_point_names(GROUP), *_REGISTERED}))
 
 
 _SPELLINGS = {CENTRAL, AUTO}
@@ -68,8 +141,8 @@ _SPELLINGS = {CENTRAL, AUTO}
 
 
 def installed_spelling(name: str) -> str:
-    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself if it matches none or several."""
-    if name in _SPELLINGS or entry_points_named(GROUP, name):
+    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself where it fits none, or several."""
+    if name in _SPELLINGS or _entries(name):
         _SPELLINGS.add(name)
         return name
     spellings = [one for one in (*protocol_names(), CENTRAL, AUTO) if one.lower() == name.lower()]
@@ -78,7 +151,9 @@ def installed_spelling(name: str) -> str:
 
 def installed_protocols() -> tuple[InstalledProtocol, ...]:
     """Return all protocols that packages offer, sorted by name; also those that cannot be used, with the reason."""
-    return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
+    installed = [_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP)]
+    registered = [_offer(entry, [entry]) for entry in _REGISTERED.values()]
+    return tuple(sorted(installed + registered, key=lambda one: one.name))
 
 
 def unknown_protocol(name: str) -> str:
@@ -88,7 +163,7 @@ def unknown_protocol(name: str) -> str:
 
 def installed_protocol(name: str) -> InstalledProtocol:
     """Return the protocol that is offered as `name`. Raises `UnknownProtocolError`, which suggests others."""
-    found = entry_points_named(GROUP, name)
+    found = _entries(name)
     if not found:
         raise UnknownProtocolError(unknown_protocol(name))
     return _offer(found[0], found)

@@ -1,8 +1,7 @@
-"""Requests to stop a search with its best result so far, as at its time limit: by the signal `STOP`.
+"""A search can be asked to stop early. Its answer is then the best one known, as at the end of its time.
 
-    kill -USR1 PID
-
-Ctrl-C and SIGTERM end the program without an answer.
+Another program asks by the signal `STOP` (`kill -USR1 PID`); a thread of this program asks by an event. Ctrl-C and
+SIGTERM end the program without an answer.
 """
 
 from __future__ import annotations
@@ -11,12 +10,16 @@ import signal
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 
-STOP = signal.SIGUSR1
+STOP: int = getattr(signal, "SIGUSR1", 0)
+"""The signal; 0 on systems without it."""
+_EVENT: ContextVar[threading.Event | None] = ContextVar("stop", default=None)
+"""The event that stops the runs of this thread."""
 
 
 class _Request:
-    """The state of the request in this process."""
+    """A request to this process."""
 
     is_made = False
 
@@ -24,17 +27,17 @@ class _Request:
 @contextmanager
 def stop_handled() -> Iterator[None]:
     """Handle the signal `STOP` inside the context; only possible in the main thread."""
-    if threading.current_thread() is not threading.main_thread():
+    if not STOP or threading.current_thread() is not threading.main_thread():
         try:
             yield
         finally:
             _Request.is_made = False
         return
 
-    def handle(*_: object) -> None:
+    def on_signal(*_: object) -> None:
         _Request.is_made = True
 
-    before = signal.signal(STOP, handle)
+    before = signal.signal(STOP, on_signal)
     mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # the parent may have blocked it
     try:
         yield
@@ -44,11 +47,22 @@ def stop_handled() -> Iterator[None]:
         _Request.is_made = False
 
 
+@contextmanager
+def stopped_by(event: threading.Event | None) -> Iterator[None]:
+    """Stop searches of this thread inside the context when the event is set."""
+    token = _EVENT.set(event)
+    try:
+        yield
+    finally:
+        _EVENT.reset(token)
+
+
 def request_stop() -> None:
-    """Request a stop like the signal. The request ends with the `stop_handled` block."""
+    """Request the end of searches in this process, as the signal does, until `stop_handled` is left."""
     _Request.is_made = True
 
 
 def stop_requested() -> bool:
-    """Return whether a stop was requested."""
-    return _Request.is_made
+    """Return whether the search of this thread is to stop."""
+    event = _EVENT.get()
+    return _Request.is_made or (event is not None and event.is_set())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 
 from robochoc.formats import read_robot, read_team
 from robochoc.model.change import team_after_events
+from robochoc.model.outcome import Metrics
 from robochoc.model.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
 from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc_within
@@ -17,10 +19,10 @@ from tests.support.program import ROOT, robochoc_within
 RESCUE = ROOT / "docs" / "examples" / "rescue"
 VERDICTS = ["solution", "solution", "solution", "no-solution", "solution"]
 EPOCH_KEYS = {
-    "verdict", "opened_by", "robots", "assignment", "cost", "messages", "bytes", "ncccs", "checks", "wall_s",
-    "verified",
+    "verdict", "opened_by", "robots", "assignment", "cost", "withdrawn", "verified", "messages_by_type",
+    *(one.name for one in fields(Metrics)),
 }  # fmt: skip
-EPOCH_EXTRAS = {"witness", "messages_by_type", "memory", "largest", "dropped_constraints"}
+EPOCH_EXTRAS = {"witness", "dropped_constraints"}
 """Keys of an epoch that are missing where they are empty."""
 METRICS = ("messages", "bytes", "ncccs", "checks")
 
