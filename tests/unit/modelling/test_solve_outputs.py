@@ -16,7 +16,7 @@ from robochoc.journal.events import AnyEvent
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.run.registry import installed_protocols, protocol_names
 from tests.support.cases import looped
-from tests.support.program import HANG_S
+from tests.support.limits import HANG_S
 
 
 class SlowMGM(MGM):
