@@ -29,7 +29,15 @@ from robochoc.generators.draws import (
     sample,
     seeded,
 )
-from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
+from robochoc.model.allocation import (
+    Distance,
+    TasksModel,
+    TaskSpec,
+    Worker,
+    assignment,
+    distance_between,
+    several_tasks,
+)
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
@@ -122,8 +130,8 @@ def tasks(
         case TasksModel.ASSIGNMENT:
             variables, constraints = assignment(_workers(problem))
         case TasksModel.SEVERAL:
-            jobs = {task: Job(str(task), load) for task, load in problem.load.items()}
-            variables, constraints = several(_workers(problem), jobs)
+            jobs = {task: TaskSpec(str(task), load) for task, load in problem.load.items()}
+            variables, constraints = several_tasks(_workers(problem), jobs)
         case never:
             assert_never(never)
     if not variables:
@@ -156,7 +164,7 @@ def drawn_tasks(
         worth, load[task] = random_integer(chance, 1, most) * 10**travel.places, random_integer(chance, 1, 3)
         for robot, (start, has) in robots.items():
             if skill in has:
-                profit[robot][task] = worth - way(start, place, travel.distance, travel.places)
+                profit[robot][task] = worth - distance_between(start, place, travel.distance, travel.places)
     return DrawnTasks(profit, load, capacity)
 
 

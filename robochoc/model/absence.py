@@ -56,7 +56,7 @@ class DroppedConstraint:
 
 
 class NotAnAggregateError(RobochocError):
-    """The expression is not an aggregate of alike terms that is compared with numbers."""
+    """An expression is not an aggregate of alike terms that is compared with numbers."""
 
 
 def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | None:
@@ -179,7 +179,7 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
 
 
 def _is_all_different(expression: Apply) -> bool:
-    """Return whether `expression` says of each pair of some terms and numbers that the two differ."""
+    """Return whether `expression` requires that each pair of some terms and numbers differs."""
     if expression.operator != "and" or any(
         not isinstance(one, Apply) or one.operator != "ne" for one in _flat(expression)
     ):

@@ -1,12 +1,13 @@
-"""Task allocation as a problem of costs: who does which task (Gerkey and Mataric, IJRR 23, 2004).
+"""Task allocation as a problem of costs (Gerkey and Mataric, IJRR 23, 2004).
 
-What a task brings a robot is what it is worth, less the way there. The sum of what is done is maximised. Two models:
+The profit of a task for a robot is its worth minus the distance to it. The sum of profits is maximised. Two models:
 
-- `assignment`: a robot does one task at most. It has one variable: its task, or 0.
-- `several`: a robot does as many as it has room for. It has a variable for each task that it could do: 1, it does it.
+- `assignment`: a robot does at most one task. It has one variable: its task, or 0.
+- `several`: a robot does several tasks, within its capacity. It has a variable for each task that it can do: 1 if it
+  does it, else 0.
 
-In both a task is done by one robot at most, unless it asks for several (in `several` alone): then by all of these, or
-by none. Each robot alone knows what tasks bring it; what robots share is that they exclude each other.
+In both, a task is done by at most one robot, unless it requires several (only in `several`): then by exactly so many,
+or by none. Profits are private; robots share only the constraints that exclude each other.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from robochoc.model.constraint import Constraint, Domain, Predicate, Relation, S
 from robochoc.model.expression import Apply, Constant, Expression, Name, Type, parse, total
 
 NOT_THE_SAME = Predicate("notSame", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
-"""Two robots do not do the same task; 0 is none."""
+"""Two robots do not do the same task; 0 means no task."""
 NOT_BOTH = Predicate("notBoth", ("X", "Y"), parse("or(eq(X, 0), eq(Y, 0))", ("X", "Y"), Type.BOOLEAN))
 _DONE = Domain("Done", (range(2),))
 
@@ -39,7 +40,7 @@ class TasksModel(StrEnum):
 
 
 class Distance(StrEnum):
-    """The measure of a way: along streets (Manhattan's), or straight."""
+    """The measure of distances: along streets (Manhattan's), or straight."""
 
     STREETS = "streets"
     STRAIGHT = "straight"
@@ -51,15 +52,15 @@ class Worker:
 
     Attributes:
         name: Its name.
-        label: What stands for it in the names of constraints.
+        label: Its label in the names of constraints.
         variable: In `assignment` its variable; in `several` the first part of the names of its variables.
-        profit: What each task that it can do brings it.
-        capacity: The room that it has; None: for any load.
-        most: The number of tasks that it does at most; None: any.
-        together: What pairs of tasks bring besides when it does both.
+        profit: The profit of each task that it can do.
+        capacity: Its maximum load. None: unlimited.
+        most: The maximum number of its tasks. None: unlimited.
+        together: The additional profit of pairs of tasks, if it does both.
         tours: The length of the tour of each set of tasks that it can do together, by their numbers. With tours,
-            `profit` has no ways in it; tasks that are in none have no place.
-        hurries: Whether it can do no other sets of these tasks, as they have deadlines.
+            `profit` does not include distances; tasks in no tour have no place.
+        has_deadlines: Whether it can do only these sets of tasks, because they have deadlines.
     """
 
     name: str
@@ -70,17 +71,17 @@ class Worker:
     most: int | None = None
     together: Mapping[tuple[int, int], int] = field(default_factory=dict)
     tours: Mapping[tuple[int, ...], int] = field(default_factory=dict)
-    hurries: bool = False
+    has_deadlines: bool = False
 
 
 @dataclass(frozen=True)
-class Job:
-    """A task, as far as all robots know it.
+class TaskSpec:
+    """The data of a task that all robots know.
 
     Attributes:
         name: The last part of the names of its variables in `several`.
-        load: The room that it takes.
-        robots: The number of robots that it asks for.
+        load: Its load.
+        robots: The number of robots that it requires.
     """
 
     name: str
@@ -89,11 +90,11 @@ class Job:
 
 
 def assignment(workers: Sequence[Worker], symbols: tuple[str, ...] = ()) -> Parts:
-    """Return the model in which a robot does one task at most.
+    """Return the model in which a robot does at most one task.
 
     Args:
         workers: The robots.
-        symbols: The names of none and of the tasks, from number 1 on; without them values are numbers.
+        symbols: The names for no task and for the tasks from number 1 on. Without them, values are numbers.
     """
     variables = {
         one.name: [
@@ -113,8 +114,8 @@ def assignment(workers: Sequence[Worker], symbols: tuple[str, ...] = ()) -> Part
     return variables, constraints()
 
 
-def several(workers: Sequence[Worker], jobs: Mapping[int, Job]) -> Parts:
-    """Return the model in which a robot does several tasks; a robot that can do none is left out."""
+def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Parts:
+    """Return the model in which a robot does several tasks. Robots that can do no task are left out."""
     able = [one for one in workers if one.profit]
     variables = {one.name: [Variable(_does(one, jobs[task]), _DONE) for task in one.profit] for one in able}
 
@@ -138,8 +139,10 @@ def several(workers: Sequence[Worker], jobs: Mapping[int, Job]) -> Parts:
     return variables, constraints()
 
 
-def way(start: Sequence[int | Fraction], end: Sequence[int | Fraction], distance: Distance, places: int) -> int:
-    """Return the length of a way in units of 10**-places, rounded, halves up."""
+def distance_between(
+    start: Sequence[int | Fraction], end: Sequence[int | Fraction], distance: Distance, places: int
+) -> int:
+    """Return the distance between two places in units of 10**-places, rounded, halves up."""
     # Whole numbers stay integers, which are several times as fast.
     parts = cast("list[Fraction]", [abs(one - other) for one, other in zip(start, end, strict=True)])
     unit: int = 10**places
@@ -149,12 +152,12 @@ def way(start: Sequence[int | Fraction], end: Sequence[int | Fraction], distance
     return (isqrt(floor(4 * square)) + 1) // 2
 
 
-def _does(one: Worker, job: Job) -> str:
+def _does(one: Worker, job: TaskSpec) -> str:
     return f"{one.variable}.{job.name}"
 
 
-def _limits(one: Worker, jobs: Mapping[int, Job]) -> Iterator[Constraint]:
-    """Yield what a robot has room for, and how many tasks it does at most, if that says anything."""
+def _limits(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
+    """Yield the constraints on the load, and on the number of tasks, of a robot, if they restrict it."""
     scope = tuple(_does(one, jobs[task]) for task in one.profit)
     if one.capacity is not None:
         loads = [jobs[task].load for task in one.profit]
@@ -163,8 +166,8 @@ def _limits(one: Worker, jobs: Mapping[int, Job]) -> Iterator[Constraint]:
         yield Constraint("most", _at_most(f"most{one.label}", [1] * len(scope), one.most), scope, scope)
 
 
-def _tours(one: Worker, jobs: Mapping[int, Job]) -> Iterator[Constraint]:
-    """Yield what tours cost, and which sets of tasks a robot has time for."""
+def _tours(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
+    """Yield the costs of tours, and the constraint on sets of tasks that a robot has time for."""
     placed = [task for task in one.profit if (task,) in one.tours]
     scope = tuple(_does(one, jobs[task]) for task in placed)
     if not scope:
@@ -172,7 +175,7 @@ def _tours(one: Worker, jobs: Mapping[int, Job]) -> Iterator[Constraint]:
     rows = {tuple([int(task in tour) for task in placed]): -length for tour, length in one.tours.items()}
     cost = Relation(f"tour{one.label}", len(scope), Semantics.SOFT, tuple(rows), tuple(rows.values()))
     yield Constraint("tour", cost, scope, scope)
-    if one.hurries:
+    if one.has_deadlines:
         able = ((0,) * len(scope), *rows)
         yield Constraint("time", Relation(f"time{one.label}", len(scope), Semantics.SUPPORTS, able), scope, scope)
 
@@ -185,8 +188,8 @@ def _at_most(name: str, loads: Sequence[int], most: int) -> Predicate:
     return Predicate(name, names, Apply("le", (total(terms), Constant(most))))
 
 
-def _crews(able: Sequence[Worker], jobs: Mapping[int, Job]) -> Iterator[Constraint]:
-    """Yield, for each task that asks for several robots, that so many do it or none does."""
+def _crews(able: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
+    """Yield, for each task that requires several robots, the constraint that so many robots do it, or none."""
     for task, job in jobs.items():
         scope = tuple(_does(one, job) for one in able if task in one.profit)
         if job.robots > 1 and scope:

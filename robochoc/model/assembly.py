@@ -1,7 +1,7 @@
-"""Teams from variables and constraints: who holds which constraint, and who is whose parent, follows from an order.
+"""Assemble teams from variables, constraints and a priority order.
 
-The lowest robot of a constraint's scope holds it, and all others of the scope are its parents (the format's
-reference, "One robot"). Importers, generators and `robochoc.Model` make their teams here.
+The lowest robot of a constraint's scope holds the constraint, and all others of the scope are parents of that robot
+(docs/reference/format.md, "One robot"). Importers, generators and `robochoc.Model` create their teams here.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
 
 @dataclass(frozen=True, kw_only=True)
 class Extras:
-    """What robots of a team have beside variables and constraints.
+    """Further parts of the robots of a team.
 
     Attributes:
-        links: Pairs of robots that are neighbours without a constraint; the one that comes first is the parent.
+        links: Pairs of robots that are neighbours without a constraint; the robot of higher priority is the parent.
         topics: The topics of robots.
-        weights: The weights of robots; 1 where there is none.
+        weights: The weights of robots; the default is 1.
         parts: The parts of partially known constraints (PKC), by the robot that knows them. Each is over variables of
-            that robot and of one other; where the other holds no part, it allows everything.
+            that robot and of one other. If the other robot has no part, it gets one that allows everything.
     """
 
     links: Sequence[tuple[str, str]] = ()
@@ -56,9 +56,9 @@ def assemble(
 ) -> Team:
     """Return the team in which robots own `variables` and share `constraints`.
 
-    Which parameters of definitions are symbols follows from the domains. A constraint without variables holds or is
-    violated whatever the robots do: its cost is added to the constant, and if it is hard and violated, the first robot
-    gets a private constraint that none of its values satisfies.
+    The domains determine which parameters of definitions are symbols. The cost of a constraint without variables is
+    added to the constant; if such a constraint is hard and violated, the first robot gets a private constraint that no
+    value satisfies.
 
     Args:
         name: The team's name.
@@ -67,13 +67,13 @@ def assemble(
             variables of one robot are private.
         kind: The kind of problem.
         costs: The unit of costs. The constant goes to the first robot alone.
-        extras: What robots have besides.
+        extras: Further parts of the robots.
 
     Raises:
         ValueError: if a constraint has a variable that no robot owns.
     """
     symbolic = {one.name: one.domain.symbols for own in variables.values() for one in own if one.domain.symbols}
-    links = _Links(variables)
+    links = _LinkBuilder(variables)
     with_variables, costs = _without_constants(constraints, variables, costs)
     for constraint in with_marked_symbols(with_variables, symbolic):
         links.add(constraint)
@@ -105,7 +105,7 @@ def assemble(
 def _without_constants(
     constraints: Iterable[Constraint], variables: Mapping[str, Sequence[Variable]], costs: CostUnits
 ) -> tuple[list[Constraint], CostUnits]:
-    """Return `constraints` as constraints with variables, and `costs` with the costs of those without."""
+    """Return the `constraints` that have variables, and `costs` with the costs of the others in the constant."""
     found = []
     for constraint in constraints:
         if constraint.variables:
@@ -124,8 +124,8 @@ def _without_constants(
 _NEVER = Predicate("never", ("X",), Apply("ne", (Name("X"), Name("X"))))
 
 
-class _Links:
-    """Constraints in the hands of robots, and the links that follow."""
+class _LinkBuilder:
+    """The constraints that robots hold, and the resulting links."""
 
     def __init__(self, variables: Mapping[str, Sequence[Variable]]) -> None:
         self._variables = variables
@@ -140,7 +140,7 @@ class _Links:
         self.private: dict[str, list[Constraint]] = defaultdict(list)
 
     def add(self, constraint: Constraint) -> None:
-        """Give a totally known constraint to the lowest robot of its scope."""
+        """Assign a totally known constraint to the lowest robot of its scope."""
         robots = self._owners(constraint)
         lowest = max(robots, key=self._rank.__getitem__)
         if len(robots) == 1:
@@ -152,7 +152,7 @@ class _Links:
         self._show(constraint, lowest)
 
     def add_part(self, robot: str, part: Constraint) -> None:
-        """Give `robot` its part of a partially known constraint."""
+        """Assign a part of a partially known constraint to `robot`."""
         (other,) = self._owners(part) - {robot}
         self._parts.setdefault((robot, frozenset(part.variables)), part)
         self._with[robot, other].append(replace(part, model=ConstraintModel.PKC))
@@ -160,7 +160,7 @@ class _Links:
         self._show(part, max(robot, other, key=self._rank.__getitem__))
 
     def missing_parts(self) -> list[tuple[str, Constraint]]:
-        """Return the robots that hold no part of a partially known constraint of theirs, each with one that allows all.
+        """Return the missing parts of partially known constraints, with their robots; they allow everything.
 
         Both robots of such a constraint have a part of it in their files.
         """
@@ -173,13 +173,13 @@ class _Links:
         return missing
 
     def link(self, one: str, other: str) -> None:
-        """Make the two neighbours."""
+        """Make the two robots neighbours."""
         higher, lower = sorted((one, other), key=self._rank.__getitem__)
         self._parents[lower].add(higher)
         self._children[higher].add(lower)
 
     def place(self) -> None:
-        """Put every shared constraint under the lowest of its parents, as readers of the files see the order."""
+        """Put every shared constraint under the lowest of its parents, in the order that readers of files compute."""
         seen = {robot: place for place, robot in enumerate(priority_order(self._parents))}
         for lowest, others, constraint in self._held:
             self._with[lowest, max(others, key=seen.__getitem__)].append(constraint)

@@ -1,7 +1,7 @@
-"""Changes of a team: the paper's function delta (Section 3.1), which takes a DisCSP to the next one.
+"""Changes of a team: the paper's function delta (Section 3.1), which maps a DisCSP to the next one.
 
-Functions are pure: they take a team and a change, and return another team. Changes come from a scenario, from the
-robots' situation, or from the loss of a robot.
+The functions are pure: they return another team. Changes come from a scenario, from the situation of the robots, or
+from the loss or the return of a robot.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from robochoc.model.problem import (
     AddValue,
     Change,
     Constraint,
+    ConstraintModel,
     Domain,
     RemoveAgent,
     RemoveConstraint,
@@ -50,7 +51,7 @@ def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
     """Return `team` after `changes`, one after the other.
 
     Raises:
-        ChangeError: if the team cannot take one of them.
+        ChangeError: if one of them is impossible.
     """
     for change in changes:
         match change:
@@ -96,8 +97,7 @@ def _check_magnitudes(team: Team, change: Change) -> None:
 def team_after_events(team: Team, events: int) -> Team:
     """Return `team` after the first `events` events of its scenario. The result has no scenario.
 
-    Changes that the team cannot take, because robots are lost, are left out.
-
+    Changes that are impossible because robots are lost are left out.
     """
     now = replace(team, scenario=()) if team.scenario else team
     for event in team.scenario[:events]:
@@ -106,17 +106,17 @@ def team_after_events(team: Team, events: int) -> Team:
 
 
 def apply_possible_changes(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]:
-    """Return `team` after those of `changes` that it can take, one after the other, and which these are."""
-    taken = []
+    """Return `team` after those of `changes` that are possible, one after the other, and these changes."""
+    applied = []
     for change in changes:
         with suppress(ChangeError):
             team = apply_changes(team, [change])
-            taken.append(change)
-    return team, taken
+            applied.append(change)
+    return team, applied
 
 
 def describe_change(change: Change, team: Team) -> str:
-    """Return `change` in a few words; values are told as the variables of `team` have them."""
+    """Return `change` in a few words, with the labels of values in `team`."""
     match change:
         case RemoveAgent(name):
             return f"-{name}"
@@ -174,7 +174,7 @@ def _check_newcomer(team: Team, robot: Robot) -> None:
     """Raise `ChangeError` for mistakes of a new robot that do not depend on its constraints."""
     own = quoted(robot.name)
     if robot.name in team:
-        raise ChangeError(f"the robot {own} is there already", "a robot can come again once it has left")
+        raise ChangeError(f"the robot {own} is in the team already", "remove it before it joins again")
     if team.robots and robot.kind is not team.kind:
         raise ChangeError(f"{own} is a {robot.kind} in a team of {team.kind}", "write the same type in both")
     if team.robots and robot.costs.maximize is not team.robots[0].costs.maximize:
@@ -183,7 +183,7 @@ def _check_newcomer(team: Team, robot: Robot) -> None:
         raise ChangeError(f"{own} {does} costs in a team that {others} them", hint)
     check_variables_free(team, robot)
     for child in robot.children:
-        hint = "it takes the lowest priority, so its file names parents only"
+        hint = "list parents only: a robot that joins has the lowest priority"
         raise ChangeError(f"{own} has the child {quoted(child.name)}", hint, line=child.line)
     for parent in robot.parents:
         if parent.name not in team:
@@ -196,7 +196,7 @@ def _check_parents(team: Team, robot: Robot, constraint: Constraint) -> None:
     for name in constraint.variables:
         owner = team.owner.get(name, robot.name)
         if owner not in parents and owner != robot.name:
-            message = f"{quoted(name)} belongs to {quoted(owner)}, which is no parent of {quoted(robot.name)}"
+            message = f"{quoted(name)} belongs to {quoted(owner)}, which is not a parent of {quoted(robot.name)}"
             raise ChangeError(message, "list it under agents_parent as well")
 
 
@@ -206,15 +206,15 @@ def _with_constraint(team: Team, agent: str, parent: str, constraint: Constraint
 
 
 def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:
-    """Return `team` without these constraints. Of a partially known one both parts go."""
+    """Return `team` without these constraints, and without both parts of partially known ones."""
     holder, above = robot_named(team, agent), robot_named(team, parent)
     sides = [
         *(one.constraints for one in holder.parents if one.name == parent),
         *(one.constraints for one in above.children if one.name == agent),
     ]
-    there = dict.fromkeys(constraint.name for side in sides for constraint in side)
-    if name not in there:
-        hint = f"there are {shortened(' '.join(there))}" if there else "the parent is the higher of two that share one"
+    known = dict.fromkeys(constraint.name for side in sides for constraint in side)
+    if name not in known:
+        hint = f"they share {shortened(' '.join(known))}" if known else "the parent is the robot of higher priority"
         message = f"{quoted(agent)} shares no constraint {quoted(name)} with a parent {quoted(parent)}"
         raise ChangeError(message, hint, missing=name)
     parents = (
@@ -235,8 +235,8 @@ def _less(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value not in domain:
         ranges = (f"{part[0]}..{part[-1]}" if len(part) > 1 else f"{part[0]}" for part in domain.ranges)
-        held = map(str, map(domain.label, domain)) if domain.symbols else ranges
-        hint = f"its domain is {shortened(' '.join(held))}" if domain.ranges else "its domain is empty"
+        values = map(str, map(domain.label, domain)) if domain.symbols else ranges
+        hint = f"its domain is {shortened(' '.join(values))}" if domain.ranges else "its domain is empty"
         raise ChangeError(f"{quoted(variable)} has no value {domain.label(value)}", hint)
     parts: list[range] = []
     for part in domain.ranges:
@@ -264,3 +264,64 @@ def _with_domain(team: Team, variable: str, domain: Domain) -> Team:
     robot = team[team.owner[variable]]
     own = (replace(one, domain=domain) if one.name == variable else one for one in robot.variables)
     return replace_robot(team, replace(robot, variables=tuple(own)))
+
+
+def rejoin(team: Team, robot: Robot) -> Team:
+    """Return `team` with `robot`, which was lost and comes back, in place of the robot of the same name.
+
+    Constraints and links with robots that are not in the team are left out. The links of its neighbours stay. It shows
+    them the variables that their constraints need, also if its file does not list these.
+
+    Raises:
+        ChangeError: if its file has other neighbours than before or another kind of problem, lacks a variable that
+            others need, or has a partially known constraint.
+    """
+    _check_returning(team, robot)
+    known = {*team.owner, *(variable.name for variable in robot.variables)}
+
+    def possible(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+        return tuple(constraint for constraint in constraints if known.issuperset(constraint.variables))
+
+    parents = [replace(one, constraints=possible(one.constraints)) for one in robot.parents if one.name in team]
+    below = [replace(one, constraints=possible(one.constraints)) for one in robot.children if one.name in team]
+    team = replace_robot(team, replace(robot, parents=tuple(parents), children=tuple(below)))
+    missing = [name for constraint in team.constraints() for name in constraint.variables if name not in team.owner]
+    if missing:
+        message = f"the variable {quoted(missing[0])}, which other robots need, is missing"
+        raise ChangeError(message, "keep the variables that the robot had")
+    return _link_neighbours(team, robot.name)
+
+
+def _check_returning(team: Team, robot: Robot) -> None:
+    """Raise `ChangeError` unless `robot` can replace the robot of its name in `team`."""
+    before = team[robot.name]
+    added = {one.name for one in robot.parents if one.name in team} - {one.name for one in before.parents}
+    added |= {one.name for one in robot.children if one.name in team} - {one.name for one in before.children}
+    for name in added:
+        message = f"{quoted(robot.name)} lists {quoted(name)}, which was not such a neighbour before"
+        raise ChangeError(message, "list the neighbours that it had")
+    check_variables_free(team, robot)
+    if robot.kind is not team.kind:
+        raise ChangeError(f"{quoted(robot.name)} is a {robot.kind} in a team of {team.kind}", "write the same type")
+    parts = (part for child in robot.children for part in child.constraints)
+    secret = next((one for one in (*robot.shared, *parts) if one.model == ConstraintModel.PKC), None)
+    if secret:
+        message = f"{quoted(secret.name)} is partially known (PKC)"
+        raise ChangeError(message, "use TKC: the links of a robot that comes back change their direction")
+
+
+def _link_neighbours(team: Team, name: str) -> Team:
+    """Return `team`, in which `name` and its neighbours list each other, with the variables that constraints need."""
+    own = {variable.name for variable in team[name].variables}
+    for parent in team[name].parents:
+        for constraint in parent.constraints:
+            check_holder(team, name, parent.name, constraint)
+            for owner in {team.owner[term] for term in constraint.variables} - {name}:
+                team = link(team, name, owner, tuple(t for t in constraint.variables if team.owner[t] == owner))
+    for other in team.robots:
+        if any(child.name == name for child in other.children):
+            team = link(team, name, other.name, ())
+        if any(parent.name == name for parent in other.parents):
+            needed = dict.fromkeys(term for constraint in other.shared for term in constraint.variables if term in own)
+            team = link(team, other.name, name, tuple(needed))
+    return team

@@ -1,19 +1,18 @@
 """Variables with their domains, and constraints as data: in extension, and in intension (predicates, functions).
 
-Costs are integers in the unit of their robot's `CostUnits` (`model/costs.py`), or `INFINITE`: a hard constraint that is
-broken, whether costs are minimised or maximised. They may be negative; what protocols work on has been normalised.
+Costs are integers in the unit of their robot's `CostUnits` (`model/costs.py`), or `INFINITE` for violated hard
+constraints, whether costs are minimised or maximised. They may be negative; protocols get normalised costs.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cached_property
 
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate
-from robochoc.model.ranges import merge_ranges
 
 Assignment = Mapping[str, int]
 """Values of variables, by name."""
@@ -36,9 +35,9 @@ class ConstraintModel(StrEnum):
 
 
 class WhenAbsent(StrEnum):
-    """The meaning of a constraint when a robot is absent, where its author has chosen one (`model/absence.py`).
+    """The meaning of a constraint when a robot is absent, if its author has chosen one (`model/absence.py`).
 
-    It is restated for the robots that stay, it is dropped, or it counts as broken.
+    It is restated for the robots that stay, dropped, or counted as violated.
     """
 
     RESTATE = "restate"
@@ -63,8 +62,8 @@ class Domain:
     Attributes:
         name: Its name.
         ranges: The values.
-        symbols: Of a symbolic domain: the names of all symbols of the team; the value 2 stands for `symbols[2]`. All
-            symbolic domains of a team have the same `symbols`, so that equal values are equal names.
+        symbols: The names of all symbols of the team, if the domain is symbolic: the value 2 means `symbols[2]`. All
+            symbolic domains of a team have the same `symbols`, so that equal values have equal names.
     """
 
     name: str
@@ -85,7 +84,7 @@ class Domain:
         return any(value in part for part in self.ranges)
 
     def label(self, value: int) -> int | str:
-        """Return `value` as its user wrote it: its name where the domain is symbolic."""
+        """Return `value`, or its name if the domain is symbolic."""
         return self.symbols[value] if 0 <= value < len(self.symbols) else value
 
 
@@ -104,7 +103,7 @@ class Relation:
     Attributes:
         name: Its name.
         arity: The length of each tuple.
-        semantics: What the tuples mean.
+        semantics: The meaning of the tuples.
         tuples: The tuples.
         costs: The cost of each tuple. Empty unless the semantics is `soft`.
         default_cost: The cost of the tuples that a soft relation does not list.
@@ -127,7 +126,7 @@ class Relation:
 
     @property
     def prices(self) -> tuple[Mapping[tuple[int, ...], float], float]:
-        """The costs of the tuples that are listed, and that of all others: 0 or `INFINITE` unless it is soft."""
+        """The costs of the listed tuples, and the cost of all others: 0 or `INFINITE` unless the relation is soft."""
         match self.semantics:
             case Semantics.SUPPORTS:
                 return self._listed, INFINITE
@@ -146,7 +145,7 @@ class Relation:
 class Predicate:
     """A constraint's definition in intension: a Boolean expression over formal `parameters`.
 
-    They are integers; those in `symbolic` are symbols, and so are constants that they are compared with.
+    The parameters are integers, except that those in `symbolic`, and constants compared with them, are symbols.
     """
 
     name: str
@@ -164,10 +163,10 @@ class Predicate:
 
 @dataclass(frozen=True)
 class GlobalPredicate(Predicate):
-    """A global constraint of XCSP 2.1; its body is what it says (`formats/global_constraints.py` makes both).
+    """A global constraint of XCSP 2.1, with an equivalent body (`formats/global_constraints.py` creates both).
 
     Attributes:
-        form: Its parameters as they are written, formal ones for variables: `[ { 1 X0 } { -1 X1 } ] <le/> 3`.
+        form: Its parameters in XCSP 2.1, with formal parameters for variables: `[ { 1 X0 } { -1 X1 } ] <le/> 3`.
     """
 
     form: str = ""
@@ -177,8 +176,8 @@ class GlobalPredicate(Predicate):
 class Function:
     """A constraint's definition in intension whose value is its cost: an integer expression over `parameters`.
 
-    The value counts whole units of the user (`CostUnits.places` does not move its point). As in a predicate, parameters
-    in `symbolic` are symbols.
+    The value is in whole units of the user (`CostUnits.places` does not scale it). As in a predicate, parameters in
+    `symbolic` are symbols.
     """
 
     name: str
@@ -187,7 +186,7 @@ class Function:
     symbolic: tuple[str, ...] = ()
 
     def cost(self, arguments: Sequence[int]) -> float:
-        """Return the cost of `arguments`. Where the body is undefined (division by zero) it is `INFINITE`."""
+        """Return the cost of `arguments`: `INFINITE` if the body is undefined (division by zero)."""
         try:
             return evaluate(self.body, dict(zip(self.parameters, arguments, strict=True)))
         except UndefinedValueError:
@@ -195,7 +194,7 @@ class Function:
 
 
 Definition = Relation | Predicate | Function
-"""What a constraint says of its terms."""
+"""The definition of a constraint."""
 
 
 @dataclass(frozen=True)
@@ -207,10 +206,10 @@ class Constraint:
         definition: The relation, predicate or function.
         scope: The variables and constants.
         parameters: The actual parameters of a predicate. For a relation they equal `scope`.
-        model: How much robots know of a shared constraint. None: the constraint is private.
+        model: The robots' knowledge of a shared constraint. None: the constraint is private.
         cost: The cost of violating a predicate, in a DisWCSP. `INFINITE`: a hard constraint.
         line: The line of the file that it was read from.
-        offset: What was taken out of each of its costs, so that none is negative (`model/costs.py`).
+        offset: The number that was subtracted from each of its costs, so that none is negative (`model/costs.py`).
         when_absent: Its meaning when a robot is absent. None: as its form implies.
         original: The original form of a constraint that was restated for the robots that stay.
         absent: The variables of `original` whose robots are absent.
@@ -245,3 +244,26 @@ class Constraint:
     def allows(self, assignment: Assignment) -> bool:
         """Return whether the cost of `assignment` is finite."""
         return self.price(assignment) < INFINITE
+
+
+def merge_ranges(ranges: tuple[range, ...]) -> tuple[range, ...]:
+    """Return `ranges` with adjacent ranges merged. Invalid ranges (overlapping, empty, with a step) stay unchanged."""
+    together: list[range] = []
+    for part in ranges:
+        before = together[-1] if together else range(0)
+        if before and part and before.step == part.step == 1 and before.stop == part.start:
+            together[-1] = range(before.start, part.stop)
+        else:
+            together.append(part)
+    return ranges if len(together) == len(ranges) else tuple(together)
+
+
+def united_ranges(ranges: Iterable[range]) -> tuple[range, ...]:
+    """Return the disjoint ascending ranges of all integers in `ranges`, which have no step and may overlap."""
+    together: list[range] = []
+    for part in sorted(filter(None, ranges), key=lambda one: one.start):
+        if together and part.start <= together[-1].stop:
+            together[-1] = range(together[-1].start, max(together[-1].stop, part.stop))
+        else:
+            together.append(part)
+    return tuple(together)

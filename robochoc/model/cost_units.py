@@ -1,4 +1,4 @@
-"""The unit of a team's costs: users write decimals, may maximise, and add a constant; inside, costs are integers."""
+"""The unit of a team's costs: decimals of the user, perhaps maximised and with a constant, are integers internally."""
 
 from __future__ import annotations
 
@@ -10,16 +10,16 @@ MAX_PLACES = 9
 """The maximum number of decimal places of a cost."""
 
 Cost = int | Decimal
-"""A cost as it is told to the user: exact, and an integer where the team's costs have no decimal places."""
+"""A cost in the user's units: exact, and an integer if the team's costs have no decimal places."""
 
 
 @dataclass(frozen=True)
 class CostUnits:
-    """The unit of costs, and what is done with their sum.
+    """The unit of costs, and the objective.
 
     Attributes:
         maximize: Whether the sum is maximised. Otherwise it is minimised.
-        places: The decimal places of the costs: with 3, an integer cost of 1 is 0.001 to the user.
+        places: The decimal places of the costs: with 3, an integer cost of 1 is 0.001 for the user.
         constant: An integer that is added to the sum, in the same unit.
     """
 
@@ -28,13 +28,13 @@ class CostUnits:
     constant: int = 0
 
     def in_user_units(self, total: float) -> Cost:
-        """Return `total`, an integer number of these units without the constant, in the user's numbers."""
-        whole = int(total) + self.constant
-        return Decimal(whole).scaleb(-self.places) if self.places else whole
+        """Return `total`, a number of these units without the constant, in the user's units with the constant."""
+        cost = int(total) + self.constant
+        return Decimal(cost).scaleb(-self.places) if self.places else cost
 
 
 def cost_shown(cost: Cost | float) -> str:
-    """Return a cost for people: all its digits, never `1.5E-8`, nor `2.0`; thousands have commas between them."""
+    """Return a cost as text for people: all its digits, with commas for thousands, never `1.5E-8` nor `2.0`."""
     if isinstance(cost, float) and cost.is_integer():
         return f"{int(cost):,}"
     return f"{cost:,f}" if isinstance(cost, Decimal) else f"{cost:,}"

@@ -1,9 +1,9 @@
-"""Normalised costs: what protocols and solvers work on has integer costs of 0 or more, whose sum is minimised.
+"""Normalised costs: protocols and solvers work on integer costs of 0 or more, whose sum is minimised.
 
-Users write decimals, negative costs and utilities that are maximised. `normalized` turns such a team into one of the
-same solutions and the same order among them: utilities change their sign, functions are counted in the team's unit, and
-the least cost of a constraint that has negative ones is taken out of it (`Constraint.offset`). `user_cost` turns a sum
-of normalised costs back into the user's number. All of this is integer arithmetic, so nothing is rounded.
+Users write decimals, negative costs and utilities that are maximised. `normalized` converts such a team to one with the
+same solutions in the same order: utilities change their sign, functions are scaled to the team's unit, and the minimum
+cost of a constraint with negative costs is subtracted from its costs (`Constraint.offset`). `user_cost` converts a sum
+of normalised costs back to the user's number. All of this is integer arithmetic, so nothing is rounded.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from robochoc.model.constraint import (
     Predicate,
     Relation,
     Semantics,
+    united_ranges,
 )
 from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits, common_units
 from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Robot, ScenarioEvent, Team
-from robochoc.model.ranges import united_ranges
 from robochoc.system.errors import RobochocError
 
 MAX_TRIED = 4096
@@ -38,18 +38,18 @@ Domains = Mapping[str, Domain]
 
 
 class UnboundedCostError(RobochocError, ValueError):
-    """Nothing bounds the cost of a function: the domain of a variable is not known here."""
+    """The cost of a function has no bounds, because the domain of a variable is unknown."""
 
 
 def normalized(team: Team) -> Team:
-    """Return `team` with integer costs of 0 or more that are minimised; `user_units` says how to tell them.
+    """Return `team` with integer costs of 0 or more that are minimised, and the user's units in `user_units`.
 
-    A team that is so already is returned as it is.
+    A team with such costs is returned unchanged.
 
     Raises:
-        UnboundedCostError: if nothing bounds a function's cost.
+        UnboundedCostError: if the cost of a function has no bounds.
     """
-    if not any(map(_needs_it, [*team.robots, *_joining(team)])):
+    if not any(map(_needs_normalizing, [*team.robots, *_joining(team)])):
         return team
     units = common_units(robot.costs for robot in team.robots)
     domains = _domains(team)
@@ -67,8 +67,7 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
     Args:
         robot: The robot.
         units: The units of its team.
-        domains: The domains of variables, as far as they are known. A function over others must say its bounds in its
-            expression.
+        domains: The known domains of variables. The expression of a function over other variables must imply bounds.
 
     Raises:
         UnboundedCostError: if it does not.
@@ -91,7 +90,7 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
 
 
 def normalized_constraint(constraint: Constraint, units: CostUnits, domains: Domains, finer: int = 1) -> Constraint:
-    """Return `constraint` with costs of 0 or more. See `normalized_robot`; its costs count `finer` of the team's."""
+    """Return `constraint` with costs of 0 or more. Its unit of costs is `finer` units of the team."""
     sign = -1 if units.maximize else 1
     match constraint.definition:
         case Relation(semantics=Semantics.SOFT) as relation:
@@ -117,7 +116,7 @@ def user_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
 
 
 def flat_units(team: Team) -> CostUnits:
-    """Return the units of a normalised `team`, with what was taken out of its costs in the constant."""
+    """Return the user's units of a normalised `team`, with the offsets of its constraints in the constant."""
     sign = -1 if team.user_units.maximize else 1
     return replace(team.user_units, constant=team.user_units.constant + sign * _taken_out(team))
 
@@ -129,10 +128,10 @@ def _taken_out(team: Team, without: Collection[str] = ()) -> int:
 
 
 def normalized_joining(team: Team, robot: Robot) -> Robot:
-    """Return `robot`, as its file says now, for a normalised `team` that it joins, or comes back to.
+    """Return `robot`, from its present file, with normalised costs for a `team` that it joins or rejoins.
 
     Raises:
-        UnboundedCostError: if nothing bounds a function's cost, or a function that others hold is bounded for other
+        UnboundedCostError: if the cost of a function has no bounds, or a function of another robot is bounded for other
             values than the robot's variables have now.
     """
     before = _domains(team)
@@ -142,15 +141,15 @@ def normalized_joining(team: Team, robot: Robot) -> Robot:
     wider = {name for name in own if name in before and len(domains[name]) > len(before[name])}
     for constraint in _held_by_others(team, robot.name):
         if isinstance(constraint.definition, Function) and (new := wider.intersection(constraint.variables)):
-            raise UnboundedCostError(f"{min(new)} has new values, and others have functions for the values it had")
+            raise UnboundedCostError(f"{min(new)} has new values, but functions of others are bounded for the old ones")
     return normalized_robot(robot, team.user_units, domains)
 
 
 def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
-    """Return `event`, which nobody knew of before, for a normalised `team`.
+    """Return `event`, which is not in the scenario, with normalised costs for a `team`.
 
     Raises:
-        UnboundedCostError: if nothing bounds the cost of a function in it, or a value is added to a variable whose
+        UnboundedCostError: if the cost of a function in it has no bounds, or a value is added to a variable whose
             functions are bounded for its present values.
     """
     domains = _domains(replace(team, scenario=(event,)))
@@ -160,15 +159,15 @@ def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
             for constraint in team.constraints()
         ):
             raise UnboundedCostError(
-                f"the value {change.value} is new to {change.variable}, whose costs are functions: their bounds are"
-                " those of the values that the files and the scenario name"
+                f"the value {change.value} of {change.variable} is new, but its functions are bounded for the values in"
+                " the files and the scenario only"
             )
     changes = tuple(_normalized_change(change, team.user_units, domains) for change in event.changes)
     return replace(event, changes=changes)
 
 
-def _needs_it(robot: Robot) -> bool:
-    """Return whether the costs of `robot`, which may be normalised already, are not."""
+def _needs_normalizing(robot: Robot) -> bool:
+    """Return whether the costs of `robot` are not normalised yet."""
     if robot.user_units != PLAIN_COSTS:
         return False
     return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, robot.constraints()))
@@ -190,7 +189,7 @@ def _joining(team: Team) -> list[Robot]:
 
 
 def _held_by_others(team: Team, name: str) -> Iterable[Constraint]:
-    """Yield the constraints that robots but `name` hold, now or after some event."""
+    """Yield the constraints of all robots except `name`, now or after some event."""
     for robot in [*team.robots, *_joining(team)]:
         if robot.name != name:
             yield from robot.constraints()
@@ -201,7 +200,7 @@ def _held_by_others(team: Team, name: str) -> Iterable[Constraint]:
 
 
 def _domains(team: Team) -> dict[str, Domain]:
-    """Return the domains of all variables: all values that they ever have, those that the scenario brings included."""
+    """Return the domains of all variables, with the values that the scenario adds."""
     domains = {name: variable.domain for name, variable in team.variables.items()}
     for event in team.scenario:
         for change in event.changes:
@@ -213,7 +212,7 @@ def _domains(team: Team) -> dict[str, Domain]:
 
 
 def _widen(domains: dict[str, Domain], robot: Robot) -> None:
-    """Add the domains of `robot`: a robot that has left may come again with others."""
+    """Add the domains of `robot`: a robot that has left may rejoin with other values."""
     for variable in robot.variables:
         domains.setdefault(variable.name, variable.domain)
         _add(domains, variable.name, variable.domain.ranges)
@@ -249,7 +248,7 @@ def _scaled(cost: float, factor: int) -> float:
 
 
 def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> Constraint:
-    """Return a predicate of this `cost`; of a negative one: that it costs something where it holds."""
+    """Return a predicate with this `cost`; for a negative cost, a function that is positive if the predicate holds."""
     if cost >= 0:
         return replace(constraint, cost=cost)
     body = Apply("if", (predicate.body, Constant(-cost), Constant(0)))
@@ -258,7 +257,7 @@ def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> 
 
 
 def _with_function(constraint: Constraint, function: Function, factor: int, domains: Domains) -> Constraint:
-    """Return a function whose expression alone says its bounds: from 0 to the most that values of `domains` cost."""
+    """Return a function with bounds in its expression: from 0 to the maximum cost of values in `domains`."""
     body = function.body if factor == 1 else Apply("mul", (Constant(factor), function.body))
     least, most = _bounds(constraint, body, function.parameters, domains)
     if least < 0:
@@ -273,7 +272,7 @@ def _with_function(constraint: Constraint, function: Function, factor: int, doma
 
 
 def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...], domains: Domains) -> tuple[int, int]:
-    """Return the least and the greatest cost of a function, or bounds of them."""
+    """Return the minimum and the maximum cost of a function, or bounds of these."""
     names = constraint.variables
     if len(names) > 1 and can_be_restated(constraint):  # its costs for fewer robots may differ
         low, high = bounds(body, defaultdict(lambda: ANY_INTEGER))
@@ -290,7 +289,7 @@ def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...
     if math.isinf(low) or math.isinf(high):
         unknown = " and ".join(name for name in names if name not in domains)
         raise UnboundedCostError(
-            f"nothing bounds the cost of {constraint.name} here, where the domain of {unknown} is not known; write"
+            f"the cost of {constraint.name} has no bounds, because the domain of {unknown} is unknown here; write"
             " bounds into the function: max(0, min(..., 100))"
         )
     return int(low), int(high)

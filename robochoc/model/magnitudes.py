@@ -1,7 +1,7 @@
-"""Limits of the numbers that constraints compute, for all values of their variables.
+"""Check that constraints compute no numbers that are too large, for all values of their variables.
 
 Expressions are evaluated within +-2**63 (`model/expression`); beyond that, a constraint would be violated and a cost
-would forbid, which the author did not intend. Costs have 18 digits at most, so that they stay within 64 bits when they
+would forbid, which the author did not intend. Costs have at most 18 digits, so that they stay within 64 bits when they
 are converted to the team's unit and normalised (`model/costs.py`). Interval arithmetic finds possible excesses; if
 there are few combinations of values, all are tried, and only actual excesses count.
 """
@@ -148,7 +148,7 @@ def _renamed(expression: Expression, actual: Mapping[str, Actual]) -> Expression
 
 
 def _in_digits(number: float) -> str:
-    """Return a number with all digits, or as a power of ten if there are very many."""
+    """Return a number with all its digits, or as a power of ten if it is very long."""
     if number in {math.inf, -math.inf}:
         return f"{'-' if number < 0 else ''}10^1000 and more"
     digits = str(number)

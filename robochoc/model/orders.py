@@ -1,11 +1,11 @@
-"""Total priority orders, and teams turned around to follow them (`robochoc solve --order`).
+"""Total priority orders, and teams with other priorities (`robochoc solve --order`).
 
-The files of a team say who ranks above whom; how fast a protocol is depends on it. The static orders are those that
+The files of a team define the priorities, on which the speed of a protocol depends. The static orders are those that
 Dechter and Meiri compare ("Experimental evaluation of preprocessing algorithms for constraint satisfaction
 problems", AIJ 68, 1994, Section 3: minimum width, maximum degree, depth-first search), and dom/deg (Bessiere and
 Regin, "MAC and combined heuristics: two reasons to forsake FC (and CBJ?) on hard problems", CP 1996).
 
-Nothing here reads or writes: a team goes in, the same problem comes out with other links.
+The functions are pure: they return a team with the same problem and other links.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Graph = Mapping[str, frozenset[str]]
 
 
 class Order(StrEnum):
-    """Orders by name; ties are broken by natural name order. `given` is the order of the files."""
+    """The names of orders. Ties are broken by natural name order. `given` is the order of the files."""
 
     GIVEN = "given"
     LEXICOGRAPHIC = "lexicographic"
@@ -39,7 +39,7 @@ class Order(StrEnum):
 
 
 class OrderError(RobochocError):
-    """A team cannot follow an order. The message says why in one sentence."""
+    """A team cannot be reordered; the message is one sentence with the reason."""
 
 
 def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
@@ -47,7 +47,7 @@ def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -
 
     Args:
         team: The team.
-        order: The name of an order, or the names of all robots. None: the team as it is.
+        order: The name of an order, or the names of all robots. None: the team stays unchanged.
         seed: For the order `random`.
 
     Raises:
@@ -88,7 +88,7 @@ def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
 
 
 def with_dom_deg_order(team: Team) -> Team:
-    """Return `team` in the order `dom-deg`, in which a withdrawal is found soon. Teams that cannot follow it stay."""
+    """Return `team` in the order `dom-deg`, which finds withdrawals fast; unchanged if it cannot be reordered."""
     try:
         return with_order(team, Order.DOM_DEG)
     except OrderError:
@@ -96,7 +96,7 @@ def with_dom_deg_order(team: Team) -> Team:
 
 
 def constraint_graph(team: Team) -> Graph:
-    """Return the neighbours of each robot: those it shares a constraint with, and those that files link to it."""
+    """Return the neighbours of each robot: robots with which it shares a constraint, or is linked in the files."""
     near: dict[str, set[str]] = {robot.name: set() for robot in team.robots}
     for robot in team.robots:
         groups = [_owners(team, constraint) for constraint in robot.shared]
@@ -111,12 +111,12 @@ def constraint_graph(team: Team) -> Graph:
 
 
 def _lexicographic(graph: Graph) -> tuple[str, ...]:
-    """Return `Robot2.1` before `Robot10.1`."""
+    """Return the robots by natural name order: `Robot2.1` before `Robot10.1`."""
     return tuple(sorted(graph, key=natural_key))
 
 
 def _max_degree(graph: Graph) -> tuple[str, ...]:
-    """Return those with the most neighbours first."""
+    """Return the robots with the most neighbours first."""
     return tuple(sorted(graph, key=lambda name: (-len(graph[name]), natural_key(name))))
 
 
@@ -134,7 +134,7 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
     while waiting:
         degree, _, last = heapq.heappop(waiting)
         if last not in left or degree != len(left[last]):
-            continue  # it stands in the heap again, with fewer
+            continue  # the heap has another entry of this robot, with fewer neighbours
         for other in left.pop(last):
             left[other].discard(last)
             heapq.heappush(waiting, (len(left[other]), -place[other], other))
@@ -145,9 +145,9 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
 def _depth_first(graph: Graph) -> tuple[str, ...]:
     """Return the order in which a depth-first search visits the robots. It induces that search's pseudo-tree.
 
-    It begins with the robot that has the most neighbours, goes on to the neighbour that has the most, and begins
-    again in each part of the team that is not linked to those before. Pseudo-trees: Freuder and Quinn, "Taking
-    advantage of stable sets of variables in constraint satisfaction problems", IJCAI 1985.
+    It starts with the robot that has the most neighbours, continues with its neighbour that has the most, and starts
+    again in each further component of the graph. Pseudo-trees: Freuder and Quinn, "Taking advantage of stable sets of
+    variables in constraint satisfaction problems", IJCAI 1985.
     """
     by_degree = _max_degree(graph)
     place = {name: number for number, name in enumerate(by_degree)}
@@ -165,10 +165,10 @@ def _depth_first(graph: Graph) -> tuple[str, ...]:
 
 
 def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
-    """Return the smallest domain per neighbour first, those without neighbours last.
+    """Return the robots with the smallest domain per neighbour first, and those without neighbours last.
 
-    The domain is the declared one: of a robot with several variables, all combinations of their values. What its
-    private constraints leave of it is known only when it has been compiled.
+    The domain is the declared one; for a robot with several variables, all combinations of their values. The values
+    that its private constraints allow are known only after compilation.
     """
     from fractions import Fraction  # noqa: PLC0415 - start-up: no other order needs it
 
@@ -182,9 +182,9 @@ def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
 
 
 def _random(graph: Graph, seed: int) -> tuple[str, ...]:
-    """Return each order is as likely as any other.
+    """Return a random order, each as likely as any other.
 
-    Uses `Random.random` alone, which Python promises never to change.
+    Only `Random.random` is used, which Python promises never to change.
     """
     from random import Random  # noqa: PLC0415 - once imported, it draws a new state in each forked process
 
@@ -193,16 +193,16 @@ def _random(graph: Graph, seed: int) -> tuple[str, ...]:
     return tuple(sorted(lots, key=lambda name: (lots[name], natural_key(name))))
 
 
-# The team, turned around
+# The team with other priorities
 
 
 def with_priorities(team: Team, names: Sequence[str]) -> Team:
     """Return `team` with the priorities of `names`, highest first: the same constraints and solutions.
 
-    The robot of a totally known constraint's scope that is now the lowest holds it; the others are its parents. Links
-    without a constraint stay, and are reversed where necessary. Children know the variables that their constraints
-    need, and those that the files list where the link was not reversed. So the team is as its author would have written
-    it with these priorities. Robots that are not linked may stand in any order.
+    A totally known constraint moves to the robot of its scope that is now the lowest; the others are parents of that
+    robot. Links without a constraint stay, and are reversed if necessary. Children know the variables that their
+    constraints need, and those that the files list if the link was not reversed. So the team is as its author would
+    have written it with these priorities. Robots that are not linked may be in any order.
 
     Args:
         team: The team.
@@ -217,12 +217,12 @@ def with_priorities(team: Team, names: Sequence[str]) -> Team:
     if tuple(names) == team.order:
         return team
     if team.dynamic:
-        raise OrderError(f"{team.name} has a scenario.xml, which speaks of its links: it is solved in its given order")
+        raise OrderError(f"{team.name} has a scenario.xml, which refers to its links: solve it in the given order")
     return _Reordering(team, names).team()
 
 
 class _Reordering:
-    """A team that gets other priorities: its links, and the robots that hold its constraints."""
+    """The new links of a team with other priorities, and the new holders of its constraints."""
 
     def __init__(self, team: Team, names: Sequence[str]) -> None:
         self._old = team
@@ -241,21 +241,21 @@ class _Reordering:
         for name, above in self._parents.items():
             for parent in above:
                 self._children[parent].add(name)
-        # Readers of the files see the links only, and a constraint stands under the lowest parent that they see.
+        # Readers of files compute the order from the links, and expect a constraint under its lowest parent.
         self._seen = {name: place for place, name in enumerate(priority_order(self._parents))}
 
     def team(self) -> Team:
-        """Return the team that has been turned."""
+        """Return the team with the new priorities."""
         return replace(self._old, robots=tuple(map(self._robot, self._rank)))
 
     def _holder(self, robot: Robot, constraint: Constraint) -> str:
-        """Return the robot that holds `constraint` from now on. So far it was `robot`."""
+        """Return the new holder of `constraint`, which `robot` has held so far."""
         if constraint.model == ConstraintModel.PKC:
             return robot.name
         return max(_owners(self._old, constraint), key=self._rank.__getitem__)
 
     def _lasting_links(self) -> Iterator[tuple[str, str]]:
-        """Yield parent and child of each link that must stay, independent of totally known constraints."""
+        """Yield parent and child of each link that stays even without totally known constraints."""
         for robot in self._old.robots:
             needed = self._needed_before[robot.name]
             for parent in robot.parents:
@@ -264,10 +264,10 @@ class _Reordering:
                 if parts and self._rank[robot.name] < self._rank[parent.name]:
                     raise OrderError(
                         f"{robot.name} shares a partially known constraint (PKC, {parts[0].name}) with its parent"
-                        f" {parent.name}; such links are not turned: choose an order with {parent.name} before it"
+                        f" {parent.name}; such links are not reversed: choose an order with {parent.name} before it"
                     )
-                told = set(below.variables)
-                if parts or parent.name not in needed or told - needed[parent.name]:
+                listed = set(below.variables)
+                if parts or parent.name not in needed or listed - needed[parent.name]:
                     yield parent.name, robot.name
 
     def _robot(self, name: str) -> Robot:
@@ -287,17 +287,17 @@ class _Reordering:
                 for parent in self._listed(parents, self._parents[name])
             ),
             children=tuple(
-                self._told(old, children.get(child, Child(child)))
+                self._with_needed_variables(old, children.get(child, Child(child)))
                 for child in self._listed(children, self._children[name])
             ),
         )
 
     def _listed(self, before: Mapping[str, object], now: set[str]) -> list[str]:
-        """Return the names in `now`: those that were listed before in that order, and then the new ones by priority."""
+        """Return the names in `now`: those listed before in their old order, then the new names by priority."""
         return [*(name for name in before if name in now), *sorted(now - before.keys(), key=self._rank.__getitem__)]
 
-    def _told(self, robot: Robot, child: Child) -> Child:
-        """Return `child`, with the variables of `robot` that it receives from now on."""
+    def _with_needed_variables(self, robot: Robot, child: Child) -> Child:
+        """Return `child` with the variables of `robot` that it must know now."""
         needs_now = self._needed[child.name].get(robot.name, set())
         needed_before = self._needed_before[child.name].get(robot.name, set())
         kept = [name for name in child.variables if name in needs_now or name not in needed_before]

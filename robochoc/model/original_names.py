@@ -1,4 +1,4 @@
-"""Results in the names that a problem had in the files of another tool."""
+"""Convert teams and results to the names that robots and variables had in the files of another tool."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Outcome, P
 from robochoc.model.problem import Team
 
 _NAME = re.compile(r"[A-Za-z0-9_.]+")
-"""A name in what opened an epoch (`describe_change`)."""
+"""A name in the description of a change that opened an epoch (`describe_change`)."""
 
 
 def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
-    """Return `outcome` with the original `names` of robots and variables, which are given by those of the team."""
+    """Return `outcome` with the original `names` of robots and variables, given by their names in the team."""
     if not names:
         return outcome
     return replace(
@@ -35,8 +35,8 @@ def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:
 
     Args:
         team: The team.
-        names: The original names by those of the team. Without any, the team stays as it is.
-        events: How many events of its scenario have happened to the team that is returned.
+        names: The original names, by the names in the team. If empty, the team is returned unchanged.
+        events: The number of events of its scenario that have happened.
     """
     if not names:
         return team
@@ -56,7 +56,7 @@ def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:
 
 
 def robots_called(team: Team, names: Mapping[str, str]) -> dict[str, str]:
-    """Return the names that the robots of `team` have there, by these and by their original `names`."""
+    """Return the names of the robots of `team`, by these names and by their original `names`."""
     return {**{names.get(name, name): name for name in team.order}, **{name: name for name in team.order}}
 
 

@@ -10,7 +10,7 @@ from robochoc.system.errors import RobochocError
 
 
 class CycleError(RobochocError, ValueError):
-    """The relation *parent of* has a cycle; `cycle` lists its robots, each the parent of the next."""
+    """The parents of robots form a cycle; `cycle` lists its robots, each the parent of the next."""
 
     def __init__(self, cycle: Sequence[str]) -> None:
         super().__init__(" -> ".join((*cycle, cycle[0])))
@@ -18,7 +18,7 @@ class CycleError(RobochocError, ValueError):
 
 
 def natural_key(name: str) -> tuple[tuple[int, str], ...]:
-    """Return a key for natural order: `Robot2.1` before `Robot10.1`. Numbers compare by length first, however long."""
+    """Return a key for natural order: `Robot2.1` before `Robot10.1`. Numbers of any length are compared as text."""
     parts = re.split(r"0*([0-9]+)", name)
     return tuple((len(part) if place % 2 else 0, part) for place, part in enumerate(parts))
 
@@ -29,7 +29,7 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
     Parents that are not themselves keys are ignored.
 
     Raises:
-        CycleError: when there is no such order.
+        CycleError: if there is no such order.
     """
     waiting = {name: {parent for parent in above if parent in parents} for name, above in parents.items()}
     children: dict[str, list[str]] = {name: [] for name in parents}
@@ -52,7 +52,7 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
 
 
 def _a_cycle(waiting: Mapping[str, set[str]]) -> list[str]:
-    """Walk up through robots that wait for a parent; where the walk meets itself is a cycle."""
+    """Return a cycle: walk up from a robot through parents that have no place yet, until a robot is reached again."""
     walk = [min(waiting, key=natural_key)]
     place = {walk[0]: 0}
     while True:

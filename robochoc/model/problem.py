@@ -1,12 +1,12 @@
 """The problem a team solves, as data: the paper's tuple (A, X, D, C, psi) (Section 3.1).
 
 A `Team` is a set of `Robot` objects (A). Each owns variables (X) with domains (D): that is psi. Constraints (C) are
-*private* to a robot, or *shared* between robots. Domains, variables and constraints stand in `model/constraint.py`
-and can be imported from here.
+*private* to a robot, or *shared* between robots. Domains, variables and constraints are defined in
+`model/constraint.py`, and can be imported from here.
 
-These are plain data. `formats` makes them from XML, `solver` compiles them, `protocols` see only what was compiled.
-Values are integers; a symbolic domain knows their names. Costs are integers, in the unit that `Robot.costs` states, or
-`INFINITE`: a violated hard constraint.
+These are plain data. `formats` reads them from XML, `solver` compiles them, and `protocols` use only compiled problems.
+Values are integers, with names in symbolic domains. Costs are integers in the unit `Robot.costs`, or `INFINITE` for
+violated hard constraints.
 """
 
 from __future__ import annotations
@@ -72,15 +72,14 @@ __all__ = [
 ]
 
 Value = tuple[int | None, ...]
-"""A robot's value as others see it: the values of its interface variables, in the order of its file.
+"""A robot's value for its neighbours: the values of its interface variables, in the order of its file.
 
-In the left side of a nogood, and in the value that it rules out, None stands for a variable that does not matter:
-the nogood holds whatever that variable's value is, and so for every value of the robot that looks alike.
+In a nogood, None is the value of a variable that does not matter: the nogood holds for each of its values.
 """
 
 
 class ProblemKind(StrEnum):
-    """The kind of a team's problem: satisfaction (DisCSP), or the best sum of costs (DisWCSP)."""
+    """The kind of a team's problem: satisfaction (DisCSP), or optimisation of the sum of costs (DisWCSP, a DCOP)."""
 
     DISCSP = "DisCSP"
     DISWCSP = "DisWCSP"
@@ -88,7 +87,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic that a robot's decision is published under (ROS Layer unit).
+    """A topic on which a robot's decision is published (ROS Layer unit).
 
     `x`, `y`, `z` are the waypoint's position.
     """
@@ -118,8 +117,8 @@ class Child:
         variables: The robot's own variables that the child must know.
         constraints: The robot's parts of partially known constraints with the child.
         line: The line of the robot's file that lists the child.
-        copies: TKC constraints that the child holds, and the robot's file repeats. Across machines the robot checks
-            the answer with them too. They do not count when robots are compared, and are not written to files.
+        copies: Copies of TKC constraints of the child, in the robot's file. Across machines the robot checks the answer
+            with them too. They are ignored when robots are compared, and are not written to files.
     """
 
     name: str
@@ -131,7 +130,7 @@ class Child:
 
 @dataclass(frozen=True)
 class Robot:
-    """One agent: the contents of its own file, its only knowledge.
+    """One agent, with the contents of its file, its only knowledge.
 
     Attributes:
         name: Its name, unique in the team.
@@ -140,13 +139,12 @@ class Robot:
         private: Constraints on its own variables only.
         parents: Neighbours of higher priority, with the constraints that it shares with them.
         children: Neighbours of lower priority.
-        topics: Where its decisions are published.
+        topics: The topics of its decisions.
         file: The file that it was read from, if any.
-        shown: Variables that neighbours see although nothing else here says so: they stand in a parent's part of a
-            partially known constraint.
+        shown: Variables that neighbours see only because a parent's part of a partially known constraint has them.
         weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
-        costs: The unit of its costs, and whether their sum is minimised or maximised, as its file says.
-        symbols: The names of the team's symbols, where no domain of its own says them.
+        costs: The unit of its costs, and whether their sum is minimised or maximised.
+        symbols: The names of the team's symbols, if none of its domains is symbolic.
         user_units: Of a robot with normalised costs (`model/costs.py`): the units in which the user reads its costs.
     """
 
@@ -178,12 +176,12 @@ class Robot:
 
     @cached_property
     def symbol_table(self) -> tuple[str, ...]:
-        """The names of the team's symbols, as far as this robot knows: the value 2 stands for the one at place 2."""
+        """The names of the team's symbols: the value 2 means the symbol at index 2."""
         return next((one.domain.symbols for one in self.variables if one.domain.symbols), self.symbols)
 
     @cached_property
     def interface(self) -> tuple[str, ...]:
-        """The interface variables: own variables that neighbours see, in the order of `variables`."""
+        """The interface variables, which neighbours see, in the order of `variables`."""
         parts = (constraint for child in self.children for constraint in child.constraints)
         seen = {name for constraint in (*self.shared, *parts) for name in constraint.variables}
         seen.update(name for child in self.children for name in child.variables)

@@ -1,4 +1,4 @@
-"""Symbols: names that stand where integers do. Inside they are codes, the places in one table of the whole team."""
+"""Symbols: values that are names. Internally they are integer codes, indices of one table of the whole team."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ EITHER = ("eq", "ne", "neq")
 
 
 def symbol_table(robots: Iterable[Robot]) -> tuple[str, ...]:
-    """Return the names of a team's symbols; empty where there are none."""
+    """Return the names of a team's symbols."""
     return next((robot.symbol_table for robot in robots if robot.symbol_table), ())
 
 
 def symbolic_variables(team: Team) -> tuple[str, ...]:
-    """Return the variables of `team`, and of robots that its scenario adds, whose values stand for symbols."""
+    """Return the variables of `team`, and of robots that its scenario adds, whose values are symbols."""
     changes = [change for event in team.scenario for change in event.changes]
     robots = [*team.robots, *(change.robot for change in changes if isinstance(change, AddAgent))]
     return tuple(dict.fromkeys(one.name for robot in robots for one in robot.variables if one.domain.symbols))
 
 
 def with_marked_symbols(constraints: Iterable[Constraint], symbolic: Collection[str]) -> list[Constraint]:
-    """Return `constraints`, whose definitions say which of their parameters or columns are symbols.
+    """Return `constraints` with definitions in which the symbolic parameters or columns are marked.
 
     Args:
         constraints: The constraints.
@@ -45,7 +45,7 @@ def with_marked_symbols(constraints: Iterable[Constraint], symbolic: Collection[
 
 
 def with_table(robot: Robot, names: tuple[str, ...]) -> Robot:
-    """Return `robot`, whose symbolic domains have the table `names`; the robot itself where it has no such domain."""
+    """Return `robot` with the table `names` in its symbolic domains or, if it has none, in `Robot.symbols`."""
     if not names:
         return robot
     domains: dict[int, Domain] = {}
@@ -57,26 +57,27 @@ def with_table(robot: Robot, names: tuple[str, ...]) -> Robot:
 
 
 def with_table_everywhere(team: Team, names: tuple[str, ...]) -> Team:
-    """Return `team` with the table `names` of symbols, the robots that its scenario adds included."""
+    """Return `team` with the table `names` of symbols, also in the robots that its scenario adds."""
 
-    def of(change: Change) -> Change:
+    def converted(change: Change) -> Change:
         return AddAgent(with_table(change.robot, names)) if isinstance(change, AddAgent) else change
 
     if not names:
         return team
-    events = tuple(replace(event, changes=tuple(map(of, event.changes))) for event in team.scenario)
+    events = tuple(replace(event, changes=tuple(map(converted, event.changes))) for event in team.scenario)
     return replace(team, robots=tuple(with_table(robot, names) for robot in team.robots), scenario=events)
 
 
 def _marked(definition: Definition, places: tuple[int, ...]) -> Definition:
     if isinstance(definition, Relation):
         return replace(definition, symbolic=places) if definition.tuples else definition
-    if _takes_either(definition):
+    if _compares_any(definition):
         return definition
     return replace(definition, symbolic=tuple(definition.parameters[place] for place in places))
 
 
-def _takes_either(definition: Definition) -> bool:
+def _compares_any(definition: Definition) -> bool:
+    """Return whether `definition` is a predefined predicate for integers or symbols."""
     match definition:
         case Predicate(name=name, parameters=(one, other), body=Apply("eq" | "ne", (Name(left), Name(right)))):
             return name in EITHER and (left, right) == (one, other)

@@ -1,7 +1,4 @@
-"""Edits of a team that several changes are made of, and the checks that come with them.
-
-Nothing is changed in place: every function returns another team.
-"""
+"""Edits of a team that several changes share, with their checks. Every function returns another team."""
 
 from __future__ import annotations
 
@@ -13,15 +10,15 @@ from robochoc.model.problem import Child, Constraint, Parent, Robot, Team, WhenA
 from robochoc.system.errors import RobochocError
 
 MAX_SHOWN = 60
-"""The maximum number of characters of a name, or of a list, in a message."""
+"""The maximum length of a name, or of a list, in a message."""
 
 
 class ChangeError(RobochocError, ValueError):
-    """A change that the team as it stands cannot take: what is wrong, and what was expected.
+    """A change that is impossible for a team.
 
     Attributes:
-        message: What is wrong.
-        hint: What was expected.
+        message: The error.
+        hint: The next step.
         missing: The name that does not exist in the team, if that is the mistake.
         line: The line of the mistake in an added robot's file. 0: it is not in one line.
     """
@@ -70,7 +67,7 @@ def without_robots(team: Team, names: Iterable[str], *, with_files: bool = False
 
 
 class Absence:
-    """The constraints of `team` when the robots `absent` are not there.
+    """The constraints of `team` without the robots `absent`.
 
     Attributes:
         restated: Those that were restated for the robots that stay.
@@ -121,7 +118,7 @@ class Absence:
 
 
 def constraints_in_force(team: Team, absent: Collection[str]) -> list[Constraint]:
-    """Return the constraints of `team` that hold when the robots `absent` are not there."""
+    """Return the constraints of `team` that are in force without the robots `absent`."""
     return Absence(team, absent).in_force(team.constraints()) if absent else list(team.constraints())
 
 
@@ -184,22 +181,22 @@ def check_holder(team: Team, agent: str, parent: str, constraint: Constraint) ->
     """Raise `ChangeError` unless `agent` is the lowest robot of the scope, and `parent` the second lowest."""
     robot_named(team, agent), robot_named(team, parent)
     if agent == parent:
-        raise ChangeError(f"{quoted(agent)} is no parent of its own", "a shared constraint is one with another robot")
+        raise ChangeError(f"{quoted(agent)} cannot be its own parent", "share the constraint with another robot")
     for name in constraint.variables:
         check_variable(team, name)
     owners = {team.owner[name] for name in constraint.variables}
     what = quoted(constraint.name)
     if agent not in owners or parent not in owners:
-        message = f"the scope of {what} is not of {quoted(agent)} and {quoted(parent)}"
-        raise ChangeError(message, "name variables of both")
+        message = f"the scope of {what} lacks variables of {quoted(agent)} or {quoted(parent)}"
+        raise ChangeError(message, "add variables of both")
     *_, above, lowest = (name for name in team.order if name in owners)
     if (above, lowest) != (parent, agent):
-        hint = f"the lowest robot of its scope holds it, {quoted(lowest)}, under the next, {quoted(above)}"
-        raise ChangeError(f"{what} does not stand with {quoted(agent)} under {quoted(parent)}", hint)
+        hint = f"add it to the lowest robot of its scope, {quoted(lowest)}, under the second lowest, {quoted(above)}"
+        raise ChangeError(f"{what} does not belong to {quoted(agent)} under {quoted(parent)}", hint)
 
 
 def link(team: Team, child: str, parent: str, variables: tuple[str, ...]) -> Team:
-    """Return `team`, in which `parent` and `child` are linked. `parent` also shows `variables` to the child."""
+    """Return `team` with a link between `parent` and `child`. `parent` also shows `variables` to the child."""
     below, above = team[child], team[parent]
     if not any(one.name == parent for one in below.parents):
         below = replace(below, parents=(*below.parents, Parent(parent)))
@@ -215,7 +212,7 @@ def link(team: Team, child: str, parent: str, variables: tuple[str, ...]) -> Tea
 def check_variable(team: Team, variable: str) -> None:
     """Raise `ChangeError` unless a robot of `team` has `variable`."""
     if variable not in team.owner:
-        hint = "name a variable of the robots that are there"
+        hint = "name a variable of the robots in the team"
         raise ChangeError(f"no robot has the variable {quoted(variable)}", hint, missing=variable)
 
 
@@ -232,8 +229,8 @@ def robot_named(team: Team, name: str) -> Robot:
 
 
 def no_robot(name: str, line: int = 0) -> ChangeError:
-    """Return the error that there is no robot called `name`."""
-    hint = "name a robot that is there at that time"
+    """Return the error that the team has no robot called `name`."""
+    hint = "name a robot of the team at that time"
     return ChangeError(f"there is no robot {quoted(name)}", hint, missing=name, line=line)
 
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.names import BEYOND
 from robochoc.formats.symbols import check_symbol
-from robochoc.model.ranges import merge_ranges
+from robochoc.model.constraint import merge_ranges
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import exact, is_number, is_truth
 

@@ -23,13 +23,13 @@ from robochoc.model.change import (
     apply_changes,
     apply_possible_changes,
     describe_change,
+    rejoin,
     team_after_events,
 )
 from robochoc.model.costs import UnboundedCostError, normalized_joining
 from robochoc.model.orders import with_priorities
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
-from robochoc.model.rejoin import rejoin
 from robochoc.model.symbols import symbol_table
 from robochoc.model.team_edits import ChangeError, without_robots
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters

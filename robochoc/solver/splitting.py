@@ -152,7 +152,7 @@ class Split:
         if operator == "if" and _may_be_undefined(expression):
             raise NotSplitError  # the other argument may be undefined
         parts = [self._reduced(part) for part in expression.arguments]
-        if OPERATORS[operator].variadic and not OPERATORS[operator].whole:
+        if OPERATORS[operator].variadic and not OPERATORS[operator].takes_all:
             first, *others = parts
             together = [first]
             for part in others:

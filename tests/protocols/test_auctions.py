@@ -11,7 +11,7 @@ from random import Random
 import pytest
 
 from robochoc.generators.tasks import Skills, tasks
-from robochoc.model.allocation import Job, Worker, several
+from robochoc.model.allocation import TaskSpec, Worker, several_tasks
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import CostUnits
@@ -106,7 +106,9 @@ def test_with_loads_there_is_no_such_bound() -> None:
     """A robot with room for 3 is sold a task of load 3 for 10, and not three of load 1 for 9 each."""
     profits = (("A", {1: 10, 2: 9, 3: 9, 4: 9}), ("B", dict.fromkeys((1, 2, 3, 4), -1)))
     workers = [Worker(f"R{name}", name, name, profit, 3) for name, profit in profits]
-    variables, constraints = several(workers, {1: Job("1", 3), 2: Job("2"), 3: Job("3"), 4: Job("4")})
+    variables, constraints = several_tasks(
+        workers, {1: TaskSpec("1", 3), 2: TaskSpec("2"), 3: TaskSpec("3"), 4: TaskSpec("4")}
+    )
     team = assemble("loads", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
     protocols = (*BUNDLING, "dpop")
     costs = [solve(team, Options(protocol=name, runtime=Runtime.SIMULATOR)).cost for name in protocols]
@@ -195,7 +197,7 @@ def team_with(constraints: Sequence[tuple[Relation, str]]) -> Team:
 def crews(able: int) -> Team:
     """Return a team of `able` robots and a task that needs two."""
     workers = [Worker(f"R{name}", name, name, {1: 9}) for name in "ABC"[:able]]
-    variables, constraints = several(workers, {1: Job("1", robots=2)})
+    variables, constraints = several_tasks(workers, {1: TaskSpec("1", robots=2)})
     return assemble("crews", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
 
 

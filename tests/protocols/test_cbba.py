@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from robochoc.model.allocation import Job, Worker, assignment, several
+from robochoc.model.allocation import TaskSpec, Worker, assignment, several_tasks
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized
@@ -120,7 +120,7 @@ def test_what_is_not_said_again_is_as_the_sender_said_it_before() -> None:
 def two_robots(**worth: tuple[int, ...]) -> Team:
     """I and K, which can do the tasks 1, 2 and 3."""
     workers = [Worker(name, name, name, dict(enumerate(worth[name], 1))) for name in "IK"]
-    return allocation(several(workers, {task: Job(str(task)) for task in (1, 2, 3)}))
+    return allocation(several_tasks(workers, {task: TaskSpec(str(task)) for task in (1, 2, 3)}))
 
 
 def bundles(*standings: tuple[str, int] | None, **stamps: int) -> Bundles:
@@ -166,5 +166,5 @@ def test_a_bid_is_never_higher_than_the_last_one_of_the_bundle() -> None:
     """With a synergy of 5 the second task gains 11, more than the first one's 9, and the bid is 9."""
     for together, second in ((5, 9), (-5, 1)):
         workers = [Worker(name, name, name, {1: 9, 2: 6}, together={(1, 2): together}) for name in "IK"]
-        team = allocation(several(workers, {1: Job("1"), 2: Job("2")}))
+        team = allocation(several_tasks(workers, {1: TaskSpec("1"), 2: TaskSpec("2")}))
         assert started(robot_of(CBBA, team, "I")) == [("K", bundles(("I", 9), ("I", second), I=1))]

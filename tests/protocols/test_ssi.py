@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.model.allocation import Job, Worker, assignment, several
+from robochoc.model.allocation import TaskSpec, Worker, assignment, several_tasks
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized
@@ -27,7 +27,7 @@ def double(together: int) -> Team:
     """A and B do both tasks if they like: to A they are worth 9 and 6, and `together` besides."""
     pair = {(1, 2): together}
     workers = [Worker("A", "A", "A", {1: 9, 2: 6}, together=pair), Worker("B", "B", "B", {1: 1, 2: 1})]
-    variables, constraints = several(workers, {1: Job("1"), 2: Job("2")})
+    variables, constraints = several_tasks(workers, {1: TaskSpec("1"), 2: TaskSpec("2")})
     return normalized(assemble("t", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True)))
 
 

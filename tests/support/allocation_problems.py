@@ -8,7 +8,7 @@ from dataclasses import replace
 from random import Random
 from typing import NamedTuple
 
-from robochoc.model.allocation import Job, Worker, assignment, several
+from robochoc.model.allocation import TaskSpec, Worker, assignment, several_tasks
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
@@ -64,8 +64,8 @@ def random_allocation(
         workers.append(worker)
     if not any(worker.profit for worker in workers):
         return random_allocation(chance, dmg=dmg, model=model, simple=simple)
-    jobs = {task: Job(str(task), chance.randint(1, 3) if loads else 1) for task in range(1, tasks + 1)}
-    variables, constraints = assignment(workers) if single else several(workers, jobs)
+    jobs = {task: TaskSpec(str(task), chance.randint(1, 3) if loads else 1) for task in range(1, tasks + 1)}
+    variables, constraints = assignment(workers) if single else several_tasks(workers, jobs)
     units = CostUnits(maximize=True, places=chance.choice((0, 0, 2)))
     team = assemble("allocation", variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
     return Allocation(team, workers, model, dmg or not (loads or synergies))

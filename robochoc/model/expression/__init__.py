@@ -1,11 +1,11 @@
-"""Functional expressions: what a predicate says, as a tree (docs/reference/format.md; Figure 2).
+"""Functional expressions, the bodies of predicates and functions, as trees (docs/reference/format.md; Figure 2).
 
-The vocabulary is XCSP 2.1's. A text is parsed by hand and type-checked, never handed to `eval`; what is computed
-stays within 64 bits, so that no expression can use up the machine's memory; `model/magnitudes.py` refuses teams whose
-expressions may exceed that. `evaluate` walks the tree and `compile_expression` builds closures: two independent
-implementations of the same meaning, which the tests compare with each other.
+The operators are those of XCSP 2.1. A text is parsed and type-checked, never passed to `eval`. Results stay within 64
+bits, so that no expression can use up the machine's memory; `model/magnitudes.py` rejects teams whose expressions may
+exceed that. `evaluate` walks the tree and `compile_expression` builds closures: two independent implementations, which
+the tests compare with each other.
 
-All arguments of an operator are evaluated, whatever the others are; only `if` chooses. Booleans are 0 and 1.
+All arguments of an operator are evaluated, except those of `if`. Booleans are 0 and 1.
 """
 
 from robochoc.model.expression.closures import compile_expression

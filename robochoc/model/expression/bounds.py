@@ -19,7 +19,7 @@ class Interval(NamedTuple):
 
 
 ANY_INTEGER = Interval(-math.inf, math.inf)
-"""Nothing is known."""
+"""The interval of an unknown value."""
 
 
 def bounds(expression: Expression, limits: Mapping[str, Interval]) -> Interval:
@@ -48,7 +48,7 @@ class Excess(NamedTuple):
 
 
 def excess(expression: Expression, limits: Mapping[str, Interval]) -> Excess | None:
-    """Return a smallest part of `expression` that may have a result beyond +-`BOUND`, also on the way to its value.
+    """Return a smallest part of `expression` that may have a result, or an intermediate result, beyond +-`BOUND`.
 
     Args:
         expression: The expression.
@@ -71,7 +71,7 @@ def excess(expression: Expression, limits: Mapping[str, Interval]) -> Excess | N
 
 
 def _steps(operator: str, parts: list[Interval]) -> Iterator[Interval]:
-    """Yield the intervals of all results on the way to the value of an operator; that of its value is the last."""
+    """Yield the intervals of all intermediate results of an operator, and last that of its value."""
     match operator:
         case "if":
             yield _hull(*parts[1:])

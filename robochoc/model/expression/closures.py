@@ -1,6 +1,6 @@
 """Expressions as Python functions, for fast repeated checks of a constraint.
 
-It shares nothing with `operators`: that both agree is tested, and so each vouches for the other.
+The module shares no code with `operators`; tests compare their results.
 """
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Closure = Callable[[Sequence[int]], int]
 
 
 def compile_expression(expression: Expression, names: Sequence[str]) -> Closure:
-    """Return `expression` as a function of the values of `names`, in their order. It is faster than `evaluate`.
+    """Return `expression` as a function of the values of `names`, in their order, which is faster than `evaluate`.
 
-    The function raises `UndefinedValueError` where `evaluate` does.
+    The function raises `UndefinedValueError` as `evaluate` does.
 
     Raises:
         ValueError: if a name of the expression is not in `names`.

@@ -1,4 +1,4 @@
-"""The operators of XCSP 2.1, in one table, and what an expression made of them is worth."""
+"""The table of the operators of XCSP 2.1, and the evaluation of expressions."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def _remainder(dividend: int, divisor: int) -> int:
 
 
 def _power(base: int, exponent: int) -> int:
-    """Return the power. It is checked before it is computed: a power grows faster than memory."""
+    """Return the power. Its size is checked first: large powers would use up memory."""
     if exponent < 0:
         raise UndefinedValueError
     if abs(base) > 1 and exponent >= BOUND.bit_length():
@@ -58,11 +58,11 @@ class Operator(NamedTuple):
     gives: Type
     meaning: Callable[..., int]
     variadic: bool = False
-    """Two or more arguments: `meaning` folds them from the left, unless it takes them `whole`."""
+    """Whether it has two or more arguments: `meaning` folds them from the left, unless `takes_all`."""
     infix: str = ""
-    """The sign whose two operands it takes as its own when they are its only argument: `minus(i-j)`."""
-    whole: bool = False
-    """`meaning` takes all arguments at once."""
+    """A sign: if an infix term with it is the only argument, its operands are the arguments: `minus(i-j)`."""
+    takes_all: bool = False
+    """Whether `meaning` gets all arguments at once."""
 
 
 _I, _B = Type.INTEGER, Type.BOOLEAN
@@ -80,23 +80,23 @@ OPERATORS: dict[str, Operator] = {
     "min": Operator((_I, _I), _I, min, variadic=True),
     "max": Operator((_I, _I), _I, max, variadic=True),
     "dist": Operator((_I, _I), _I, lambda x, y: abs(x - y), infix="-"),
-    "eq": Operator((_I, _I), _B, _all_equal, variadic=True, whole=True),
+    "eq": Operator((_I, _I), _B, _all_equal, variadic=True, takes_all=True),
     "ne": Operator((_I, _I), _B, arithmetic.ne),
     "lt": Operator((_I, _I), _B, arithmetic.lt),
     "le": Operator((_I, _I), _B, arithmetic.le),
     "gt": Operator((_I, _I), _B, arithmetic.gt),
     "ge": Operator((_I, _I), _B, arithmetic.ge),
-    "in": Operator((_I, _I), _B, lambda x, *members: x in members, variadic=True, whole=True),
+    "in": Operator((_I, _I), _B, lambda x, *members: x in members, variadic=True, takes_all=True),
     "not": Operator((_B,), _B, arithmetic.not_),
     "and": Operator((_B, _B), _B, arithmetic.and_, variadic=True),
     "or": Operator((_B, _B), _B, arithmetic.or_, variadic=True),
     "xor": Operator((_B, _B), _B, arithmetic.xor, variadic=True),
-    "iff": Operator((_B, _B), _B, _all_equal, variadic=True, whole=True),
+    "iff": Operator((_B, _B), _B, _all_equal, variadic=True, takes_all=True),
     "imp": Operator((_B, _B), _B, lambda condition, consequence: not condition or consequence),
     "if": Operator((_B, _I, _I), _I, lambda condition, then, otherwise: then if condition else otherwise),
 }
 ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
-"""The paper's names for some of them."""
+"""The paper's names of some operators."""
 
 
 def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
@@ -119,6 +119,6 @@ def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
         case Apply(operator, arguments):
             values = [evaluate(argument, environment) for argument in arguments]
             meaning = OPERATORS[operator].meaning
-            if len(values) == 1 or OPERATORS[operator].whole:
+            if len(values) == 1 or OPERATORS[operator].takes_all:
                 return _bounded(int(meaning(*values)))
             return reduce(lambda left, right: _bounded(int(meaning(left, right))), values)

@@ -1,4 +1,4 @@
-"""The tree that a functional expression is, and its canonical text."""
+"""Trees of functional expressions, and their canonical text."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from enum import StrEnum
 from robochoc.system.errors import RobochocError
 
 BOUND = 2**63
-"""No result may lie beyond +-BOUND: it is undefined instead."""
+"""A result beyond +-BOUND is undefined."""
 
 
 class Type(StrEnum):
-    """The type of an expression's value. Names (formal parameters, variables) are integers, or symbols."""
+    """The type of an expression's value. Names (formal parameters, variables) are integers or symbols."""
 
     INTEGER = "integer"
     BOOLEAN = "Boolean"
@@ -47,11 +47,11 @@ Expression = Constant | Name | Apply
 
 
 class UndefinedValueError(RobochocError, ArithmeticError):
-    """The expression has no value here: a division by zero, a negative exponent, or a result out of bounds."""
+    """The expression has no value: a division by zero, a negative exponent, or a result out of bounds."""
 
 
 class ExcessiveValueError(UndefinedValueError):
-    """The expression, or a part of it, has a value beyond +-`BOUND`. Teams in which that can happen are refused."""
+    """The expression, or a part of it, has a value beyond +-`BOUND`. Teams in which that can happen are invalid."""
 
 
 SYMBOLIC = ("eq", "ne", "in")
@@ -59,12 +59,12 @@ SYMBOLIC = ("eq", "ne", "in")
 
 
 def text(expression: Expression, symbolic: Collection[str] = (), symbols: Sequence[str] = ()) -> str:
-    """Return `expression` in XCSP 2.1's functional form, which `parse` reads back: `ne(abs(sub(X,Y)),1)`.
+    """Return `expression` in XCSP 2.1's functional form, for `parse`: `ne(abs(sub(X,Y)),1)`.
 
     Args:
         expression: The expression.
-        symbolic: Its names that stand for symbols. What they are compared with is written as a symbol, `eq(X,'red')`.
-        symbols: The symbols, by their codes; a code that has none is written as it is.
+        symbolic: Its names that are symbols. Constants compared with them are written as symbols, `eq(X,'red')`.
+        symbols: The symbols, by their codes. Other codes are written as integers.
     """
     match expression:
         case Constant(value):
@@ -105,7 +105,7 @@ def _every_name(expression: Expression) -> Iterator[str]:
 
 
 def total(terms: Iterable[Expression]) -> Expression:
-    """Return the sum of integer `terms`: their number is free, that of the arguments of `add` is not."""
+    """Return the sum of any number of integer `terms`; `add` requires at least two."""
     given = tuple(terms)
     match given:
         case ():

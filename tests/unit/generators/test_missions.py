@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from robochoc.formats import check_team
 from robochoc.generators.tasks import DrawnTasks, Skills, Travel, drawn_tasks, tasks
 from robochoc.generators.tracking import Field, drawn_field, tracking
-from robochoc.model.allocation import Distance, way
+from robochoc.model.allocation import Distance, distance_between
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -139,5 +139,5 @@ def test_straight_ways_are_rounded_exactly(across: int, along: int, places: int)
         context.prec = 60
         exact = Decimal(across**2 + along**2).sqrt()
         rounded = exact.quantize(Decimal(1).scaleb(-places), ROUND_HALF_UP)
-    assert way((0, along), (across, 0), Distance.STRAIGHT, places) == rounded.scaleb(places)
-    assert way((0, along), (across, 0), Distance.STREETS, places) == (across + along) * 10**places
+    assert distance_between((0, along), (across, 0), Distance.STRAIGHT, places) == rounded.scaleb(places)
+    assert distance_between((0, along), (across, 0), Distance.STREETS, places) == (across + along) * 10**places

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.model.change import apply_changes, team_after_events
+from robochoc.model.change import apply_changes, rejoin, team_after_events
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -26,7 +26,6 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.model.rejoin import rejoin
 from robochoc.model.team_edits import ChangeError, without_robots
 from tests.support.cases import looped
 from tests.support.problems import team_of
@@ -105,19 +104,19 @@ def test_a_robot_can_come_again() -> None:
 @looped(
     ("robot", "message", "line"),
     [
-        (newcomer(name="RA"), "the robot 'RA' is there already", 0),
+        (newcomer(name="RA"), "the robot 'RA' is in the team already", 0),
         (newcomer(variable="A"), "the variable 'A' belongs to 'RA'", 0),
         (replace(newcomer(), kind=ProblemKind.DISWCSP), "'RE' is a DisWCSP in a team of DisCSP", 0),
         (replace(newcomer(), children=(Child("RA", line=7),)), "'RE' has the child 'RA'", 7),
         (newcomer(Parent("RX", line=8)), "there is no robot 'RX'", 8),
         (newcomer(Parent("RA", (replace(named_constraint("N", "B", "E"), line=9),))),
-         "'B' belongs to 'RB', which is no parent", 9),
+         "'B' belongs to 'RB', which is not a parent", 9),
         (newcomer(Parent("RA", (replace(named_constraint("N", "X", "E"), line=9),))), "no robot has the variable 'X'",
          9),
         (newcomer(Parent("RA"), Parent("RB", (replace(named_constraint("N", "A", "E"), line=9),))),
-         "the scope of 'N' is not of 'RE' and 'RB'", 9),
+         "the scope of 'N' lacks variables of 'RE' or 'RB'", 9),
         (newcomer(Parent("RA", (replace(named_constraint("N", "A", "B", "E"), line=9),)), Parent("RB")),
-         "'N' does not stand with 'RE' under 'RA'", 9),
+         "'N' does not belong to 'RE' under 'RA'", 9),
     ],
 )  # fmt: skip
 def test_a_robot_that_cannot_come(robot: Robot, message: str, line: int) -> None:
@@ -207,12 +206,15 @@ def test_both_parts_of_a_partially_known_constraint_go(sides: tuple[str, ...]) -
         (RemoveConstraint("RA", "RX", "C"), "there is no robot 'RX'"),
         (AddConstraint("RX", "RA", named_constraint("N", "A", "B")), "there is no robot 'RX'"),
         (AddConstraint("RB", "RX", named_constraint("N", "A", "B")), "there is no robot 'RX'"),
-        (AddConstraint("RB", "RB", named_constraint("N", "A", "B")), "'RB' is no parent of its own"),
+        (AddConstraint("RB", "RB", named_constraint("N", "A", "B")), "'RB' cannot be its own parent"),
         (AddConstraint("RB", "RA", named_constraint("N", "A", "X")), "no robot has the variable 'X'"),
-        (AddConstraint("RC", "RA", named_constraint("N", "A", "B")), "the scope of 'N' is not of 'RC' and 'RA'"),
-        (AddConstraint("RA", "RB", named_constraint("N", "A", "B")), "'N' does not stand with 'RA' under 'RB'"),
-        (AddConstraint("RB", "RA", named_constraint("N", "A", "B", "C")), "'N' does not stand with 'RB' under 'RA'"),
-        (AddConstraint("RC", "RA", named_constraint("N", "A", "B", "C")), "'N' does not stand with 'RC' under 'RA'"),
+        (
+            AddConstraint("RC", "RA", named_constraint("N", "A", "B")),
+            "the scope of 'N' lacks variables of 'RC' or 'RA'",
+        ),
+        (AddConstraint("RA", "RB", named_constraint("N", "A", "B")), "'N' does not belong to 'RA' under 'RB'"),
+        (AddConstraint("RB", "RA", named_constraint("N", "A", "B", "C")), "'N' does not belong to 'RB' under 'RA'"),
+        (AddConstraint("RC", "RA", named_constraint("N", "A", "B", "C")), "'N' does not belong to 'RC' under 'RA'"),
     ],
 )
 def test_constraints_that_cannot_come_or_go(change: Change, message: str) -> None:
@@ -286,13 +288,16 @@ def test_links_that_came_later_stay_when_a_robot_rejoins() -> None:
 @pytest.mark.parametrize(
     ("robot", "message"),
     [
-        (replace(triangle()["RD"], parents=(Parent("RA"),)), "'RD' names 'RA', which does not know it as such"),
-        (replace(triangle()["RD"], parents=(), children=(Child("RC"),)), "'RD' names 'RC', which does not know it"),
-        (newcomer(name="RD", variable="Z"), "the variable 'D' is gone, and others need it"),
+        (replace(triangle()["RD"], parents=(Parent("RA"),)), "'RD' lists 'RA', which was not such a neighbour before"),
+        (
+            replace(triangle()["RD"], parents=(), children=(Child("RC"),)),
+            "'RD' lists 'RC', which was not such a neighbour",
+        ),
+        (newcomer(name="RD", variable="Z"), "the variable 'D', which other robots need, is missing"),
         (newcomer(name="RD", variable="A"), "the variable 'A' belongs to 'RA'"),
         (
             replace(triangle()["RD"], parents=(Parent("RC", (named_constraint("N", "D", "A"),)),)),
-            "the scope of 'N' is not of 'RD' and 'RC'",
+            "the scope of 'N' lacks variables of 'RD' or 'RC'",
         ),
     ],
 )

@@ -8,8 +8,8 @@ from pathlib import Path
 from random import Random
 
 from robochoc.formats import read_robot, read_team, write_team
+from robochoc.model.change import rejoin
 from robochoc.model.problem import Domain, Robot, Team
-from robochoc.model.rejoin import rejoin
 from robochoc.model.team_edits import ChangeError, without_robots
 from tests.support.brute_force import solutions
 from tests.support.complex_changes import random_complex_changing_team

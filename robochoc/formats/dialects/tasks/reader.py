@@ -28,7 +28,15 @@ from robochoc.formats.dialects.tasks.entries import (
 from robochoc.formats.dialects.tasks.tours import TaskSet, TourSearch, round_length
 from robochoc.formats.symbols import check_symbol
 from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
-from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
+from robochoc.model.allocation import (
+    Distance,
+    TasksModel,
+    TaskSpec,
+    Worker,
+    assignment,
+    distance_between,
+    several_tasks,
+)
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team, Variable
@@ -189,7 +197,7 @@ class _TeamBuilder:
             variables, constraints = assignment(workers, (NONE, *read.tasks))
         else:
             jobs = {self._number[name]: self._job(name, task, workers) for name, task in read.tasks.items()}
-            variables, constraints = several(workers, jobs)
+            variables, constraints = several_tasks(workers, jobs)
         if not variables:
             raise MistakeError("no robot can do any of the tasks", "check skills, needs, loads and deadlines")
         _check_names(variables)
@@ -237,12 +245,12 @@ class _TeamBuilder:
         hurries = any(entry.deadline is not None for entry in placed.values())
         return {tasks: round_length(length, self._scale.places) for tasks, length in lengths.items()}, hurries
 
-    def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> Job:
+    def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> TaskSpec:
         able = sum(self._number[name] in one.profit for one in workers)
         if task.robots > 1 and able > MAX_CREW:
             what = f"the task '{shortened(name)}' requires {task.robots} robots, and {able} robots can do it"
             raise MistakeError(what, f"use needs: so that at most {MAX_CREW} robots can do it", task.line)
-        return Job(self._task_names.allowed(name), task.load, task.robots)
+        return TaskSpec(self._task_names.allowed(name), task.load, task.robots)
 
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
         """Return the names in the file, by the names in the team where the two differ."""
@@ -283,4 +291,4 @@ class _TeamBuilder:
         return int(worth) // entry.robots - way
 
     def _way(self, start: Point, end: Point, places: int) -> int:
-        return way(start, end, self._read.distance, places) if start and end else 0
+        return distance_between(start, end, self._read.distance, places) if start and end else 0

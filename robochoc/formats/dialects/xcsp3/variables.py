@@ -13,8 +13,8 @@ from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.xcsp3.document import ignore_remarks
 from robochoc.formats.dialects.xcsp3.expressions import integer, span, words_of
 from robochoc.formats.element_view import ElementView
+from robochoc.model.constraint import merge_ranges
 from robochoc.model.problem import Domain
-from robochoc.model.ranges import merge_ranges
 
 MAX_VARIABLES = 100_000
 """The maximum number of variables, and of variables in one list."""
