@@ -59,8 +59,8 @@ class ImportResult:
         dialect: The name of the dialect.
         names: The original names of robots and variables, by their names in the team, where the two differ.
         notes: The differences from the files: `renamed`, `scale`, `shared variable`, ...
-        bound: The cost from which on the format counts an assignment as no solution (maximising: down from which).
-            None: the format has no such bound, or the team cannot reach it.
+        bound: A cost that solutions in this format do not reach. None: the format has no such bound, or no assignment
+            of the team reaches it.
     """
 
     team: Team
@@ -117,7 +117,7 @@ class Dialect:
 
 
 class NameMap:
-    """Maps names of other tools to unique names that are valid in a team. A valid name stays as it is."""
+    """Maps names of other tools to unique names that are valid in a team. Valid names are kept."""
 
     def __init__(self) -> None:
         self._taken: dict[str, str] = {}

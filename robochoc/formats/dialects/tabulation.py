@@ -89,7 +89,7 @@ class Tabulator:
 
 
 def tabulate(team: Team) -> tuple[list[TabulatedConstraint], Fraction]:
-    """Return the constraints of a team that has not been normalised as tables, and its constant cost.
+    """Return the tables of all constraints, and the constant cost, of a team that has not been normalised.
 
     Raises:
         UnsupportedError: if a constraint is too large for a table.

@@ -287,7 +287,7 @@ class _Compiler:
             return lambda _: value
         if name not in self._variables and name not in self._stored:
             if name in FUNCTIONS:
-                raise MistakeError(f"the function '{name}' has no arguments", "write its arguments in parentheses")
+                raise MistakeError(f"the function '{name}' is used as a value", "call it: write its arguments")
             hint = suggestion(name, sorted({*self._variables, *self._stored}), "variables")
             raise MistakeError(f"the function contains '{shortened(name)}', which is not a variable", hint)
         return lambda names: names[name]

@@ -1,4 +1,4 @@
-"""Functions of pyDCOP's files as predicates and functions of ours, where they are simple: cheaper than tables."""
+"""Translate simple functions of pyDCOP's files to predicates and functions, which are cheaper than tables."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.parser import MAX_DEPTH
 
 _LARGEST = 2**62
-"""No result on the way may lie beyond it: ours are undefined from 2**63 on, Python's are not."""
+"""The limit of all intermediate results: robochoc's values are undefined from 2**63 on, unlike Python's."""
 _MAX_PARTS = 1000
 _NEGATION = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}

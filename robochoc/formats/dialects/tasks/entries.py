@@ -108,7 +108,7 @@ class EntryReader:
             return default
         value = node.scalar
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST:
-            raise self._mistake(key, node, f"write a whole number from {least} to {MOST}")
+            raise self._mistake(key, node, f"write an integer from {least} to {MOST}")
         return value
 
     def flag(self, key: str) -> bool:

@@ -72,7 +72,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
                 raise MistakeError(
                     f"is a list of tasks, whose import does not support --{option}", f"leave out --{option}"
                 )
-        found = _TeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
+        found = _TaskTeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
     mistakes.finish()
     if found is None:
         raise InvalidInputError([])
@@ -172,7 +172,7 @@ def _check_names(variables: Mapping[str, Sequence[Variable]]) -> None:
             names[one.name] = robot
 
 
-class _TeamBuilder:
+class _TaskTeamBuilder:
     """Builds the team of a list. Tasks are numbered from 1, in the order of the file."""
 
     def __init__(self, read: _TaskList) -> None:

@@ -146,7 +146,7 @@ class _TeamBuilder:
     # Constraints
 
     def _constraints(self, one: ForeignConstraint) -> Iterator[tuple[str, Constraint]]:
-        """Yield the constraints for one constraint, each with the only robot that knows it, or an empty text."""
+        """Yield the team's constraints for a constraint of the file, each with the only robot that knows it, or ""."""
         if isinstance(one.content, AsymmetricTable):
             yield from self._asymmetric_parts(one, one.content)
             return

@@ -14,7 +14,7 @@ from robochoc.formats.element_view import ElementView
 from robochoc.model.expression import Apply, Constant, Expression, names
 
 MAX_TOGETHER = 10_000
-"""The combinations of values of a list from which on its extremum or number of values gets auxiliary variables."""
+"""A list with more combinations of values gets auxiliary variables for its extremum or number of values."""
 
 _BOUND = "the bound that the objective minimises or maximises"
 _USED = "whether a value is used; the objective minimises the number of used values"

@@ -1,4 +1,4 @@
-"""Reads XCSP3 instances: variables, constraints with their groups and slides, and the objective."""
+"""Read XCSP3 instances: variables, constraints with their groups and slides, and the objective."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ KINDS: Mapping[str, Kind] = {
 
 _SYMBOLIC = {"intension", "extension", "allDifferent", "allEqual", "instantiation"}
 _WIDE = 4_000_000
-"""The combinations of values from which on a constraint is reported: the central solver makes no larger tables."""
+"""A constraint with more combinations of values is reported, since the central solver makes no larger tables."""
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:

@@ -203,9 +203,7 @@ def regular(element: Element, posting: Posting) -> None:
     states = {*arcs, *(state for by_value in arcs.values() for targets in by_value.values() for state in targets)}
     for state in [start, *final]:
         if state not in states:
-            raise MistakeError(
-                f"the state '{shortened(state)}' is in no transition", suggestion(state, states, "states")
-            )
+            raise MistakeError(f"the state '{shortened(state)}' has no transition", suggestion(state, states, "states"))
     _post_paths(element, posting, arcs, start, set(final))
 
 

@@ -34,7 +34,7 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
         SolverLostError: if pycsp3, which writes the document in its own process, fails.
     """
     team = normalized(team)
-    network, costs = _as_told(team, *team_network(team))
+    network, costs = _with_user_costs(team, *team_network(team))
     names = list(team.variables)
     further = [f"partial{number}" for number in range(1, len(network.domains) - len(names) - len(costs) + 1)]
     charged = [f"cost{number}" for number in range(1, len(costs) + 1)]
@@ -50,7 +50,7 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")
 
 
-def _as_told(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes]:
+def _with_user_costs(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes]:
     """Return a network of normalised costs with the user's costs: negated if maximised, and with their constant."""
     sign = -1 if team.user_units.maximize else 1
     constant = flat_units(team).constant

@@ -90,7 +90,7 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
     ("now", "then", "told"),
     [
         ("skills: [camera]", "skill: [camera]", "3: unknown key 'skill' in robots.bob (did you mean 'skills'?)"),
-        ("most: 2", "most: 2.5", "3: the robot 'bob' cannot have '2.5' as 'most' (write a whole number"),
+        ("most: 2", "most: 2.5", "3: the robot 'bob' cannot have '2.5' as 'most' (write an integer"),
         ("most: 2", "most: yes", "3: the robot 'bob' cannot have 'True' as 'most'"),
         ("most: 2", "speed: 0", "3: the robot 'bob' has the speed 0 (write a number above 0)"),
         ("at: [8, 1]", "at: [8]", "3: the robot 'bob' cannot have this value as 'at' (write at: [X, Y]"),
