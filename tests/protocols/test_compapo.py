@@ -24,7 +24,7 @@ from robochoc.protocols.satisfaction.compapo import (
     Release,
     Wait,
 )
-from robochoc.protocols.satisfaction.mediation import Mediation, Table, allows
+from robochoc.protocols.satisfaction.mediation import AllowedTable, Mediation, allows
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import after, assert_refused, replies, robot_of, started, value
 from tests.support.examples import count
@@ -56,8 +56,8 @@ def session(*edges: str, domains: dict[str, int] | None = None) -> CompAPO:
     return robot
 
 
-def table(*robots: str) -> Table:
-    return Table(robots, (2, 2), UNEQUAL)
+def table(*robots: str) -> AllowedTable:
+    return AllowedTable(robots, (2, 2), UNEQUAL)
 
 
 def mediator() -> CompAPO:
@@ -116,7 +116,7 @@ def test_choose_solution_tells_each_its_value_and_its_neighbours_new_ones() -> N
 
 def test_robots_outside_that_are_in_conflict_with_the_solution_join_the_good_list() -> None:
     robot = session("AB", "BC", domains={"A": 1})
-    one = Table(("RA", "RB"), (1, 2), bytes([0b10]))
+    one = AllowedTable(("RA", "RB"), (1, 2), bytes([0b10]))
     replies(robot, ("RB", Evaluation(1, 0, 0, (one, table("RC", "RB")))))
     said = replies(robot, ("RC", Evaluation(1, 1, 1, ())))
     assert said == [("RB", Assign(1, {})), ("RC", Release({"RB": (1, 1)}))]
@@ -168,10 +168,10 @@ def test_what_cannot_be_is_refused() -> None:
     sizes = (((2, 2), b"\x00\x00"), ((2, 2), b""), ((2,), b"\x00"), ((0, 2), b""), ((2**40, 2), b"\x01"))
     for each, allowed in sizes:
         with pytest.raises(ValueError, match="a table"):
-            Table(("RA", "RB"), each, allowed)
+            AllowedTable(("RA", "RB"), each, allowed)
 
 
-def random_tables(chance: Random, names: str) -> list[Table]:
+def random_tables(chance: Random, names: str) -> list[AllowedTable]:
     """Tables over two or three of `names`, of two or three values each."""
     sizes = {name: chance.choice((2, 3)) for name in names}
     tables = []
@@ -180,7 +180,7 @@ def random_tables(chance: Random, names: str) -> list[Table]:
             own = tuple(sizes[name] for name in scope)
             combinations = own[0] * own[1] * (own[2] if len(own) > 2 else 1)
             bits = sum((chance.random() < 0.7) << bit for bit in range(combinations))
-            tables.append(Table(scope, own, bits.to_bytes(-(-combinations // 8), "little")))
+            tables.append(AllowedTable(scope, own, bits.to_bytes(-(-combinations // 8), "little")))
     return tables
 
 

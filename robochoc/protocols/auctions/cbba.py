@@ -85,7 +85,7 @@ class Bundles(wire.Message, frozen=True):
         return winning_bids_prove(self.standings, reception)
 
 
-class Action(Enum):
+class TableAction(Enum):
     """An action of Table I: a change of the receiver's standing of a task."""
 
     UPDATE = "update"
@@ -236,7 +236,7 @@ class CBBA(Auction):
                 else:
                     self._differing[rival].add(task)
 
-    def _action(self, sender: str, task: int, received: Standing, stamps: Stamps) -> Action:
+    def _action(self, sender: str, task: int, received: Standing, stamps: Stamps) -> TableAction:
         """Return the action of Table I, where `sender` is the paper's agent k, and this robot is agent i."""
         match received.winner:
             case self.problem.agent:
@@ -257,47 +257,51 @@ class CBBA(Auction):
         known = self.standings[task]
         return self.outbids(received.winner, received.amount, known.winner or None, known.amount)
 
-    def _sender_names_sender(self, sender: str, task: int, received: Standing, stamps: Stamps) -> Action:
+    def _sender_names_sender(self, sender: str, task: int, received: Standing, stamps: Stamps) -> TableAction:
         known = self.standings[task].winner
         if known == self.problem.agent:
-            return Action.UPDATE if self._is_higher(received, task) else Action.LEAVE
+            return TableAction.UPDATE if self._is_higher(received, task) else TableAction.LEAVE
         if known in {sender, ""}:
-            return Action.UPDATE
-        return Action.UPDATE if self._is_newer(known, stamps) or self._is_higher(received, task) else Action.LEAVE
+            return TableAction.UPDATE
+        return (
+            TableAction.UPDATE
+            if self._is_newer(known, stamps) or self._is_higher(received, task)
+            else TableAction.LEAVE
+        )
 
-    def _sender_names_receiver(self, sender: str, task: int, stamps: Stamps) -> Action:
+    def _sender_names_receiver(self, sender: str, task: int, stamps: Stamps) -> TableAction:
         known = self.standings[task].winner
         if known in {self.problem.agent, ""}:
-            return Action.LEAVE
-        return Action.RESET if known == sender or self._is_newer(known, stamps) else Action.LEAVE
+            return TableAction.LEAVE
+        return TableAction.RESET if known == sender or self._is_newer(known, stamps) else TableAction.LEAVE
 
-    def _sender_names_another(self, sender: str, task: int, received: Standing, stamps: Stamps) -> Action:
+    def _sender_names_another(self, sender: str, task: int, received: Standing, stamps: Stamps) -> TableAction:
         known, winner = self.standings[task].winner, received.winner
         is_newer = self._is_newer(winner, stamps)
         if known == self.problem.agent:
-            return Action.UPDATE if is_newer and self._is_higher(received, task) else Action.LEAVE
+            return TableAction.UPDATE if is_newer and self._is_higher(received, task) else TableAction.LEAVE
         if known == sender:
-            return Action.UPDATE if is_newer else Action.RESET
+            return TableAction.UPDATE if is_newer else TableAction.RESET
         if known in {winner, ""}:
-            return Action.UPDATE if is_newer else Action.LEAVE
+            return TableAction.UPDATE if is_newer else TableAction.LEAVE
         known_is_older = self._is_newer(known, stamps)
         if is_newer and (known_is_older or self._is_higher(received, task)):
-            return Action.UPDATE
-        return Action.RESET if known_is_older and stamps[winner] < self.s[winner] else Action.LEAVE
+            return TableAction.UPDATE
+        return TableAction.RESET if known_is_older and stamps[winner] < self.s[winner] else TableAction.LEAVE
 
-    def _sender_names_nobody(self, sender: str, task: int, stamps: Stamps) -> Action:
+    def _sender_names_nobody(self, sender: str, task: int, stamps: Stamps) -> TableAction:
         known = self.standings[task].winner
         if known in {self.problem.agent, ""}:
-            return Action.LEAVE
-        return Action.UPDATE if known == sender or self._is_newer(known, stamps) else Action.LEAVE
+            return TableAction.LEAVE
+        return TableAction.UPDATE if known == sender or self._is_newer(known, stamps) else TableAction.LEAVE
 
-    def _apply(self, action: Action, task: int, received: Standing) -> None:
+    def _apply(self, action: TableAction, task: int, received: Standing) -> None:
         match action:
-            case Action.UPDATE:
+            case TableAction.UPDATE:
                 self.set_standing(task, received)
-            case Action.RESET:
+            case TableAction.RESET:
                 self.set_standing(task, NOBODY)
-            case Action.LEAVE:
+            case TableAction.LEAVE:
                 pass
             case never:
                 assert_never(never)

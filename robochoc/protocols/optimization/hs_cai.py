@@ -65,16 +65,16 @@ MOST_CELLS = 1 << 17
 """The maximum number of cells of a table and of its message; while it is computed, for each value of the robot."""
 
 
-class Table(NamedTuple):
+class RobotTable(NamedTuple):
     """Costs, with an axis for each robot of `names`."""
 
     names: tuple[str, ...]
     costs: NDArray[np.float64]
 
-    def at(self, places: Mapping[str, int]) -> Table:
+    def at(self, places: Mapping[str, int]) -> RobotTable:
         """Return the part of the table with these robots' values at these places."""
         index = tuple([places.get(name, slice(None)) for name in self.names])
-        return Table(tuple(name for name in self.names if name not in places), self.costs[index])
+        return RobotTable(tuple(name for name in self.names if name not in places), self.costs[index])
 
     def over(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return the least costs with an axis for each of `names`, in this order; of length 1 if the table has none."""
@@ -96,7 +96,7 @@ def limited_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
     return kept[::-1]
 
 
-def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables: Sequence[Table]) -> list[Number]:
+def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables: Sequence[RobotTable]) -> list[Number]:
     """Return the least sum of `charges` and `tables` over the robot's values, for each combination of `axes`' values.
 
     Each table is minimised separately over robots that are not in `axes`, so the sum is a lower bound.
@@ -113,7 +113,7 @@ def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables
     return [number_of(cost) for cost in least.reshape(-1).tolist()]
 
 
-def table_of(axes: Sequence[Axis], costs: Sequence[Number]) -> Table:
+def table_of(axes: Sequence[Axis], costs: Sequence[Number]) -> RobotTable:
     """Return the table of a message.
 
     Raises:
@@ -122,7 +122,7 @@ def table_of(axes: Sequence[Axis], costs: Sequence[Number]) -> Table:
     shape = [size for _, _, size in axes]
     if min(shape, default=1) < 1 or math.prod(shape) != len(costs) or len(costs) > MOST_CELLS:
         raise ValueError(f"{len(costs)} costs do not form a table of {shape}")
-    return Table(tuple(name for name, _, _ in axes), np.array(costs, np.float64).reshape(shape))
+    return RobotTable(tuple(name for name, _, _ in axes), np.array(costs, np.float64).reshape(shape))
 
 
 def number_of(cost: float) -> Number:
@@ -262,7 +262,7 @@ class Tighter(NamedTuple):
     """A child's table in a context."""
 
     context: Places
-    table: Table
+    table: RobotTable
 
 
 class HSCAI(BranchingProtocol):
@@ -292,7 +292,7 @@ class HSCAI(BranchingProtocol):
         super().__init__(problem, order)
         self.domains: dict[str, list[Value]] = {}
         self.level = 0
-        self.tables: dict[str, Table] = {}
+        self.tables: dict[str, RobotTable] = {}
         self.tighter: dict[str, Tighter] = {}
         self.places: dict[str, int] = {}
         self.stayed: dict[str, int] = {}
@@ -300,9 +300,9 @@ class HSCAI(BranchingProtocol):
         self._levels: dict[str, int] = {}
         self._from: dict[str, PreUtil] = {}
         self._axes: dict[str, Axis] = {}
-        self._own_tables: list[Table] = []
+        self._own_tables: list[RobotTable] = []
         self._asked: list[Places] = []
-        self._made: dict[str, Table] = {}
+        self._made: dict[str, RobotTable] = {}
 
     def start_in_tree(self) -> None:
         """Send the domain to the robots below, as the root."""
@@ -370,7 +370,7 @@ class HSCAI(BranchingProtocol):
             self.search(self.limit, self.problem.charges)
             return
         made = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._own_tables = [Table((*table.agents, self.problem.agent), table.charges) for table in made]
+        self._own_tables = [RobotTable((*table.agents, self.problem.agent), table.charges) for table in made]
         axes, costs = self._least({}, self.tables)
         dropped = [axis for name, axis in self._axes.items() if axis not in axes]
         self.send(self.parent, PreUtil(axes, dropped, dearest, costs))
@@ -389,7 +389,7 @@ class HSCAI(BranchingProtocol):
                     raise ValueError(f"{child} sends another depth or number of values for {axis[0]}")
         return axes
 
-    def _least(self, context: Places, tables: Mapping[str, Table]) -> tuple[list[Axis], list[Number]]:
+    def _least(self, context: Places, tables: Mapping[str, RobotTable]) -> tuple[list[Axis], list[Number]]:
         """Return the axes and costs of this robot's table, with the values of `context`."""
         axes = limited_axes([axis for name, axis in self._axes.items() if name not in context], self.settings.k)
         parts = [table.at(context) for table in (*self._own_tables, *tables.values())]
@@ -420,7 +420,7 @@ class HSCAI(BranchingProtocol):
             return bounds
         return [max(pair) for pair in zip(bounds, self._bounds_in(tighter.table), strict=True)]
 
-    def _bounds_in(self, table: Table) -> list[Number]:
+    def _bounds_in(self, table: RobotTable) -> list[Number]:
         part = table.at(self.places)
         costs = [number_of(cost) for cost in part.costs.reshape(-1).tolist()]
         return costs if part.names else costs * len(self.problem.values)
@@ -465,7 +465,7 @@ class HSCAI(BranchingProtocol):
                 self._ask(child, lacks, None)
         self._answer_if_all_are_there()
 
-    def _store_tighter(self, child: str, table: Table) -> None:
+    def _store_tighter(self, child: str, table: RobotTable) -> None:
         """Use a child's table, for this search or for the parent: answers arrive in the order of the requests."""
         if not self.inferring.get(child) or not self._is_below(child, table):
             raise ValueError(f"unexpected table from {child}, or one over other robots")
@@ -481,7 +481,7 @@ class HSCAI(BranchingProtocol):
                 if not branch.known[index]:
                     branch.lower[index] = max(branch.lower[index], bound)
 
-    def _is_below(self, child: str, table: Table) -> bool:
+    def _is_below(self, child: str, table: RobotTable) -> bool:
         """Return whether a table is over robots that matter to the child's subtree, with as many values."""
         sizes = {name: size for name, _, size in (*self._from[child].axes, *self._from[child].dropped)}
         return [sizes.get(name) for name in table.names] == [*table.costs.shape]

@@ -75,7 +75,7 @@ from robochoc.protocols.disclosure import FINITE, Clash, HasOnly, HasValue, Pays
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.mediation import Mediation, Table, allows, distinct, own_tables, sizes_in
+from robochoc.protocols.satisfaction.mediation import AllowedTable, Mediation, allows, distinct, own_tables, sizes_in
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
 from robochoc.solver.local_problem import LocalProblem
@@ -141,7 +141,7 @@ class Evaluation(Message, frozen=True):
     session: int
     place: int
     count: int
-    tables: tuple[Table, ...]
+    tables: tuple[AllowedTable, ...]
 
     act = Act(Performative.AGREE, "the sender keeps its value until the mediation session is over")
 
@@ -223,7 +223,7 @@ def _current_values(changes: Changes, reception: Reception) -> list[Proof]:
     return [HasValue(robot, values[place], (count,)) for robot, values, place, count in known if values is not None]
 
 
-def _table_proves(table: Table, tables: Sequence[Table], reception: Reception) -> Iterator[Proof]:
+def _table_proves(table: AllowedTable, tables: Sequence[AllowedTable], reception: Reception) -> Iterator[Proof]:
     """Yield the proofs of one of the sender's `tables`: the values that clash, and those that all constraints allow.
 
     There are none if the receiver does not know the domains that the places refer to.
@@ -268,7 +268,7 @@ class CompAPO(Protocol):
         self.count = 0
         self.domains: dict[str, tuple[Value, ...]] = {}
         self.good_list = {self.name, *self.linked}
-        self.tables: dict[str, tuple[Table, ...]] = {}
+        self.tables: dict[str, tuple[AllowedTable, ...]] = {}
         self.repairs = 0
         self.holder: str | None = None
         self.held: tuple[int, int] = (0, 0)
@@ -507,13 +507,13 @@ class CompAPO(Protocol):
 
     # Constraints
 
-    def _own_tables(self) -> tuple[Table, ...]:
+    def _own_tables(self) -> tuple[AllowedTable, ...]:
         """Return this robot's constraints, those over the same robots in one table."""
         if self.name not in self.tables:
             self.tables[self.name] = own_tables(self.problem, self.linked, self.domains)
         return self.tables[self.name]
 
-    def _known_tables(self) -> list[Table]:
+    def _known_tables(self) -> list[AllowedTable]:
         """Return the constraints of the good_list, each once."""
         return distinct(table for robot in self._ranked(self.good_list) for table in self.tables.get(robot, ()))
 

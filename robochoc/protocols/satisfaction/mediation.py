@@ -19,7 +19,7 @@ from robochoc.protocols.message import Value
 from robochoc.solver.local_problem import LocalProblem
 
 
-class Table(msgspec.Struct, frozen=True, array_like=True):
+class AllowedTable(msgspec.Struct, frozen=True, array_like=True):
     """All constraints over the same robots in one table: a bit for each combination of their values, set if allowed.
 
     The place of the last robot's value varies fastest; bit i of the table is bit i % 8 of byte i // 8.
@@ -46,7 +46,7 @@ class Table(msgspec.Struct, frozen=True, array_like=True):
 
 def own_tables(
     problem: LocalProblem, linked: Iterable[str], domains: Mapping[str, Sequence[Value]]
-) -> tuple[Table, ...]:
+) -> tuple[AllowedTable, ...]:
     """Return the constraints of `problem` with the robots `linked`, those over the same robots in one table."""
     allowed: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
     for lowest in linked:
@@ -56,15 +56,15 @@ def own_tables(
     return tuple([_table(problem, domains, others, masks) for others, masks in allowed.items()])
 
 
-def distinct(tables: Iterable[Table]) -> list[Table]:
+def distinct(tables: Iterable[AllowedTable]) -> list[AllowedTable]:
     """Return one of `tables` for each set of robots, the first one: all of these robots send the same table."""
-    found: dict[frozenset[str], Table] = {}
+    found: dict[frozenset[str], AllowedTable] = {}
     for table in tables:
         found.setdefault(frozenset(table.robots), table)
     return list(found.values())
 
 
-def sizes_in(tables: Iterable[Table], places: Mapping[str, int]) -> dict[str, int]:
+def sizes_in(tables: Iterable[AllowedTable], places: Mapping[str, int]) -> dict[str, int]:
     """Return the sizes of the domains of all robots in `tables`, whose values are at these `places`.
 
     Raises:
@@ -83,14 +83,14 @@ def _table(
     domains: Mapping[str, Sequence[Value]],
     others: tuple[str, ...],
     masks: Mapping[tuple[int, ...], int],
-) -> Table:
+) -> AllowedTable:
     """Return a table whose last robot is the one of `problem`."""
     own = len(problem.values)
     bits = 0
     for row, place in enumerate(sorted(masks)):
         bits |= masks[place] << row * own
     sizes = (*(len(domains[robot]) for robot in others), own)
-    return Table((*others, problem.agent), sizes, bits.to_bytes(-(-len(masks) * own // 8), "little"))
+    return AllowedTable((*others, problem.agent), sizes, bits.to_bytes(-(-len(masks) * own // 8), "little"))
 
 
 class _Node(NamedTuple):
@@ -102,13 +102,13 @@ class _Node(NamedTuple):
     cost: int
 
 
-class _Seen:
+class _RestrictedTable:
     """A table restricted to the mediator's robots: the values of robots outside are fixed.
 
     `inside` are the robots that the mediator decides on. `hard`: all robots of the table are inside.
     """
 
-    def __init__(self, table: Table, members: Mapping[str, int], places: Mapping[str, int]) -> None:
+    def __init__(self, table: AllowedTable, members: Mapping[str, int], places: Mapping[str, int]) -> None:
         self._allowed = table.allowed
         self._strides: dict[str, int] = {}
         self._base = 0
@@ -139,7 +139,7 @@ class _Seen:
 class Mediation:
     """One mediator's problem. `checks` counts its constraint checks."""
 
-    def __init__(self, tables: Sequence[Table], members: Mapping[str, int], places: Mapping[str, int]) -> None:
+    def __init__(self, tables: Sequence[AllowedTable], members: Mapping[str, int], places: Mapping[str, int]) -> None:
         """Select the tables that contain one of `members`.
 
         Args:
@@ -150,11 +150,11 @@ class Mediation:
         self.checks = 0
         self._members = members
         self._places = places
-        self._seen = [_Seen(table, members, places) for table in tables]
-        self._of: dict[str, list[_Seen]] = {name: [] for name in members}
-        for seen in self._seen:
-            for name in seen.inside:
-                self._of[name].append(seen)
+        self._restricted = [_RestrictedTable(table, members, places) for table in tables]
+        self._of: dict[str, list[_RestrictedTable]] = {name: [] for name in members}
+        for table in self._restricted:
+            for name in table.inside:
+                self._of[name].append(table)
         self._least = len(tables) + 1
         """The number of constraints that the best assignment so far breaks."""
 
@@ -175,9 +175,9 @@ class Mediation:
     def _root(self) -> _Node | None:
         """Return the empty assignment; None if a robot has no value left."""
         node: _Node | None = _Node({}, {name: (1 << size) - 1 for name, size in self._members.items()}, {}, 0)
-        for seen in self._seen:
-            if node is not None and len(seen.inside) == 1:
-                node = self._pruned(node, seen, seen.inside[0])
+        for table in self._restricted:
+            if node is not None and len(table.inside) == 1:
+                node = self._pruned(node, table, table.inside[0])
         return node
 
     def _children(self, node: _Node) -> Iterator[_Node]:
@@ -199,19 +199,19 @@ class Mediation:
             if cost + rest >= self._least:
                 return
             child: _Node | None = _Node({**node.assigned, robot: value}, {**left}, node.broken, cost)
-            for seen in self._of[robot]:
-                ahead = [name for name in seen.inside if name in left]
+            for table in self._of[robot]:
+                ahead = [name for name in table.inside if name in left]
                 if child is not None and len(ahead) == 1:
-                    child = self._pruned(child, seen, ahead[0])
+                    child = self._pruned(child, table, ahead[0])
             if child is not None:
                 yield child
 
-    def _pruned(self, node: _Node, seen: _Seen, robot: str) -> _Node | None:
+    def _pruned(self, node: _Node, table: _RestrictedTable, robot: str) -> _Node | None:
         """Return `node` after forward checking with a table in which only `robot` is open; None: no value is left."""
         left = node.left[robot]
         self.checks += left.bit_count()
-        mask = seen.mask(robot, node.assigned, left)
-        if seen.hard:
+        mask = table.mask(robot, node.assigned, left)
+        if table.hard:
             node.left[robot] = mask
             return node if mask else None
         if mask == left:
@@ -222,7 +222,7 @@ class Mediation:
         return node._replace(broken={**node.broken, robot: prices})
 
 
-def allows(table: Table, places: Mapping[str, int]) -> bool:
+def allows(table: AllowedTable, places: Mapping[str, int]) -> bool:
     """Return whether `table` allows these values."""
     bit = 0
     for robot, size in zip(table.robots, table.sizes, strict=True):

@@ -19,7 +19,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.satisfaction.mediation import Table
+from robochoc.protocols.satisfaction.mediation import AllowedTable
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.acl import parse
@@ -129,7 +129,7 @@ SIMPLE: dict[Any, st.SearchStrategy[Any]] = {
     bytes: st.binary(max_size=20),
     bool: st.booleans(),
     type(None): st.none(),
-    Table: st.integers(1, 20).map(lambda size: Table(("RA",), (size,), bytes(-(-size // 8)))),
+    AllowedTable: st.integers(1, 20).map(lambda size: AllowedTable(("RA",), (size,), bytes(-(-size // 8)))),
 }
 
 
