@@ -109,7 +109,7 @@ REAL = {
     ("count-dpop", "Counts"): (
         "RX01 says: in how many ways my subtree attains the costs of my table: 16 cells, of 1 byte"
     ),
-    ("p-dpop", "Wave"): "RX00 says: somebody whose score begins with 5df9 wants to be the root",
+    ("p-dpop", "Wave"): "RX00 says: a robot whose score begins with 5df9 wants to be the root",
     ("p-dpop", "Token"): "RX00 says: if you are not in the tree yet, you are my child",
     ("p-dpop", "Bounce"): "RX00 says: I am in the tree, above you",
     ("p-dpop", "Back"): "RX04 says: all below me are in the tree",

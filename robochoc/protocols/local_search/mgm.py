@@ -61,7 +61,7 @@ class Gain(wire.Message, frozen=True):
     broken: int
     cost: int | float
 
-    act = Act(Performative.INFORM, "the receiver learns what the sender's move would save")
+    act = Act(Performative.INFORM, "the receiver learns the saving by the sender's move")
     # A gain may be that of two robots that move together (MGM-2), weighted (GDBA), or contain transferred costs
     # (MCS-MGM). So it does not bound the sender's cost.
     proves_nothing = True

@@ -40,7 +40,7 @@ class Wave(Message, frozen=True):
 class Token(Message, frozen=True):
     """The token of the depth-first search; a receiver that it has not visited becomes the sender's child."""
 
-    act = Act(Performative.REQUEST, "the receiver continues the tree")
+    act = Act(Performative.REQUEST, "the receiver must continue building the tree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:

@@ -37,7 +37,7 @@ class Token(Message, frozen=True):
 
     visited: Visited
 
-    act = Act(Performative.REQUEST, "the receiver continues the tree")
+    act = Act(Performative.REQUEST, "the receiver must continue building the tree")
     proves_nothing = True
 
     def in_words(self, _: Wording) -> str:
