@@ -175,7 +175,7 @@ class Projects:
         """
         folder = self.store.path(name)
         ended = end_jobs_in(folder)
-        self.store.put_away(name)
+        self.store.move_to_removed(name)
         project = self._open.pop(name, None)
         if project is not None:
             project.mark_removed()

@@ -122,11 +122,11 @@ async def _serve(
     shown: AbstractContextManager[RedirectFile | None] = RedirectFile(url) if open_browser else nullcontext()
     with shown as redirect:
 
-        def begin() -> None:
+        def on_started() -> None:
             if ready:
                 ready(url)
             if redirect is not None:  # in a thread: a browser for the terminal returns when it is closed
                 threading.Thread(target=webbrowser.open, args=(redirect.url,), daemon=True).start()
 
-        server.ready, server.redirect = begin, redirect
+        server.ready, server.redirect = on_started, redirect
         await server.serve(sockets=[here])

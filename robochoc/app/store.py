@@ -184,10 +184,10 @@ class TeamStore:
 
     def remove(self, name: str) -> None:
         """Remove a team and its runs. Raises `KeyError` for an invalid id."""
-        self.put_away(name)
+        self.move_to_removed(name)
         self.sweep()
 
-    def put_away(self, name: str) -> None:
+    def move_to_removed(self, name: str) -> None:
         """Remove a team at once; its files, which may be many, are deleted by `sweep`.
 
         Raises:

@@ -11,7 +11,7 @@ class Cache:
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._held = 0
+        self._size = 0
         self._answers: OrderedDict[Hashable, bytes] = OrderedDict()
 
     def get(self, key: Hashable) -> bytes | None:
@@ -23,10 +23,10 @@ class Cache:
 
     def put(self, key: Hashable, answer: bytes) -> bytes:
         """Store `answer`, unless it is larger than the cache; return it."""
-        self._held -= len(self._answers.pop(key, b""))
+        self._size -= len(self._answers.pop(key, b""))
         if len(answer) < self._most:
             self._answers[key] = answer
-            self._held += len(answer)
-        while self._held > self._most:
-            self._held -= len(self._answers.popitem(last=False)[1])
+            self._size += len(answer)
+        while self._size > self._most:
+            self._size -= len(self._answers.popitem(last=False)[1])
         return answer

@@ -107,7 +107,7 @@ class LiveTrace:
             return True
         if self._age_s() > _FORSAKEN_S:
             rest, _ = self._follower.finish()
-            self._take(rest)
+            self._add(rest)
             if not self._ended:
                 self._end()
             return True
@@ -118,14 +118,14 @@ class LiveTrace:
         if self.trace is None and not _may_begin(self._file.head):
             raise JournalError("the file does not start like a journal")
         lines = self._follower.read(_EVENTS_AT_ONCE)
-        self._take(lines)
+        self._add(lines)
         if self._follower.damage is None:
             return bool(lines)
         if not self._ended:
             self._end()
         return True
 
-    def _take(self, lines: Iterable[JournalEntry]) -> None:
+    def _add(self, lines: Iterable[JournalEntry]) -> None:
         events: list[AnyEvent] = []
         for line in lines:
             match line:
@@ -196,20 +196,20 @@ def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[An
     A run's events are stored in an unnamed temporary file until the end of the run; only their times and positions are
     in memory.
     """
-    aside = _StoredEvents()
+    stored = _StoredEvents()
     try:
         for lines in pieces:
             for line in lines:
                 if isinstance(line, Header | Ended):
                     continue
                 if isinstance(line, Began):
-                    yield from aside.sorted()
-                    aside = _StoredEvents()
-                aside.put(line)
+                    yield from stored.sorted()
+                    stored = _StoredEvents()
+                stored.add(line)
             yield []
-        yield from aside.sorted()
+        yield from stored.sorted()
     finally:
-        aside.close()
+        stored.close()
 
 
 class _StoredEvents:
@@ -225,7 +225,7 @@ class _StoredEvents:
     def close(self) -> None:
         self._file.close()
 
-    def put(self, event: AnyEvent) -> None:
+    def add(self, event: AnyEvent) -> None:
         self._times.append(event.t)
         self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
 

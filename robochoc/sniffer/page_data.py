@@ -232,12 +232,12 @@ def _ending(trace: Trace, outcome: Outcome) -> str:
         headline = describe_outcome(outcome, len(trace.robots))
         why = f": no solution for all{witness}" if outcome.deadline is None else ", by the deadline"
         return f"{headline}{why}; withdrawn: {_cut(outcome.withdrawn_alive)}{out}."
-    said = _said(outcome.verdict)
+    said = _verdict_words(outcome.verdict)
     cost = f", of cost {cost_shown(outcome.cost)}" if outcome.cost else ""
     return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."
 
 
-def _said(verdict: Verdict) -> str:
+def _verdict_words(verdict: Verdict) -> str:
     match verdict:
         case Verdict.SOLUTION:
             return "a solution"
@@ -260,7 +260,9 @@ def _by(outcome: Outcome) -> str:
 
 def _epochs(epochs: Sequence[EpochOutcome]) -> str:
     """Return the number of epochs and the results of the first ones, in words."""
-    ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
+    ends = [
+        f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _verdict_words(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]
+    ]
     more = len(epochs) - len(ends)
     return f"{len(epochs):,} epochs: {', '.join(ends)}{f' and {more:,} more' if more else ''}."
 

@@ -33,18 +33,18 @@ class WholeBlocks(BlockReader):
 
     def __init__(self) -> None:
         super().__init__()
-        self._held = bytearray()
+        self._pending = bytearray()
         self._passed = 0
 
-    def take(self, content: bytes) -> bytes:
+    def add(self, content: bytes) -> bytes:
         """Add `content`; return the newly completed blocks. Raises `JournalError` and `JournalDamagedError`."""
-        self._held += content
+        self._pending += content
         self.feed(content)
         while self.next() is not None:
             pass
         size = self._place - self._passed
-        whole = bytes(self._held[:size])
-        del self._held[:size]
+        whole = bytes(self._pending[:size])
+        del self._pending[:size]
         self._passed = self._place
         return whole
 
@@ -110,7 +110,7 @@ class IncomingJournal:
         """The next request."""
         return question(self._run, self._start)
 
-    def take(self, content: bytes) -> FollowResult | None:
+    def receive(self, content: bytes) -> FollowResult | None:
         """Process an answer; return the end of the journal if it was reached."""
         try:
             piece = piece_in(content)
@@ -118,7 +118,7 @@ class IncomingJournal:
                 return FollowResult(over=False, why=f"the master at {self._place} was restarted")
             if piece.start != self._start:  # the answer to an earlier request
                 return None
-            whole = self._blocks.take(piece.content)
+            whole = self._blocks.add(piece.content)
         except (JournalError, JournalDamagedError) as bad:
             return FollowResult(over=False, why=f"the master at {self._place} sent an invalid journal: {bad}")
         if whole:
@@ -144,11 +144,11 @@ class _MasterClient:
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
         """Return the run to follow; None if stopped. Raises `NoAnswerError` after a refusal, or without an answer."""
-        until, asked = time.monotonic() + patience_s, 0.0
+        until, last_request = time.monotonic() + patience_s, 0.0
         while time.monotonic() < until and not stopped():
-            if time.monotonic() - asked > ASK_AGAIN_S:
-                asked = time.monotonic()
-                self._ask()
+            if time.monotonic() - last_request > ASK_AGAIN_S:
+                last_request = time.monotonic()
+                self._request()
             answer = self._answer(LOOK_S)
             if answer and answer.why:
                 raise NoAnswerError(
@@ -164,15 +164,15 @@ class _MasterClient:
 
     def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> FollowResult:
         """Request the journal, piece by piece, until it ends."""
-        heard = time.monotonic()
+        last_answer = time.monotonic()
         while not stopped():
             content = self._transport.ask(journal_key(self._name), journal.question, PIECE_S)
             if content is not None:
-                heard = time.monotonic()
-                ending = journal.take(content)
+                last_answer = time.monotonic()
+                ending = journal.receive(content)
                 if journal.idle and not ending:
                     time.sleep(LOOK_S)
-            elif time.monotonic() - heard > patience_s:
+            elif time.monotonic() - last_answer > patience_s:
                 return FollowResult(
                     over=False,
                     why=f"the master at {self._place} has ended, or does not allow {self._name} to sniff any more",
@@ -183,12 +183,12 @@ class _MasterClient:
                 return ending
         return STOPPED
 
-    def _ask(self) -> None:
+    def _request(self) -> None:
         self._transport.send(MASTER, self._framing.write(MASTER, JournalRequest(self._number)))
 
     def _refused(self) -> FollowResult | None:
         """Request the reason for a missing answer; return None if there is none, or no answer."""
-        self._ask()
+        self._request()
         answer = self._answer(PIECE_S)
         if answer is None or not answer.why:
             return None

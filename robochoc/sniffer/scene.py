@@ -33,7 +33,7 @@ Move = tuple[int, int, float, float, float]
 """A step, the number of a drone, and its position x, y, z from that step on."""
 
 
-def whole_scene(trace: Trace) -> bytes:
+def complete_scene(trace: Trace) -> bytes:
     """Return the scene of a complete trace as JSON, from the robots' files in the trace."""
     stage = TraceScene(trace, robots_given(trace))
     return msgspec.json.encode(stage.answer() if stage else None)

@@ -77,12 +77,7 @@ class Selection:
     last: int | None = None
     run: int | None = None
 
-    @property
-    def whole(self) -> bool:
-        """True if everything is selected."""
-        return self == Selection()
-
-    def of(self, trace: Trace) -> range | list[int]:
+    def numbers_in(self, trace: Trace) -> range | list[int]:
         """Return the numbers of the selected messages, in order. Raises `NothingSelectedError`."""
         count = len(trace.messages.t)
         numbers = range(min(self.first, count), count if self.last is None else min(self.last + 1, count))

@@ -35,7 +35,7 @@ class JournalSentences:
     def __init__(self, called: ValueLabel | None = None) -> None:
         self._called = called
         self._reader = TeamReader()
-        self._asked = self._protocol = ""
+        self._requested = self._protocol = ""
         self._types: Mapping[str, type[Message]] = {}
         self._on_tree = False
         self._names = RunNames()
@@ -44,7 +44,7 @@ class JournalSentences:
         """Update the present protocol, and the names of the robots and their variables."""
         match entry:
             case Header():
-                self._asked = entry.protocol
+                self._requested = entry.protocol
                 self._set_protocol(entry.protocol)
             case Began():
                 self._set_protocol(entry.protocol)
@@ -62,7 +62,7 @@ class JournalSentences:
         if protocol == self._protocol:
             return
         self._protocol = protocol
-        found = installed_protocol(protocol, self._asked)
+        found = installed_protocol(protocol, self._requested)
         self._types = types_by_name(found[1]) if found else {}
         self._on_tree = found is not None and found[1].traits.tree
 

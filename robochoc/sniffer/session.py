@@ -65,7 +65,7 @@ class SnifferSession:
         """Read a small part; return False if there was none. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
         return self._live_trace.advance() or self._replaced()
 
-    def begin(self) -> None:
+    def read_header(self) -> None:
         """Read up to the header, if there is one. Raises as `advance`."""
         while self._live_trace.trace is None and self._live_trace.advance():
             pass

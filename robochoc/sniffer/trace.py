@@ -196,7 +196,7 @@ class Trace:
         self._contents = Contents()
         self._number_of_robot: dict[str, int] = {}
         self._number_of_kind: dict[str, int] = {}
-        self._begin()
+        self._reset_run()
 
     @classmethod
     def of(cls, journal: Journal, generation: int = 0) -> Self:
@@ -267,12 +267,12 @@ class Trace:
 
     # Runs
 
-    def _begin(self) -> None:
+    def _reset_run(self) -> None:
         self._channels: dict[tuple[str, str], PendingChannel] = {}
         self._open: dict[str, PendingStep] = {}
         self._waiting: dict[str, deque[PendingStep]] = {}
         self._checks: dict[str, int] = {}
-        self._said: dict[str, int] = {}
+        self._sent_counts: dict[str, int] = {}
 
     def _close(self) -> None:
         """End the run: stop waiting, and end the steps without a recorded end."""
@@ -280,7 +280,7 @@ class Trace:
             step.checks = self._checks.get(robot, 0)
             self._ready(robot, step)
         self.flush()
-        self._begin()
+        self._reset_run()
 
     def _new_run(self, began: Began) -> None:
         self._close()
@@ -433,7 +433,7 @@ class Trace:
         messages.kind.append(_number(sent.type, self._number_of_kind, self.kinds))
         messages.run.append(run)
         messages.taken.append(NOT_YET)
-        self._said[sent.sender] = sequence = self._said.get(sent.sender, 0) + 1
+        self._sent_counts[sent.sender] = sequence = self._sent_counts.get(sent.sender, 0) + 1
         messages.sequence.append(sequence)
 
 

@@ -57,7 +57,7 @@ def is_satisfiable(team: Team, until: float) -> bool:
     return verdict != Verdict.NO_SOLUTION
 
 
-def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
+def conflict_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
     """Return the conflict in the team with files in `folder`, after a number of `events` of its scenario.
 
     CPMpy is used if it is installed, else robochoc's central solver. Raises `InvalidInputError`.
@@ -129,13 +129,13 @@ def main() -> None:
     seconds = float(sys.argv[1])
     signal_when_orphaned(signal.SIGKILL)  # solvers may ignore other signals
     if len(sys.argv) > 2:  # noqa: PLR2004 - files
-        found = found_in_files(Path(sys.argv[2]), int(sys.argv[3]), seconds)
+        found = conflict_in_files(Path(sys.argv[2]), int(sys.argv[3]), seconds)
     else:
-        found = found_in(msgspec.json.decode(sys.stdin.buffer.read(), type=Sketch), seconds)
+        found = conflict_in(msgspec.json.decode(sys.stdin.buffer.read(), type=Sketch), seconds)
     sys.stdout.buffer.write(msgspec.json.encode(found))
 
 
-def found_in(sketch: Sketch, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
+def conflict_in(sketch: Sketch, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
     """Return the conflict in a sketch, by CPMpy if it is installed, else by robochoc's central solver."""
     rules = [rule.id for rule in candidates(sketch)]
     if use_cpmpy:

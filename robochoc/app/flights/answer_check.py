@@ -57,7 +57,7 @@ def check(run: Run) -> None:
     record.checked, record.maximised = None, False
     with suppress(*_UNREADABLE):
         drawn = bool(run.sketch.decisions)
-        team, code = _drawn(run, result) if drawn else _of_files(run, result)
+        team, code = _team_of_sketch(run, result) if drawn else _team_of_files(run, result)
         record.maximised = not drawn and any(robot.costs.maximize for robot in team.robots)
         if result is not None and result.assignment:
             record.checked = _checked(team, code, result)
@@ -67,7 +67,7 @@ _Code = Callable[[str, Value], int | None]
 """Returns the code of a variable's value; None for an invalid value."""
 
 
-def _drawn(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
+def _team_of_sketch(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
     """Return the final team of a run of a sketch, and the function that encodes the user's values."""
     changed = changed_to(run) if result is not None and len(result.epochs) > 1 else None
     sketch = run.sketch if changed is None else changed
@@ -83,7 +83,7 @@ def _drawn(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
     return team, lambda name, value: codes.get(name, {}).get(value)
 
 
-def _of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
+def _team_of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
     """Return the final team of a run of files, and the function that encodes the files' values."""
     events = max(0, len(result.epochs) - 1) if result is not None else 0
     team = team_after_events(read_team(run.team), events)

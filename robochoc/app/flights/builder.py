@@ -62,7 +62,7 @@ class BuildStage(StrEnum):
     DONE = "done"
 
 
-class CannotMakeError(RobochocError):
+class BuildError(RobochocError):
     """A command has failed, with its error text."""
 
 
@@ -164,7 +164,7 @@ class FlightBuilder:
             self._set_stage(BuildStage.WAITING)
 
     async def recording(self) -> Path:
-        """Return a recording of the flight, which is created if it does not exist. Raises `CannotMakeError`."""
+        """Return a recording of the flight, which is created if it does not exist. Raises `BuildError`."""
         async with self._recording:
             file = self.run.artefact(RECORDING)
             if file is None:
@@ -172,10 +172,10 @@ class FlightBuilder:
                 await asyncio.wait([asyncio.wrap_future(job.future)])
                 try:
                     file = job.future.result()
-                except CannotMakeError:
+                except BuildError:
                     raise
                 except Exception as fault:  # noqa: BLE001 - the job was ended, or the error is in the error log
-                    raise CannotMakeError(error_text(fault)) from None
+                    raise BuildError(error_text(fault)) from None
             return file
 
     def _start(self) -> None:
@@ -184,28 +184,28 @@ class FlightBuilder:
         self._call = event_loop_caller()
         self.stage = BuildStage.FLIGHT if self._needs_flight else BuildStage.CONVERSATION
         before, self._before = self._before, None
-        self._job = job = Job(f"flight {self.run.folder}", partial(self._make, before), folder=self.run.folder)
-        job.over = partial(self._interrupted, job)
+        self._job = job = Job(f"flight {self.run.folder}", partial(self._build, before), folder=self.run.folder)
+        job.on_incomplete = partial(self._interrupted, job)
         job.start()
 
     @property
     def _needs_flight(self) -> bool:
         return self.flight is None and self.has_answer and flies(self.run)
 
-    def _make(self, before: Job[None] | None, job: Job[None]) -> None:
+    def _build(self, before: Job[None] | None, job: Job[None]) -> None:
         if before:  # two jobs must not write the same files
             before.join()
         if self._needs_flight:
-            self._part(job, BuildStage.FLIGHT, self._make_flight)
+            self._part(job, BuildStage.FLIGHT, self._build_flight)
         if self.conversation is None and self.run.artefact(JOURNAL):
-            self._part(job, BuildStage.CONVERSATION, self._make_conversation)
+            self._part(job, BuildStage.CONVERSATION, self._build_conversation)
         self._advance(job, BuildStage.DONE)
 
     def _part(self, job: Job[None], stage: BuildStage, make: Callable[[Job[None]], None]) -> None:
         self._advance(job, stage)
         try:
             make(job)
-        except CannotMakeError as why:
+        except BuildError as why:
             self.troubles[stage] = str(why)
 
     def _interrupted(self, job: Job[None], why: str) -> None:
@@ -213,17 +213,17 @@ class FlightBuilder:
             self.troubles[self.stage] = why
         self._advance(job, BuildStage.DONE if why else BuildStage.WAITING)
 
-    def _make_flight(self, job: Job[None]) -> None:
+    def _build_flight(self, job: Job[None]) -> None:
         self._write_team()
         given = [self._result(), "--team", self.run.team.name, *self._map()]
         try:
             result = self._run(job, "fly", *given, "--json", "--html", FLIGHT)
-        except CannotMakeError as why:  # for example, drones too near to each other: show the goals nevertheless
+        except BuildError as why:  # for example, drones too near to each other: show the goals nevertheless
             self._run(job, "animate", *given, "--html", FLIGHT)
             result = refused(str(why).rpartition(_REFUSAL)[2])
         write_atomically(self.run.folder / FLOWN, result)
 
-    def _make_conversation(self, job: Job[None]) -> None:
+    def _build_conversation(self, job: Job[None]) -> None:
         cut = ["--to", str(MOST_MESSAGES - 1)] if self.is_cut else []
         self._run(job, "journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
 
@@ -258,13 +258,13 @@ class FlightBuilder:
         try:
             model_of(run.sketch).save(run.team)
         except (ModelError, InvalidInputError, ValueError, TypeError) as mistake:
-            raise CannotMakeError(str(mistake)) from None
+            raise BuildError(str(mistake)) from None
 
     def _run(self, job: Job[None] | Job[Path], *arguments: str) -> bytes:
         """Run a command of robochoc in the run's folder; return its output."""
         finished = job.run(Command(arguments, self.run.folder))
         if finished.status not in {0, _NOT_AS_PLANNED}:
-            raise CannotMakeError(finished.why[-_MAX_MESSAGE:])
+            raise BuildError(finished.why[-_MAX_MESSAGE:])
         return finished.out
 
     def _advance(self, job: Job[None], stage: BuildStage) -> None:

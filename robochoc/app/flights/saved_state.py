@@ -43,7 +43,7 @@ def file_name(name: str, ending: str = "") -> str:
 
 MAX_BYTES = 256 << 20
 """The maximum number of bytes of an unpacked run."""
-MOST_SAID = open_from_disk.MAX_BYTES * 3 // 4
+MAX_JOURNAL_BYTES = open_from_disk.MAX_BYTES * 3 // 4
 """The maximum number of bytes of a packed journal. A larger one is left out, so that the file can be opened again."""
 MOST_AT_ONCE = {RECORD: MAX_SKETCH, SKETCH: MAX_SKETCH, CHANGE: MAX_SKETCH, RESULT: MAX_RESULT}
 """The maximum number of bytes of files that are read at once. Larger files are rejected."""
@@ -89,7 +89,7 @@ def packed(run: Run) -> bytes:
 def is_too_long(run: Run) -> bool:
     """Return whether the journal of a run is too long to be packed."""
     journal = run.artefact(JOURNAL)
-    return journal is not None and journal.stat().st_size > MOST_SAID
+    return journal is not None and journal.stat().st_size > MAX_JOURNAL_BYTES
 
 
 def _add(archive: zipfile.ZipFile, name: str, file: Path) -> None:

@@ -161,18 +161,18 @@ def _robots(team: Team) -> Iterator[RobotFacts]:
 def _values(domain: Domain) -> str:
     """Return the values of a decision, in short: `1..4, 7`."""
     if domain.symbols:
-        said = ", ".join(str(domain.label(value)) for value in islice(domain, _LONGEST_VALUES))
+        text = ", ".join(str(domain.label(value)) for value in islice(domain, _LONGEST_VALUES))
     else:
         parts = domain.ranges[:_MOST_RANGES]
-        said = ", ".join(f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)
-        said += ", …" if len(domain.ranges) > _MOST_RANGES else ""
-    return said if len(said) <= _LONGEST_VALUES else f"{said[: _LONGEST_VALUES - 1]}…"
+        text = ", ".join(f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)
+        text += ", …" if len(domain.ranges) > _MOST_RANGES else ""
+    return text if len(text) <= _LONGEST_VALUES else f"{text[: _LONGEST_VALUES - 1]}…"
 
 
 def has_place(robot: Robot) -> bool:
     """Return whether a robot has a position: in a topic, or in its name, such as `Robot3.1`."""
-    said = any(coordinate is not None for topic in robot.topics for coordinate in (topic.x, topic.y, topic.z))
-    return said or row_and_column(robot.name) is not None
+    text = any(coordinate is not None for topic in robot.topics for coordinate in (topic.x, topic.y, topic.z))
+    return text or row_and_column(robot.name) is not None
 
 
 def _events(scenario: Sequence[ScenarioEvent], domains: Mapping[str, Domain]) -> Iterator[str]:
@@ -180,13 +180,13 @@ def _events(scenario: Sequence[ScenarioEvent], domains: Mapping[str, Domain]) ->
         when = (
             say("imported.when-decided") if event.after is None else say("imported.when-sent", count=f"{event.after:,}")
         )
-        told = [_said(change, domains) for change in event.changes[:MOST_CHANGES]]
-        if (more := len(event.changes) - len(told)) > 0:
-            told.append(say("imported.more-changes", count=f"{more:,}"))
-        yield f"{when} {'; '.join(told)}."
+        words = [_change_words(change, domains) for change in event.changes[:MOST_CHANGES]]
+        if (more := len(event.changes) - len(words)) > 0:
+            words.append(say("imported.more-changes", count=f"{more:,}"))
+        yield f"{when} {'; '.join(words)}."
 
 
-def _said(change: Change, domains: Mapping[str, Domain]) -> str:
+def _change_words(change: Change, domains: Mapping[str, Domain]) -> str:
     match change:
         case RemoveAgent(name):
             return say("imported.leaves", robot=name)

@@ -44,7 +44,7 @@ def read_robot_file(folder: Path, robot: str) -> ShownRobotFile:
     file = _file_of(folder, robot)
     found = read_robot(file)
     constraints = [*found.constraints()]
-    says = (sentence(one, found.symbol_table, found.costs) for one in constraints[:MOST_SENTENCES])
+    sentences = (sentence(one, found.symbol_table, found.costs) for one in constraints[:MOST_SENTENCES])
     with file.open(encoding="utf-8", errors="replace") as opened:
         text = opened.read(MOST_SHOWN + 1)
     return ShownRobotFile(
@@ -52,7 +52,7 @@ def read_robot_file(folder: Path, robot: str) -> ShownRobotFile:
         text[:MOST_SHOWN],
         len(text) > MOST_SHOWN,
         tuple(dict.fromkeys([*(one.name for one in found.parents), *(one.name for one in found.children)])),
-        tuple(says),
+        tuple(sentences),
         len(constraints),
     )
 
@@ -87,15 +87,15 @@ def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUni
         units: The units of the costs in its robot's file. None: integers.
     """
     units = units or CostUnits()
-    says = _says(constraint, symbols, units)
-    says = says if len(says) <= _LONGEST else f"{says[: _LONGEST - 1]}…"
+    text = _in_words(constraint, symbols, units)
+    text = text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
     if isinstance(constraint.definition, Predicate) and constraint.cost != INFINITE:
         cost = cost_shown(CostUnits(places=units.places).in_user_units(constraint.cost))
-        says = say("imported.or-costs", says=says, cost=cost)
-    return say("imported.own-part", says=says) if constraint.model == ConstraintModel.PKC else says
+        text = say("imported.or-costs", says=text, cost=cost)
+    return say("imported.own-part", says=text) if constraint.model == ConstraintModel.PKC else text
 
 
-def _says(constraint: Constraint, symbols: Sequence[str], units: CostUnits) -> str:
+def _in_words(constraint: Constraint, symbols: Sequence[str], units: CostUnits) -> str:
     match constraint.definition:
         case Relation() as relation:
             return _table(constraint, relation, symbols, units)
@@ -110,9 +110,9 @@ def _table(constraint: Constraint, relation: Relation, symbols: Sequence[str], u
     """Return a table in words: its decisions and its first rows."""
     rows = []
     for number, row in enumerate(relation.tuples[:_MOST_ROWS]):
-        told = ", ".join(_label(value, column in relation.symbolic, symbols) for column, value in enumerate(row))
-        told = told if relation.arity == 1 else f"({told})"
-        rows.append(f"{told}: {_priced(relation.costs[number], units)}" if relation.costs else told)
+        entry = ", ".join(_label(value, column in relation.symbolic, symbols) for column, value in enumerate(row))
+        entry = entry if relation.arity == 1 else f"({entry})"
+        rows.append(f"{entry}: {_priced(relation.costs[number], units)}" if relation.costs else entry)
     if (more := len(relation.tuples) - len(rows)) > 0:
         rows.append(say("imported.more-rows", count=f"{more:,}"))
     over = ", ".join(map(str, constraint.scope))

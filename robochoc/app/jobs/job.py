@@ -16,7 +16,7 @@ from robochoc.app.jobs.process import Command, Finished, GroupProcess
 from robochoc.app.log import log_error
 from robochoc.system.errors import RobochocError
 
-LOOK_S = 0.2
+OBSERVE_S = 0.2
 """The interval of the callback that observes a process."""
 _PAUSES_S = (0.001, 0.05)
 """The first and the longest pause between two checks whether a process has ended."""
@@ -30,7 +30,7 @@ AT_ONCE = ((0.0, signal.SIGKILL),)
 T = TypeVar("T")
 Call = Callable[[Callable[[], None]], object]
 """Calls a function, perhaps later and in another thread."""
-Over = Callable[[str], object]
+OnIncomplete = Callable[[str], object]
 """Called once, in the job's thread, if the job did not complete: with the error, or empty if the job was ended."""
 
 
@@ -59,13 +59,13 @@ def event_loop_caller() -> Call:
 class Job(Generic[T]):
     """Work in a thread. The argument of `work` is the job, which can start processes.
 
-    The job always ends: after an error, `future` has the exception, `over` is called, and unforeseen errors are written
-    to the error log.
+    The job always ends: after an error, `future` has the exception, and `on_incomplete` is called. Unforeseen errors
+    are written to the error log.
 
     Args:
         name: A description of the job, for the error log.
         work: The work.
-        over: Called if the work was not completed.
+        on_incomplete: Called if the work was not completed.
         folder: The folder that the job uses, if any: see `end_jobs_in`.
         stopping: The signals that stop its process, each with the seconds after which it is sent.
     """
@@ -75,13 +75,13 @@ class Job(Generic[T]):
         name: str,
         work: Callable[[Job[T]], T],
         *,
-        over: Over | None = None,
+        on_incomplete: OnIncomplete | None = None,
         folder: Path | None = None,
         stopping: tuple[tuple[float, int], ...] = AT_ONCE,
     ) -> None:
         self.name, self.folder = name, folder
         self.future: Future[T] = Future()
-        self.over = over
+        self.on_incomplete = on_incomplete
         self._does, self._stopping = work, stopping
         self._lock = threading.Lock()
         self._is_reported = False
@@ -153,13 +153,13 @@ class Job(Generic[T]):
             raise EndedError
 
     def run(
-        self, command: Command, look: Callable[[], object] | None = None, within_s: float | None = None
+        self, command: Command, observe: Callable[[], object] | None = None, within_s: float | None = None
     ) -> Finished:
         """Run a process to its end.
 
         Args:
             command: The process.
-            look: Called repeatedly while the process runs.
+            observe: Called repeatedly while the process runs.
             within_s: The time limit of the process.
 
         Raises:
@@ -171,7 +171,7 @@ class Job(Generic[T]):
             self.check()
             self._process = process = GroupProcess(command)
         try:
-            late = self._watch(process, look, within_s)
+            late = self._watch(process, observe, within_s)
         finally:
             with self._lock:
                 self._process = None
@@ -181,9 +181,9 @@ class Job(Generic[T]):
             raise LateError
         return finished
 
-    def _watch(self, process: GroupProcess, look: Callable[[], object] | None, within_s: float | None) -> bool:
+    def _watch(self, process: GroupProcess, observe: Callable[[], object] | None, within_s: float | None) -> bool:
         """Watch a process until its end; return whether it has reached its time limit."""
-        began = looked = time.monotonic()
+        began = observed = time.monotonic()
         sent = 0
         pause_s, longest_s = _PAUSES_S
         while not process.has_ended and not self.is_ended:
@@ -196,9 +196,9 @@ class Job(Generic[T]):
                     break
                 process.kill() if number == signal.SIGKILL else process.signal(number)
                 sent += 1
-            if look and now - looked >= LOOK_S:
-                look()
-                looked = now
+            if observe and now - observed >= OBSERVE_S:
+                observe()
+                observed = now
             self._news.wait(pause_s)
             self._news.clear()
             pause_s = min(2 * pause_s, longest_s)
@@ -225,9 +225,9 @@ class Job(Generic[T]):
     def _report(self, why: str) -> None:
         with self._lock:
             was_reported, self._is_reported = self._is_reported, True
-        if self.over and not was_reported:
+        if self.on_incomplete and not was_reported:
             try:
-                self.over(why)
+                self.on_incomplete(why)
             except Exception as fault:  # noqa: BLE001 - the job must end nevertheless
                 log_error(fault, self.name)
 

@@ -38,7 +38,7 @@ class LessonProgress:
         self._done[number] = step + 1
         self._write()
 
-    def begin_again(self, number: int) -> None:
+    def restart(self, number: int) -> None:
         """Delete the progress of a lesson."""
         if self._done.pop(number, 0):
             self._write()

@@ -100,7 +100,7 @@ def build_gallery(projects: Projects) -> None:
             ui.label(say("gallery.title"))
         ui.label(say("gallery.intro")).classes("soft")
     with ui.element("ul").classes("cards"):
-        _card(say("gallery.new"), say("gallery.new-hint"), lambda: _begin(projects, Sketch()), icon="add")
+        _card(say("gallery.new"), say("gallery.new-hint"), lambda: _create_team(projects, Sketch()), icon="add")
         build_upload_card(projects, show_team)
         _card(say("lesson.title"), say("lesson.title-hint"), lambda: ui.navigate.to("/lessons"), icon="school")
     _heading("gallery.examples")
@@ -109,7 +109,7 @@ def build_gallery(projects: Projects) -> None:
             _card(
                 title_of(key),
                 sketch.story,
-                partial(_begin, projects, sketch),
+                partial(_create_team, projects, sketch),
                 sketch=sketch,
                 note=_shown_by(key, sketch),
             )
@@ -126,7 +126,7 @@ def show_team(name: str) -> None:
     ui.navigate.to(f"/team/{name}/model")
 
 
-def _begin(projects: Projects, sketch: Sketch) -> None:
+def _create_team(projects: Projects, sketch: Sketch) -> None:
     show_team(projects.add(sketch).id)
 
 
@@ -149,12 +149,12 @@ def _own_card(projects: Projects, name: str) -> None:
     title = name if sketch is None else sketch.name
     says = say("app.damaged") if sketch is None else counted(len(sketch.robots))
     with _card(title, says, partial(show_team, name), sketch=sketch):
-        button = ui.button(icon="close", on_click=partial(_ask_to_remove, projects, name, title)).classes("remove")
+        button = ui.button(icon="close", on_click=partial(_confirm_removal, projects, name, title)).classes("remove")
         button.props("flat round dense size=sm")
         button.props["aria-label"] = say("gallery.remove", name=title)  # `props` would parse the name
 
 
-def _ask_to_remove(projects: Projects, name: str, title: str) -> None:
+def _confirm_removal(projects: Projects, name: str, title: str) -> None:
     def remove() -> None:
         dialog.close()
         with suppress(KeyError):  # already removed

@@ -45,7 +45,7 @@ class Live:
         bound: The lower bound of the cost. None: not known.
         recent: The number of messages in the last second, by sender and receiver.
         is_cut: Whether the last messages were skipped, since there were too many after the end of the run.
-        said: The last messages in words, the last one first.
+        last_messages: The last messages in words, the last one first.
     """
 
     messages: int = 0
@@ -55,7 +55,7 @@ class Live:
     costs: list[tuple[float, Cost]] = field(default_factory=list)
     recent: Counter[tuple[str, str]] = field(default_factory=Counter)
     is_cut: bool = False
-    said: tuple[MessageWords, ...] = ()
+    last_messages: tuple[MessageWords, ...] = ()
 
     def settled(self, robot: str) -> bool:
         """Return whether a robot has not changed its values for a while."""
@@ -134,8 +134,8 @@ class LiveReader:
         if bunch:
             self._live.messages += bunch.total()
             self._bunches.append((now, bunch))
-            said = [in_words(sent, self._spoken) for sent in reversed(last)]
-            self._live.said = (*said, *self._live.said)[:LAST]
+            last_messages = [in_words(sent, self._spoken) for sent in reversed(last)]
+            self._live.last_messages = (*last_messages, *self._live.last_messages)[:LAST]
         return bool(entries)
 
     def close(self) -> None:
@@ -174,6 +174,6 @@ class LiveReader:
         while self._bunches and now - self._bunches[0][0] > RECENT_S:
             self._bunches.popleft()
         recent: Counter[tuple[str, str]] = Counter()
-        for _, said in self._bunches:
-            recent.update(said)
+        for _, last_messages in self._bunches:
+            recent.update(last_messages)
         self._live.recent = recent

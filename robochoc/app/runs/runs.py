@@ -45,7 +45,7 @@ def run_job(run: Run, prepare: Callable[[Run], PreparedTeam]) -> Job[None]:
     return Job(
         f"run {run.folder}",
         partial(_work, run, prepare),
-        over=partial(_interrupted, run),
+        on_incomplete=partial(_interrupted, run),
         folder=run.folder,
         stopping=_STOPPING,
     )
@@ -120,7 +120,7 @@ def _finish(run: Run, state: RunState, message: str = "") -> None:
     run.notify()
 
 
-MOST_KEPT = 30
+MAX_RUNS = 30
 """The maximum number of runs of a team. Older ones are removed."""
 _USUAL = RunOptions()
 
@@ -239,8 +239,8 @@ class Runs:
                 run.watched_by.end()
 
     def _forget_old(self) -> None:
-        over = [run for run in self._runs if run.state != RunState.RUNNING]
-        for run in over[: max(0, len(self._runs) - MOST_KEPT)]:
+        ended = [run for run in self._runs if run.state != RunState.RUNNING]
+        for run in ended[: max(0, len(self._runs) - MAX_RUNS)]:
             self._runs.remove(run)
             with suppress(OSError):  # without its record, the folder is not a run any more if this process dies now
                 (run.folder / RECORD).unlink()

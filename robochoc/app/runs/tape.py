@@ -24,7 +24,7 @@ MOST_READ = 300_000
 """The maximum number of messages and decisions that are played: more are slow to read and sort, and unreadable."""
 MOST_BYTES = 32 << 20
 """The maximum number of bytes that are read of the journal."""
-WORDS_KEPT = 3
+WORDS_SAVED = 3
 """The number of messages of a moment that are available in words."""
 MOST_LETTERS = 300
 MOST_LINKS = 200
@@ -53,14 +53,14 @@ class Moment:
 
     Attributes:
         count: The number of messages.
-        said: The last messages, in words.
+        last_messages: The last messages, in words.
         links: The number of messages by sender and receiver.
         values: The values that have changed since the previous moment, by robot and `ROBOT.DECISION`.
         begins: Whether a run or an epoch begins in this moment: earlier decisions are void.
     """
 
     count: int = 0
-    said: tuple[MessageWords, ...] = ()
+    last_messages: tuple[MessageWords, ...] = ()
     links: Counter[tuple[str, str]] = field(default_factory=Counter)
     values: dict[str, dict[str, Value]] = field(default_factory=dict)
     begins: bool = False
@@ -68,9 +68,9 @@ class Moment:
     def joined(self, later: Moment) -> Moment:
         """Return this moment joined with the next one."""
         links = Counter(dict((self.links + later.links).most_common(MOST_LINKS)))
-        said = (*self.said, *later.said)[-WORDS_KEPT:]
+        last_messages = (*self.last_messages, *later.last_messages)[-WORDS_SAVED:]
         values = later.values if later.begins else self.values | later.values
-        return Moment(self.count + later.count, said, links, values, begins=self.begins or later.begins)
+        return Moment(self.count + later.count, last_messages, links, values, begins=self.begins or later.begins)
 
     def after(self, before: Mapping[str, Mapping[str, Value]]) -> dict[str, Mapping[str, Value]]:
         """Return the values of all robots at its end, given the values `before` it."""
@@ -98,7 +98,7 @@ class Tape:
         self._robots = frozenset(robots)
         self._label = label
         self._spoken = JournalSentences(called)
-        self._last: deque[Sent] = deque(maxlen=WORDS_KEPT)
+        self._last: deque[Sent] = deque(maxlen=WORDS_SAVED)
         self._size = 1
         self._settled: dict[str, int] = {}
 
@@ -112,7 +112,7 @@ class Tape:
                 values = {name: self._label(name, value) for name, value in entry.assignment.items()}
                 self.moments[-1].values[entry.robot] = values
             case Began():
-                self._begin()
+                self._start_run()
                 self._spoken.follow(entry)
             case _:
                 self._spoken.follow(entry)
@@ -126,7 +126,7 @@ class Tape:
             robots = before.keys() | now.keys() if moment.begins else moment.values.keys()
             self._settled |= {robot: number for robot in robots if before.get(robot) != now.get(robot)}
 
-    def _begin(self) -> None:
+    def _start_run(self) -> None:
         """Start a run or an epoch, in which no robot has decided yet."""
         self._close()
         if self.moments[-1].count:
@@ -147,8 +147,8 @@ class Tape:
         """Convert the last messages to words, while the context of the messages is available."""
         if self._last:
             moment = self.moments[-1]
-            said = (*moment.said, *(in_words(sent, self._spoken) for sent in self._last))
-            moment.said = said[-WORDS_KEPT:]
+            last_messages = (*moment.last_messages, *(in_words(sent, self._spoken) for sent in self._last))
+            moment.last_messages = last_messages[-WORDS_SAVED:]
             moment.links = Counter(dict(moment.links.most_common(MOST_LINKS)))
             self._last.clear()
 
@@ -176,23 +176,23 @@ class Tape:
         """Return the number of messages up to the end of a moment."""
         return sum(moment.count for moment in self.moments[: number + 1])
 
-    def said_at(self, number: int, most: int) -> list[MessageWords]:
+    def words_at(self, number: int, most: int) -> list[MessageWords]:
         """Return the last messages in words at the end of a moment, the last one first."""
-        said: list[MessageWords] = []
+        last_messages: list[MessageWords] = []
         for moment in reversed(self.moments[: number + 1]):
-            said += reversed(moment.said)
-            if len(said) >= most:
+            last_messages += reversed(moment.last_messages)
+            if len(last_messages) >= most:
                 break
-        return said[:most]
+        return last_messages[:most]
 
 
-def recorded(file: Path, tape: Tape, wanted: Callable[[], bool] = lambda: True) -> Tape:
+def recorded(file: Path, tape: Tape, is_needed: Callable[[], bool] = lambda: True) -> Tape:
     """Return `tape` with the conversation of a complete or interrupted journal, ordered by time.
 
     Args:
         file: The journal.
         tape: The tape to fill.
-        wanted: Returns whether the result is still needed; called from time to time.
+        is_needed: Returns whether the result is still needed; called from time to time.
 
     Raises:
         OSError: if the journal cannot be read.
@@ -203,21 +203,21 @@ def recorded(file: Path, tape: Tape, wanted: Callable[[], bool] = lambda: True) 
         growing = GrowingFile(descriptor)
         growing.widen(MOST_BYTES)
         tape.is_whole = growing.end == growing.size
-        _read(growing, tape, wanted)
+        _read(growing, tape, is_needed)
     finally:
         os.close(descriptor)
     tape.end()
     return tape
 
 
-def _read(file: GrowingFile, tape: Tape, wanted: Callable[[], bool]) -> None:
+def _read(file: GrowingFile, tape: Tape, is_needed: Callable[[], bool]) -> None:
     here = file.again()
     for header in next_entries(Follower(BufferedReader(here)), here, file.end)[:1]:
         tape.add(header)
     for piece in sorted_by_time(_first(file, tape)):
         for event in piece:
             tape.add(event)
-        if not wanted():
+        if not is_needed():
             tape.is_whole = False
             return
 

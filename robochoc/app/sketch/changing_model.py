@@ -128,7 +128,9 @@ class _Difference:
     def _check_robot(self, name: str) -> None:
         """Raise `FromScratchError` if a remaining robot has other decisions, or another weight or rank."""
         was, now = self._before.robot(name), self._after.robot(name)
-        decided, decides = ({one.name: one.kind for one in _of(sketch, name)} for sketch in (self._before, self._after))
+        decided, decides = (
+            {one.name: one.kind for one in _decisions_of(sketch, name)} for sketch in (self._before, self._after)
+        )
         if decided != decides:
             raise FromScratchError("whatif.anew-decision", robot=name)
         assert was is not None  # noqa: S101 - the robot is in both sketches
@@ -192,7 +194,7 @@ class _Difference:
                 event.remove_constraint(link.name)
         for drawn in self._come:
             robot = event.robot(drawn.name, weight=drawn.weight)
-            for decision in _of(self._after, drawn.name):
+            for decision in _decisions_of(self._after, drawn.name):
                 robot.variable(decision.name, [*self._after.values(decision)])
             add_topic(self._after, robot)
         for link in self._added:
@@ -267,7 +269,7 @@ def _add(event: ModelEvent, model: Model, link: RuleLink) -> None:
             event.add(variable != value, cost=price, name=f"{link.name}_{value}".replace("-", "m"))
 
 
-def _of(sketch: Sketch, robot: str) -> Iterator[Decision]:
+def _decisions_of(sketch: Sketch, robot: str) -> Iterator[Decision]:
     """Yield the decisions of a robot."""
     for decision in sketch.decisions:
         if robot in sketch.deciders(decision):

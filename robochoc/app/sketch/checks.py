@@ -32,19 +32,19 @@ def hopeless(facts: SketchFacts) -> Iterator[Trouble]:
     """Yield rules that cannot be satisfied."""
     hard = [rule for rule in facts.sound if rule.cost is None and not PALETTE[rule.kind].graded]
     own: Own = {}
-    found = [*_alone(facts, [rule for rule in hard if PALETTE[rule.kind].links == Links.EACH], own)]
+    found = [*_single_conflicts(facts, [rule for rule in hard if PALETTE[rule.kind].links == Links.EACH], own)]
     yield from found
     if found:
         return
-    found = [*_of_two(facts, hard, own)]
+    found = [*_pair_conflicts(facts, hard, own)]
     yield from found
     lost = {trouble.element for trouble in found}
     for rule in hard:
         if rule.id not in lost:
-            yield from _of_all(facts, rule, own)
+            yield from _group_conflicts(facts, rule, own)
 
 
-def _alone(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
+def _single_conflicts(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
     """Remove from `own` the values that each rule forbids. Yield the rules that leave a robot no values."""
     for rule in rules:
         given, entry = Applied(facts.sketch, rule), PALETTE[rule.kind]
@@ -65,7 +65,7 @@ def _left(facts: SketchFacts, own: Own, robot: str, decision: str) -> Values:
     return frozenset(facts.values[decision]) if found is None else found
 
 
-def _of_two(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
+def _pair_conflicts(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
     """Yield the last one of rules that two robots cannot satisfy together."""
     links: dict[_Link, list[tuple[int, bool]]] = {}
     for place, rule in enumerate(rules):
@@ -102,7 +102,7 @@ def _is_satisfiable(facts: SketchFacts, left: tuple[Values, Values], applied: li
     )
 
 
-def _of_all(facts: SketchFacts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
+def _group_conflicts(facts: SketchFacts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
     """Yield a rule that its robots cannot satisfy together."""
     robots = facts.sketch.bound(rule)
     left = [_left(facts, own, robot, rule.decision) for robot in robots]
@@ -157,9 +157,18 @@ def errors_of(sketch: Sketch) -> list[Trouble]:
 
 def _checked(sketch: Sketch) -> tuple[list[Trouble], SketchFacts | None]:
     """Return all errors and quick hints, and the facts about a sketch that is within bounds."""
-    found = [*element_checks.of_bounds(sketch)]
+    found = [*element_checks.check_bounds(sketch)]
     if found:
         return found, None
-    found += [*element_checks.of_names(sketch), *element_checks.of_robots(sketch), *element_checks.of_decisions(sketch)]
+    found += [
+        *element_checks.check_names(sketch),
+        *element_checks.check_robots(sketch),
+        *element_checks.check_decisions(sketch),
+    ]
     facts = SketchFacts(sketch)
-    return [*found, *facts.unfit.values(), *rule_checks.of_secrets(facts), *rule_checks.of_number(facts)], facts
+    return [
+        *found,
+        *facts.unfit.values(),
+        *rule_checks.check_private(facts),
+        *rule_checks.check_link_count(facts),
+    ], facts

@@ -19,7 +19,7 @@ _LONGEST = 10_000
 """The maximum length of any text in a readable sketch."""
 
 
-def of_bounds(sketch: Sketch) -> Iterator[Trouble]:
+def check_bounds(sketch: Sketch) -> Iterator[Trouble]:
     """Yield exceeded bounds of a sketch. The other checks require a sketch within the bounds."""
     if not is_label(sketch.name):
         yield Trouble(About.TEAM, "team", "trouble.team-name", {"name": shortened(sketch.name)})
@@ -46,7 +46,7 @@ def is_label(name: str) -> bool:
     return is_name(name) and name != RESERVED and len(name) <= limits.MAX_LABEL
 
 
-def of_names(sketch: Sketch) -> Iterator[Trouble]:
+def check_names(sketch: Sketch) -> Iterator[Trouble]:
     """Yield invalid and duplicate names."""
     groups: tuple[tuple[About, list[str]], ...] = (
         (About.ROBOT, [robot.name for robot in sketch.robots]),
@@ -74,7 +74,7 @@ def _clashes(sketch: Sketch) -> Iterator[Trouble]:
         known |= own
 
 
-def of_robots(sketch: Sketch) -> Iterator[Trouble]:
+def check_robots(sketch: Sketch) -> Iterator[Trouble]:
     """Yield the errors of robots."""
     if not sketch.robots:
         yield Trouble(About.MAP, "map", "trouble.no-robots")
@@ -97,36 +97,39 @@ def of_robots(sketch: Sketch) -> Iterator[Trouble]:
         yield Trouble(About.MAP, "map", "trouble.map-blocked")
 
 
-def of_decisions(sketch: Sketch) -> Iterator[Trouble]:
+def check_decisions(sketch: Sketch) -> Iterator[Trouble]:
     """Yield the errors of decisions: of their robots and values."""
     known = {robot.name for robot in sketch.robots}
     for decision in sketch.decisions:
         named: dict[str, str | int] = {"name": shortened(decision.name)}
-        for key, found in (("unknown", strangers(decision.robots, known)), ("twice", repeated(decision.robots))):
+        for key, found in (
+            ("unknown", first_unknown(decision.robots, known)),
+            ("twice", first_repeated(decision.robots)),
+        ):
             if found is not None:
                 with_robot = named | {"robot": shortened(found)}
                 yield Trouble(About.DECISION, decision.name, f"trouble.decision-robot-{key}", with_robot)
         if not sketch.values(decision):
             key = "trouble.decision-no-cell" if decision.kind == DecisionKind.PLACE else "trouble.decision-empty"
             yield Trouble(About.DECISION, decision.name, key, named)
-        yield from _of_values(sketch, decision)
+        yield from _check_values(sketch, decision)
 
 
-def _of_values(sketch: Sketch, decision: Decision) -> Iterator[Trouble]:
+def _check_values(sketch: Sketch, decision: Decision) -> Iterator[Trouble]:
     """Yield the first invalid value of a decision, or else its first duplicate value."""
     named: dict[str, str | int] = {"name": shortened(decision.name)}
     for value in decision.values:
-        key = _of_value(sketch, decision.kind, value)
+        key = _value_error(sketch, decision.kind, value)
         if key:
             yield Trouble(About.DECISION, decision.name, key, named | {"value": shortened(value), "most": MAX_NUMBER})
             return
-    twice = repeated(decision.values)
+    twice = first_repeated(decision.values)
     if twice is not None:
         with_value = named | {"value": shortened(twice)}
         yield Trouble(About.DECISION, decision.name, "trouble.decision-value-twice", with_value)
 
 
-def _of_value(sketch: Sketch, kind: DecisionKind, value: int | str) -> str | None:
+def _value_error(sketch: Sketch, kind: DecisionKind, value: int | str) -> str | None:
     if kind not in NUMBERED:
         if isinstance(value, int):
             return "trouble.decision-no-text"
@@ -141,12 +144,12 @@ def _of_value(sketch: Sketch, kind: DecisionKind, value: int | str) -> str | Non
     return "trouble.decision-blocked" if sketch.area.cell(value) in sketch.area.blocked else None
 
 
-def strangers(names: Iterable[str], known: set[str]) -> str | None:
+def first_unknown(names: Iterable[str], known: set[str]) -> str | None:
     """Return the first unknown name; None if all are known."""
     return next((name for name in names if name not in known), None)
 
 
-def repeated(items: Sequence[int | str]) -> int | str | None:
+def first_repeated(items: Sequence[int | str]) -> int | str | None:
     """Return the first item that occurs more than once; None if there is none."""
     return next((item for item, count in Counter(items).items() if count > 1), None)
 

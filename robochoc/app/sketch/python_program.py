@@ -158,19 +158,21 @@ def _rule(sketch: Sketch, rule: SketchRule, dictionary: str) -> Iterator[str]:
     if entry.links == Links.GROUP:
         few = 2
         names = bound if len(bound) == few else ()
-        each = Each(f"{dictionary}[a]", _over(sketch, rule, dictionary))
-        terms = [each] if not rule.private else [_of(dictionary, name) for name in bound]
+        each = Each(f"{dictionary}[a]", _variables_of(sketch, rule, dictionary))
+        terms = [each] if not rule.private else [_variable(dictionary, name) for name in bound]
         yield from _statements(sketch, rule, terms, bound if rule.private else (), [rule.id, *names])
     elif len(links) <= one_line:
         for _, robots in links:
-            yield from _statements(sketch, rule, [_of(dictionary, one) for one in robots], robots, [rule.id, *robots])
+            yield from _statements(
+                sketch, rule, [_variable(dictionary, one) for one in robots], robots, [rule.id, *robots]
+            )
     else:
         loop = _loop(entry.links, bound, [robots for _, robots in links])
         if loop.names == bound == sketch.deciders(_decision_of(sketch, rule)):
             yield f"{loop.before}{dictionary}{loop.after}"
         else:
             yield from _broken(loop.before, loop.names, loop.after)
-        terms = [_of(dictionary, one) for one in loop.robots]
+        terms = [_variable(dictionary, one) for one in loop.robots]
         for line in _statements(sketch, rule, terms, loop.robots, [rule.id, *loop.robots]):
             yield f"    {line}"
 
@@ -195,12 +197,12 @@ def _decision_of(sketch: Sketch, rule: SketchRule) -> Decision:
     return decision
 
 
-def _over(sketch: Sketch, rule: SketchRule, dictionary: str) -> str:
+def _variables_of(sketch: Sketch, rule: SketchRule, dictionary: str) -> str:
     bound = sketch.bound(rule)
     return dictionary if bound == sketch.deciders(_decision_of(sketch, rule)) else python_literal([*bound])
 
 
-def _of(dictionary: str, robot: str | PythonText) -> PythonText:
+def _variable(dictionary: str, robot: str | PythonText) -> PythonText:
     return PythonText(f"{dictionary}[{python_literal(robot)}]")
 
 

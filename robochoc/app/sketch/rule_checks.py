@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robochoc.app.sketch import sketch as limits
-from robochoc.app.sketch.element_checks import repeated, strangers
+from robochoc.app.sketch.element_checks import first_repeated, first_unknown
 from robochoc.app.sketch.palette import Form, Links, PaletteRule, RuleField
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Setting, Sketch, SketchRule
@@ -39,10 +39,10 @@ class SketchFacts:
 
 def _first(facts: SketchFacts, rule: SketchRule) -> Trouble | None:
     """Return the first error of a rule."""
-    return next(_of_rule(facts, rule), None)
+    return next(_check_rule(facts, rule), None)
 
 
-def _of_rule(facts: SketchFacts, rule: SketchRule) -> Iterator[Trouble]:
+def _check_rule(facts: SketchFacts, rule: SketchRule) -> Iterator[Trouble]:
     entry, decision = PALETTE.get(rule.kind), facts.sketch.decision(rule.decision)
     if entry is None:
         yield _trouble(rule, "kind", kind=shortened(rule.kind))
@@ -51,9 +51,9 @@ def _of_rule(facts: SketchFacts, rule: SketchRule) -> Iterator[Trouble]:
     elif decision.kind not in entry.kinds:
         yield _trouble(rule, "fit", decision=shortened(decision.name), kind=say(f"kind.{decision.kind}").lower())
     else:
-        yield from _of_robots(facts, rule, entry)
+        yield from _check_robots(facts, rule, entry)
         for opening in entry.openings:
-            key = _of_opening(rule.settings.get(opening.name), opening, facts.values[decision.name])
+            key = _field_error(rule.settings.get(opening.name), opening, facts.values[decision.name])
             if key:
                 named: Named = {"what": say(f"opening.{opening.name}").lower(), "decision": shortened(decision.name)}
                 yield _trouble(rule, key, least=opening.least, most=opening.most, **named)
@@ -65,10 +65,10 @@ def _trouble(rule: SketchRule, key: str, **named: str | int) -> Trouble:
     return Trouble(About.RULE, rule.id, f"trouble.rule-{key}", named | {"rule": shortened(rule.id)})
 
 
-def _of_robots(facts: SketchFacts, rule: SketchRule, entry: PaletteRule) -> Iterator[Trouble]:
+def _check_robots(facts: SketchFacts, rule: SketchRule, entry: PaletteRule) -> Iterator[Trouble]:
     """Yield the errors of a rule's robots."""
-    stranger, twice = strangers(rule.robots, facts.robots), repeated(rule.robots)
-    idle = strangers(rule.robots, facts.deciders[rule.decision])
+    stranger, twice = first_unknown(rule.robots, facts.robots), first_repeated(rule.robots)
+    idle = first_unknown(rule.robots, facts.deciders[rule.decision])
     count = facts.bound(rule)
     group = entry.links == Links.GROUP
     if stranger is not None:
@@ -87,7 +87,7 @@ def _of_robots(facts: SketchFacts, rule: SketchRule, entry: PaletteRule) -> Iter
         yield _trouble(rule, "private-many", count=count)
 
 
-def _of_opening(given: Setting | None, opening: RuleField, values: set[int | str]) -> str | None:
+def _field_error(given: Setting | None, opening: RuleField, values: set[int | str]) -> str | None:
     """Return the key of the error in a field; None if its value is valid."""
     match opening.form:
         case Form.NUMBER:
@@ -100,10 +100,10 @@ def _of_opening(given: Setting | None, opening: RuleField, values: set[int | str
                 return "values-none"
             return None if all(_is_value(one, values) for one in given) else "values"
         case Form.TABLE:
-            return _of_table(given, values)
+            return _table_error(given, values)
 
 
-def _of_table(given: Setting | None, values: set[int | str]) -> str | None:
+def _table_error(given: Setting | None, values: set[int | str]) -> str | None:
     if not isinstance(given, list) or not given:
         return "table-none"
     for row in given:
@@ -116,7 +116,7 @@ def _is_value(given: object, values: set[int | str]) -> bool:
     return isinstance(given, (int, str)) and given in values
 
 
-def of_secrets(facts: SketchFacts) -> Iterator[Trouble]:
+def check_private(facts: SketchFacts) -> Iterator[Trouble]:
     """Yield private rules of two robots in a team with costs: no protocol for costs supports private rules.
 
     Rules of a single robot are never disclosed.
@@ -153,7 +153,7 @@ def _is_graded(rule: SketchRule) -> bool:
     return entry is not None and entry.graded
 
 
-def of_number(facts: SketchFacts) -> Iterator[Trouble]:
+def check_link_count(facts: SketchFacts) -> Iterator[Trouble]:
     """Yield the first rule with which the number of constraints exceeds the limit."""
     total = 0
     for rule in facts.sound:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from html import escape
 
-from robochoc.app.sketch.element_checks import of_bounds
+from robochoc.app.sketch.element_checks import check_bounds
 from robochoc.app.sketch.palette import Links
 from robochoc.app.sketch.rule_checks import SketchFacts
 from robochoc.app.sketch.rules import PALETTE
@@ -36,7 +36,7 @@ def thumbnail(sketch: Sketch, links: Iterable[tuple[str, str]] = ()) -> str:
         sketch: The sketch.
         links: Further pairs of linked robots.
     """
-    if any(one.key != _NAMED_ELSEWHERE for one in of_bounds(sketch)):
+    if any(one.key != _NAMED_ELSEWHERE for one in check_bounds(sketch)):
         sketch = Sketch()  # an empty map
     scale = min((WIDTH - 2 * _MARGIN) / sketch.area.columns, (HEIGHT - 2 * _MARGIN) / sketch.area.rows)
     drawn = _Thumbnail(sketch, scale)

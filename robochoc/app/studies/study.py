@@ -106,7 +106,7 @@ class TeamStudy:
         self._job = Job(
             f"study {self._folder}",
             partial(self._work, sketch, files, facts),
-            over=partial(self._interrupted, facts),
+            on_incomplete=partial(self._interrupted, facts),
             folder=self._folder,
             stopping=_STOPPING,
         ).start()

@@ -82,7 +82,7 @@ def export(
     read = saved_journal(file)
     trace = _trace(read, file)
     try:
-        messages = selection.of(trace)
+        messages = selection.numbers_in(trace)
     except NothingSelectedError as nothing:
         raise click.UsageError(_one_line(str(nothing))) from nothing
     if trace.damage:
@@ -170,10 +170,10 @@ def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
     from robochoc.sniffer.export import embedded_answers
     from robochoc.sniffer.page import sniffer_page
     from robochoc.sniffer.page_data import PageData
-    from robochoc.sniffer.scene import whole_scene
+    from robochoc.sniffer.scene import complete_scene
 
     data = PageData(trace, chosen=selection.robots)
-    answers = {**embedded_answers(data, read), "scene": zlib.compress(whole_scene(trace))}
+    answers = {**embedded_answers(data, read), "scene": zlib.compress(complete_scene(trace))}
     return sniffer_page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
 
 

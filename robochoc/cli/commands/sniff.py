@@ -144,7 +144,7 @@ def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
         try:
             session = SnifferSession(journal, chosen=patterns_in(chosen), robots=robots)
             on_error.callback(session.close)
-            session.begin()
+            session.read_header()
         except (JournalError, TraceTooLargeError) as error:
             raise Failure(INVALID, on_one_line(f"{journal}: {error} ({JOURNAL_STEP})")) from error
         except OSError as error:

@@ -267,7 +267,7 @@ def test_what_is_nothing_of_ours_is_told(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     (tmp_path / "empty").mkdir()
     told = {name: refused(tmp_path / name) for name in ("a.txt", "a.xml", "pipe", "empty", "missing")}
-    assert "no format" in told["a.txt"]
+    assert "unknown format" in told["a.txt"]
     assert "open the team's folder" in told["a.xml"]
     assert "no robot here" in told["empty"]
 

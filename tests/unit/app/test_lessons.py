@@ -102,7 +102,7 @@ def test_progress_is_kept(tmp_path: Path) -> None:
     again = LessonProgress(tmp_path)
     assert again.is_over(1)
     assert again.next() == 2
-    again.begin_again(1)
+    again.restart(1)
     assert LessonProgress(tmp_path).done(1) == 0
 
 

@@ -84,7 +84,7 @@ def test_who_cannot_be_interrupted_leaves_nothing_either(projects: Projects) -> 
 
 def test_what_was_broken_off_is_removed_the_next_time(projects: Projects) -> None:
     name = projects.add(Sketch()).id
-    projects.store.put_away(name)
+    projects.store.move_to_removed(name)
     (left,) = projects.store.folder.iterdir()
     assert (left / "history.json").is_file()
     assert projects.store.ids() == []

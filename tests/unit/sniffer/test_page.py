@@ -20,7 +20,7 @@ from robochoc.model.expression import Name
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Topic, Variable
 from robochoc.sniffer.page import sniffer_page
-from robochoc.sniffer.scene import TraceScene, whole_scene
+from robochoc.sniffer.scene import TraceScene, complete_scene
 from robochoc.sniffer.trace import Trace
 from tests.support.program import ROOT
 from tests.support.sniffer_server import header, journal_of, run_events
@@ -131,7 +131,7 @@ def test_all_land_when_another_run_begins() -> None:
 
 def test_meshcats_commands_hold_every_drone_and_no_animation() -> None:
     events, outcome = run_events()
-    scene = msgspec.json.decode(whole_scene(trace_of(events, outcome)))
+    scene = msgspec.json.decode(complete_scene(trace_of(events, outcome)))
     commands = [umsgpack.unpackb(base64.b64decode(command)) for command in scene["commands"]]
     assert {command["type"] for command in commands} == {"set_transform", "set_property", "set_object"}
     paths = {command["path"] for command in commands}
@@ -140,7 +140,7 @@ def test_meshcats_commands_hold_every_drone_and_no_animation() -> None:
 
 def test_nobody_to_be_seen_is_no_scene() -> None:
     assert (
-        whole_scene(
+        complete_scene(
             Trace.of(
                 Journal(header(), (), Outcome(Verdict.UNKNOWN, team="t", protocol="abt", runtime="simulator", seed=0))
             )

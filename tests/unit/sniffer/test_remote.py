@@ -51,9 +51,9 @@ class Kept:
 def test_whole_blocks_however_the_bytes_come(cuts: list[int]) -> None:
     kept = Kept()
     for start, end in zip([0, *sorted(cuts)], [*sorted(cuts), len(WHOLE)], strict=True):
-        assert kept.journal.take(told(start, WHOLE[start:end])) is None
+        assert kept.journal.receive(told(start, WHOLE[start:end])) is None
         assert kept.content == WHOLE[: max(place for place in ENDS if place <= end)]
-    assert kept.journal.take(told(len(WHOLE), b"", over=True)) == FollowResult(over=True, why="the run is over")
+    assert kept.journal.receive(told(len(WHOLE), b"", over=True)) == FollowResult(over=True, why="the run is over")
     assert kept.content == WHOLE
 
 
@@ -62,7 +62,7 @@ def test_nothing_is_kept_from_where_a_byte_is_another(place: int, change: int) -
     kept = Kept()
     content = bytearray(WHOLE)
     content[place] ^= change
-    ending = kept.journal.take(told(0, bytes(content))) or kept.journal.take(told(len(WHOLE), b"", over=True))
+    ending = kept.journal.receive(told(0, bytes(content))) or kept.journal.receive(told(len(WHOLE), b"", over=True))
     assert ending
     assert not ending.over
     assert kept.content == WHOLE[: len(kept.content)]
@@ -73,24 +73,24 @@ def test_a_block_that_is_missing_doubled_or_cut() -> None:
     missing, doubled = b"".join(BLOCKS[:3] + BLOCKS[4:]), b"".join(BLOCKS[:4] + BLOCKS[3:])
     for content in (missing, doubled):
         with pytest.raises(JournalDamagedError, match="checksum"):
-            WholeBlocks().take(content)
+            WholeBlocks().add(content)
     kept = Kept()
-    ending = kept.journal.take(told(0, WHOLE[:-1], over=True))
+    ending = kept.journal.receive(told(0, WHOLE[:-1], over=True))
     assert ending == FollowResult(
         over=False, why=f"the run is over, but its journal is incomplete: byte {ENDS[-2]:,}: it ends within a block"
     )
     assert kept.content == WHOLE[: ENDS[-2]]
     with pytest.raises(JournalError):
-        WholeBlocks().take(b"{}")
+        WholeBlocks().add(b"{}")
 
 
 def test_pieces_of_others_and_of_another_run() -> None:
     kept = Kept()
-    assert kept.journal.take(told(7, WHOLE[:100])) is None  # an answer that comes late
+    assert kept.journal.receive(told(7, WHOLE[:100])) is None  # an answer that comes late
     assert kept.content == b""
     for content in (b"", b"junk", told(0, bytes(PIECE_BYTES + 1))):
-        ending = Kept().journal.take(content)
+        ending = Kept().journal.receive(content)
         assert ending
         assert "sent an invalid journal" in ending.why
-    ending = kept.journal.take(told(0, WHOLE, run="another"))
+    ending = kept.journal.receive(told(0, WHOLE, run="another"))
     assert ending == FollowResult(over=False, why="the master at master:7447 was restarted")

@@ -153,7 +153,7 @@ class ComparePage:
         self._wrong = ui.label().classes("error").props("role=alert")
         with ui.element("div").classes("compare-row"):
             self._start = (
-                ui.button(say("compare.start"), on_click=self._begin, color=None)
+                ui.button(say("compare.start"), on_click=self._start_study, color=None)
                 .props("no-caps unelevated")
                 .classes("go")
             )
@@ -224,7 +224,7 @@ class ComparePage:
         ui.clipboard.write(self._text.text if self._text else "")
         ui.notify(say("compare.copied"))
 
-    def _begin(self) -> None:
+    def _start_study(self) -> None:
         question = self._question()
         few = len(question.protocols) < _FEWEST
         self._wrong.set_text(say("compare.few") if few else "")

@@ -73,20 +73,20 @@ class ConversationPlayer:
         """True if the playback is running."""
         return self._player.playing
 
-    def show_live(self, said: Sequence[MessageWords]) -> None:
+    def show_live(self, messages: Sequence[MessageWords]) -> None:
         """Show the last messages of a run in progress."""
         self._reset()
         self._controls.set_visibility(False)
-        self._list.set_content(said_html(said[:_LISTED]))
+        self._list.set_content(messages_html(messages[:_LISTED]))
 
-    def offer(self, run: Run | None) -> None:
+    def set_run(self, run: Run | None) -> None:
         """Offer the playback of an ended run; None: there is no run."""
         if run is self._run:
             return
         self._reset()
         self._run = run
         self._controls.set_visibility(run is not None)
-        self._list.set_content(said_html(run.live.said[:_LISTED]) if run else "")
+        self._list.set_content(messages_html(run.live.last_messages[:_LISTED]) if run else "")
         self._refresh()
 
     def start(self) -> None:
@@ -176,7 +176,7 @@ class ConversationPlayer:
             self._where.set_text(say("decide.talk-offer"))
             return
         self._slider.set_value(player.moment)
-        self._list.set_content(said_html(tape.said_at(player.moment, _LISTED)))
+        self._list.set_content(messages_html(tape.words_at(player.moment, _LISTED)))
         counts = {"number": f"{tape.messages_at(player.moment):,}", "all": f"{tape.messages:,}"}
         self._where.set_text(say("decide.talk-where" if tape.is_whole else "decide.talk-where-first", **counts))
 
@@ -194,14 +194,14 @@ def conversation_of(run: Run, wanted: Callable[[], bool] = lambda: True) -> Tape
     return tape if tape.messages and wanted() else None
 
 
-def said_html(said: Sequence[MessageWords]) -> str:
+def messages_html(messages: Sequence[MessageWords]) -> str:
     """Return messages as a list, the last one first. Names and texts are escaped."""
-    if not said:
+    if not messages:
         return ""
     items = "".join(
         f'<li><span class="whom">{escape(one.sender)} → {escape(one.receiver)}</span> '
         f'<span class="kind">{escape(one.kind)}</span> <span class="words">{escape(one.words)}</span></li>'
-        for one in said
+        for one in messages
     )
     return f'<h2>{escape(say("decide.talk"))}</h2><ol class="said-list">{items}</ol>'
 

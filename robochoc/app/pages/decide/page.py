@@ -15,7 +15,7 @@ from robochoc.app.pages.decide.conversation_player import ConversationPlayer
 from robochoc.app.pages.decide.no_solution_panel import NoSolutionPanel
 from robochoc.app.pages.decide.picture import decides_places, falling_svg, targets_of, team_svg, values_of
 from robochoc.app.pages.decide.run_options_panel import RunOptionsPanel
-from robochoc.app.pages.imported.answer import ImportedNoSolutionPanel, says_of, show_imported_below
+from robochoc.app.pages.imported.answer import ImportedNoSolutionPanel, show_imported_below, values_in_short
 from robochoc.app.pages.imported.answer import table_html as answers_html
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
@@ -168,9 +168,9 @@ class _Page:
     def _show_conversation(self, shown: Run | None) -> None:
         """Show the messages. A short conversation is played back in the tab where the run was started."""
         if shown is not None and shown.state == RunState.RUNNING:
-            self._player.show_live(shown.live.said)
+            self._player.show_live(shown.live.last_messages)
             return
-        self._player.offer(shown if shown and shown.result else None)
+        self._player.set_run(shown if shown and shown.result else None)
         if shown is not None and shown is self._pressed:
             self._pressed = None
             if shown.state == RunState.ENDED and shown.result and _is_short(shown.result):
@@ -185,7 +185,7 @@ class _Page:
 
     def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
         values, unsettled = tape.values_at(number), tape.unsettled_at(number)
-        says = says_of(self._imported, values) if self._imported else values_of(sketch, values)
+        says = values_in_short(self._imported, values) if self._imported else values_of(sketch, values)
         targets = targets_of(sketch, values)
         links = tape.moments[number].links
         self._picture.set_content(team_svg(sketch, says, unsettled=unsettled, spoken=links, targets=targets))
@@ -213,7 +213,7 @@ class _Page:
         unsettled = frozenset(robot.name for robot in sketch.robots if result is None and not live.settled(robot.name))
         aside = frozenset(result.withdrawn if result else ())
         spoken = dict(live.recent) if running else {}
-        says = says_of(self._imported, values) if self._imported else values_of(sketch, values)
+        says = values_in_short(self._imported, values) if self._imported else values_of(sketch, values)
         targets = targets_of(sketch, values)
         picture = team_svg(sketch, says, unsettled=unsettled, aside=aside, spoken=spoken, targets=targets)
         self._picture.set_content(picture)

@@ -100,7 +100,7 @@ def view_box(sketch: Sketch) -> str:
     return f"{first.x * UNIT - 26} {-(last.y + 1) * UNIT - 6} {width + 32} {height + 30}"
 
 
-def goers_svg(
+def robots_with_targets_svg(
     sketch: Sketch,
     targets: Mapping[str, TargetCell],
     says: Mapping[str, str],
@@ -217,7 +217,7 @@ def team_svg(
     """
     if decides_places(sketch):
         named = len(sketch.robots) <= MOST_NAMED
-        goers = goers_svg(sketch, targets, says, unsettled, aside, named=named)
+        goers = robots_with_targets_svg(sketch, targets, says, unsettled, aside, named=named)
         return _svg(view_box(sketch), [*map_svg(sketch), *_messages(homes(sketch), spoken), *goers], len(sketch.robots))
     where = _places(sketch)
     left = min((x for x, _ in where.values()), default=0) - UNIT

@@ -21,7 +21,7 @@ from robochoc.app.pages.fly.share_panel import build_share_panel
 from robochoc.app.pages.shell import on_leave
 from robochoc.app.projects import Project
 from robochoc.app.runs.run import Checked, Run, RunState
-from robochoc.app.runs.runs import MOST_KEPT, runs_of
+from robochoc.app.runs.runs import MAX_RUNS, runs_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.model.cost_units import cost_shown
@@ -86,7 +86,7 @@ class _Page:
         self._project = project
         self._runs = runs_of(project)
         request = ui.context.client.request
-        self._asked = request.query_params.get("run", "")[:_LONGEST_ID] if request else ""
+        self._requested = request.query_params.get("run", "")[:_LONGEST_ID] if request else ""
         self._shown: tuple[str, RunState] | None = None
         self._leave: Callable[[], None] = _nothing
         self._body = ui.element("div").classes("fly")
@@ -98,7 +98,7 @@ class _Page:
         self._leave()
 
     def _run(self) -> Run | None:
-        asked = self._runs.find(self._asked) if self._asked else None
+        asked = self._runs.find(self._requested) if self._requested else None
         return asked or self._runs.latest_for("decide") or self._runs.latest_for("whatif")
 
     def _follow(self) -> None:
@@ -115,9 +115,9 @@ class _Page:
             self._build(run)
 
     def _build(self, run: Run | None) -> None:
-        if self._asked and (run is None or run.id != self._asked):
+        if self._requested and (run is None or run.id != self._requested):
             key = "fly.gone" if run else "fly.gone-nothing"
-            ui.label(say(key, run=self._asked, most=MOST_KEPT)).classes("note").props("role=status")
+            ui.label(say(key, run=self._requested, most=MAX_RUNS)).classes("note").props("role=status")
         if run is None:
             _empty_page("fly.nothing", "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
             return
@@ -150,16 +150,16 @@ class _Page:
             self._choice(run)
         if sketch != self._project.sketch:
             ui.label(say("fly.old")).classes("note")
-        making = builder_of(run)
+        builder = builder_of(run)
         if not flies(run):
             remedy = "fly.no-places-files" if self._project.import_folder else "fly.no-places-remedy"
             _note("fly.no-places", remedy, "fly.to-model", f"/team/{self._project.id}/model")
-        elif not making.has_answer:
+        elif not builder.has_answer:
             ui.label(say("fly.no-answer")).classes("note")
         elif run.result and run.result.ends_unsolved:
             ui.label(say("fly.unsolved")).classes("note")
-        shown = _BuiltFrames(making)
-        build_share_panel(making, shown.frames)
+        shown = _BuiltFrames(builder)
+        build_share_panel(builder, shown.frames)
         self._leave = shown.leave
 
     def _choice(self, run: Run) -> None:
@@ -179,25 +179,25 @@ class _Page:
 class _BuiltFrames:
     """The frames of a run, which appear when they are built, with the progress until then."""
 
-    def __init__(self, making: FlightBuilder) -> None:
-        self._builder = making
+    def __init__(self, builder: FlightBuilder) -> None:
+        self._builder = builder
         self._line = ui.element("div").classes("fly-line").props("role=status")
         with self._line:
             self._spinner = ui.spinner(size="1.4rem")
             self._says = ui.label("")
             self._cancel = ui.button(say("fly.cancel"), on_click=self._stop).props("flat no-caps dense")
-            self._again = ui.button(say("fly.again"), on_click=self._begin).props("flat no-caps dense")
+            self._again = ui.button(say("fly.again"), on_click=self._request_files).props("flat no-caps dense")
         self._troubles = ui.element("div").classes("fly-troubles").props("role=status")
-        self.frames = RunFrames(flies=making.has_flight, talks=making.has_conversation)
+        self.frames = RunFrames(flies=builder.has_flight, talks=builder.has_conversation)
         self._timer = ui.timer(_TICK_S, self._show_time)
         self._release: Callable[[], None] = _nothing
-        self._begin()
+        self._request_files()
 
     def leave(self) -> None:
         """End the request for the files, after the page was closed."""
         self._release()
 
-    def _begin(self) -> None:
+    def _request_files(self) -> None:
         self._release()
         self._release = self._builder.request(self._update)
         self._update()
@@ -207,7 +207,7 @@ class _BuiltFrames:
         self._update()
 
     def _update(self) -> None:
-        making, stage = self._builder, self._builder.stage
+        builder, stage = self._builder, self._builder.stage
         works = stage in {BuildStage.FLIGHT, BuildStage.CONVERSATION}
         self._line.set_visibility(stage != BuildStage.DONE)
         self._spinner.set_visibility(works)
@@ -215,25 +215,25 @@ class _BuiltFrames:
         self._again.set_visibility(stage == BuildStage.WAITING)
         self._timer.active = works
         self._show_time()
-        flight, talk = _framed(making, making.flight), _framed(making, making.conversation)
-        self.frames.show(flight, talk, flies=making.has_flight, talks=making.has_conversation)
-        self.frames.set_visibility(making.has_flight or making.has_conversation)
+        flight, talk = _framed(builder, builder.flight), _framed(builder, builder.conversation)
+        self.frames.show(flight, talk, flies=builder.has_flight, talks=builder.has_conversation)
+        self.frames.set_visibility(builder.has_flight or builder.has_conversation)
         self._troubles.clear()
         with self._troubles:
             self._show_troubles()
-            if making.is_cut and talk:
+            if builder.is_cut and talk:
                 ui.label(say("fly.cut", most=f"{MOST_MESSAGES:,}")).classes("soft")
 
     def _show_troubles(self) -> None:
-        making = self._builder
-        for place, why in making.troubles.items():
+        builder = self._builder
+        for place, why in builder.troubles.items():
             ui.label(say(f"fly.trouble.{place}", why=why)).classes("error")
-        flown = flight_result_of(making.run) if making.flight else None
+        flown = flight_result_of(builder.run) if builder.flight else None
         words = flight_words(flown) if flown else []
         for sentence in words:
             ui.label(sentence).classes("error" if flown and flown.refused else "note")
-        failed = making.troubles or (flown and flown.refused)
-        if making.stage == BuildStage.DONE and failed:
+        failed = builder.troubles or (flown and flown.refused)
+        if builder.stage == BuildStage.DONE and failed:
             ui.button(say("fly.try-again"), icon="refresh", on_click=self._try_again).props("flat no-caps dense")
 
     def _try_again(self) -> None:
@@ -251,10 +251,10 @@ class _BuiltFrames:
             self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._builder.seconds)))
 
 
-def _framed(making: FlightBuilder, page: Path | None) -> str | None:
+def _framed(builder: FlightBuilder, page: Path | None) -> str | None:
     """Return the address of a page for a frame, with the time of the page against caching."""
     with suppress(OSError):
-        return f"{relative_address(making.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None
+        return f"{relative_address(builder.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None
     return None
 
 

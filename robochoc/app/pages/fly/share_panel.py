@@ -7,16 +7,16 @@ from collections.abc import Callable
 
 from nicegui import ui
 
-from robochoc.app.flights.builder import RECORDING, CannotMakeError, FlightBuilder, can_record, flies
-from robochoc.app.flights.saved_state import MOST_SAID, file_name, is_too_long
+from robochoc.app.flights.builder import RECORDING, BuildError, FlightBuilder, can_record, flies
+from robochoc.app.flights.saved_state import MAX_JOURNAL_BYTES, file_name, is_too_long
 from robochoc.app.pages.fly.frames import RunFrames
 from robochoc.app.pages.fly.saved_files import REPORT, STATE, TEAM, relative_address
 from robochoc.app.texts import say
 
 
-def build_share_panel(making: FlightBuilder, stage: RunFrames | None) -> None:
+def build_share_panel(builder: FlightBuilder, stage: RunFrames | None) -> None:
     """Fill the current container."""
-    run = making.run
+    run = builder.run
     name = run.sketch.name
     with ui.element("section").classes("tell").props("aria-labelledby=tell-title"):
         with ui.element("h2").props("id=tell-title"):
@@ -25,20 +25,20 @@ def build_share_panel(making: FlightBuilder, stage: RunFrames | None) -> None:
             with _card("tell.report", "tell.report-hint"):
                 _link(say("tell.get"), "tell.report", relative_address(run, REPORT), file_name(name, ".html"))
                 _link(say("tell.report-open"), "tell.report", relative_address(run, REPORT))
-            _recording(making)
+            _recording(builder)
             with _card("tell.team", "tell.team-hint"):
                 _link(say("tell.get"), "tell.team", relative_address(run, TEAM), file_name(name, ".zip"))
             with _card("tell.state", "tell.state-hint"):
                 if is_too_long(run):
-                    ui.label(say("tell.state-long", most=MOST_SAID >> 20)).classes("soft")
+                    ui.label(say("tell.state-long", most=MAX_JOURNAL_BYTES >> 20)).classes("soft")
                 _link(say("tell.get"), "tell.state", relative_address(run, STATE), file_name(name, ".robochoc.zip"))
             with _card("tell.link", "tell.link-hint"):
                 _copy(run.id, stage)
 
 
-def _recording(making: FlightBuilder) -> None:
+def _recording(builder: FlightBuilder) -> None:
     with _card("tell.recording", "tell.recording-hint"):
-        if not making.has_answer or not flies(making.run):
+        if not builder.has_answer or not flies(builder.run):
             ui.label(say("tell.recording-nothing")).classes("soft")
         elif not can_record():
             ui.label(say("tell.recording-missing")).classes("soft")
@@ -48,11 +48,11 @@ def _recording(making: FlightBuilder) -> None:
             async def record() -> None:
                 button.props("loading")
                 try:
-                    await making.recording()
-                except (CannotMakeError, OSError, ValueError) as why:
+                    await builder.recording()
+                except (BuildError, OSError, ValueError) as why:
                     ui.notify(say("tell.not-made", why=why), type="negative")
                 else:
-                    ui.run_javascript(f"location.assign({json.dumps(relative_address(making.run, RECORDING))})")
+                    ui.run_javascript(f"location.assign({json.dumps(relative_address(builder.run, RECORDING))})")
                 finally:
                     button.props(remove="loading")
 

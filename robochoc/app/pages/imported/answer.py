@@ -58,8 +58,8 @@ class ImportedNoSolutionPanel:
                 ui.label(say("imported.no-aside-events")).classes("soft")
             with ui.element("div").classes("two"):
                 if not facts.events:
-                    _door("decide.door-aside", "decide.door-aside-help", partial(decide, withdraw=True))
-                _door("imported.door-conflict", "imported.door-conflict-help", self._search_conflict)
+                    _choice_card("decide.door-aside", "decide.door-aside-help", partial(decide, withdraw=True))
+                _choice_card("imported.door-conflict", "imported.door-conflict-help", self._search_conflict)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
             ui.link(say("imported.to-files"), f"/team/{project.id}/model")
         on_leave(self.end)
@@ -108,7 +108,7 @@ class ImportedNoSolutionPanel:
                 ui.label(say("decide.by-cpmpy" if conflict.finder == Finder.CPMPY else "decide.by-own")).classes("soft")
 
 
-def _door(title: str, hint: str, does: Callable[[], object]) -> None:
+def _choice_card(title: str, hint: str, does: Callable[[], object]) -> None:
     with ui.element("button").classes("card door").props("type=button").on("click", does):
         with ui.element("h3"):
             ui.label(say(title))
@@ -123,7 +123,7 @@ _MOST_AT_ONE = 3
 _LONGEST = 160
 
 
-def says_of(facts: ImportedFacts, values: Mapping[str, Value]) -> dict[str, str]:
+def values_in_short(facts: ImportedFacts, values: Mapping[str, Value]) -> dict[str, str]:
     """Return each robot's decisions in short, by its name."""
     said: dict[str, str] = {}
     for robot in facts.robots:

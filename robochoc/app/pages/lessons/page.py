@@ -84,7 +84,7 @@ class _Page:
         ui.link(say("lesson.all"), "/lessons")
         self._head = ui.element("div").classes("lesson-head")
         self._body = ui.element("div").classes("lesson")
-        self._told = ui.label().classes("heard-only").props("role=status aria-live=polite")
+        self._announcement = ui.label().classes("heard-only").props("role=status aria-live=polite")
         ui.keyboard(self._pressed, repeating=False, ignore=["input", "select", "textarea"])
         self._show()
 
@@ -110,7 +110,7 @@ class _Page:
         if choice.right:
             self._progress.answered(self._number, self._place)
         self._show()
-        self._told.set_text(f"{said} {choice.why}")
+        self._announcement.set_text(f"{said} {choice.why}")
         if choice.right:
             self._focus(self._onward)
         else:
@@ -120,11 +120,11 @@ class _Page:
         self._place += by
         self._chosen = []
         self._show()
-        self._told.set_text(self._where())
+        self._announcement.set_text(self._where())
         self._focus(self._heading)
 
-    def _begin_again(self) -> None:
-        self._progress.begin_again(self._number)
+    def _restart(self) -> None:
+        self._progress.restart(self._number)
         self._go(-self._place)
 
     def _pressed(self, event: KeyEventArguments) -> None:
@@ -221,7 +221,7 @@ class _Page:
         with ui.element("section").classes("panel"):
             ui.label(self._lesson.end).classes("prose")
             with ui.element("div").classes("moves"):
-                ui.button(say("lesson.again"), on_click=self._begin_again).props("flat no-caps")
+                ui.button(say("lesson.again"), on_click=self._restart).props("flat no-caps")
                 if self._number < COUNT:
                     following = say("lesson.next-lesson", title=lesson(self._number + 1).title)
                     ui.link(following, f"/lessons/{self._number + 1}")

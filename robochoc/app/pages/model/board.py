@@ -100,7 +100,7 @@ class Board(Element, component="board.js"):
             self._set("links", links)
         self.update()
 
-    def offer(self, robot: dict[str, str], cell: dict[str, str]) -> None:
+    def set_menus(self, robot: dict[str, str], cell: dict[str, str]) -> None:
         """Set the actions in the menus of robots and cells: names of actions, and their texts."""
         self._change("acts", {"robot": [*robot.items()], "cell": [*cell.items()]})
 

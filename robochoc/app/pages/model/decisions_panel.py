@@ -60,7 +60,7 @@ class DecisionsPanel:
         sketch = self._desk.sketch
         name = free_decision_name(sketch, kind.value)
         values = first_values(sketch, kind, say("model.first-names"))
-        self._desk.do(lambda sketch: with_decision(sketch, Decision(name, kind, values)))
+        self._desk.try_edit(lambda sketch: with_decision(sketch, Decision(name, kind, values)))
 
 
 class _DecisionCard:
@@ -135,7 +135,7 @@ class _DecisionCard:
         if decision is not None and (self._desk.cells_of == decision.name) is not on:
             self._desk.cells_of = decision.name if on else None
             self._desk.opened = None if on else self._desk.opened
-            self._desk.looked()
+            self._desk.notify_view_change()
 
     def _same(self, text: str | None, decision: Decision) -> bool:
         try:
@@ -179,4 +179,4 @@ class _DecisionCard:
     def _removed(self) -> None:
         decision = self._decision
         if decision is not None:
-            self._desk.do(lambda sketch: without_decision(sketch, decision.name))
+            self._desk.try_edit(lambda sketch: without_decision(sketch, decision.name))

@@ -35,7 +35,7 @@ class Desk:
         cells_of: The name of the decision whose cells are chosen by clicks on the map.
         pointed: The rule under the pointer in the list.
         troubles: The known errors and hints.
-        tell: Shows an error that belongs to no field.
+        show_error: Shows an error that belongs to no field.
         point: Called when another rule in the list is under the pointer.
     """
 
@@ -46,7 +46,7 @@ class Desk:
     cells_of: str | None = None
     pointed: str | None = None
     troubles: list[Trouble] = field(default_factory=list)
-    tell: Callable[[str], None] = _quiet
+    show_error: Callable[[str], None] = _quiet
     point: Callable[[], None] = _still
     _listeners: Listeners = field(default_factory=Listeners)
 
@@ -55,11 +55,11 @@ class Desk:
         """The present state of the team."""
         return self.project.sketch
 
-    def on_look(self, callback: Callable[[], None]) -> None:
+    def on_view_change(self, callback: Callable[[], None]) -> None:
         """Call `callback` after a change of the selection or the open rule, without a change of the team."""
         self._listeners.add(callback)
 
-    def looked(self) -> None:
+    def notify_view_change(self) -> None:
         """Update all panels after a change of the selection, the open rule, or the pointer."""
         self._listeners()
 
@@ -71,10 +71,10 @@ class Desk:
             return edit_error_text(error)
         return None
 
-    def do(self, change: Edit) -> bool:
+    def try_edit(self, change: Edit) -> bool:
         """Change the team, and show an error below the map. Return whether the edit was valid."""
         wrong = self.edit(change)
-        self.tell(wrong or "")
+        self.show_error(wrong or "")
         return wrong is None
 
     def select(self, names: list[str]) -> None:
@@ -82,7 +82,7 @@ class Desk:
         known = {robot.name for robot in self.sketch.robots}
         self.selected = [name for name in dict.fromkeys(names) if name in known]
         self.just_added = None
-        self.looked()
+        self.notify_view_change()
 
     def select_added(self, name: str) -> None:
         """Select a robot that was just added."""
@@ -97,7 +97,7 @@ class Desk:
     def open(self, rule: str | None) -> None:
         """Open a rule for editing; None to close it."""
         self.opened, self.cells_of = rule, None
-        self.looked()
+        self.notify_view_change()
 
     def drop_removed(self) -> None:
         """Drop removed elements from the selection and the open rule."""

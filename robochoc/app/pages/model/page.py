@@ -140,7 +140,7 @@ class ModelPage:
                 self._decisions = DecisionsPanel(desk)
                 self._rules = RulesPanel(desk)
         self._sources = Sources(desk)
-        desk.on_look(self._follow)
+        desk.on_view_change(self._follow)
         desk.point = self._light
         on_leave(project.on_change(self._changed))
         self._timer = ui.timer(_QUIET_S, self._check, active=False)
@@ -165,7 +165,7 @@ class ModelPage:
             self._board = Board(events)
         self._wrong = ui.label().classes("error").props("role=alert")
         self._wrong.set_visibility(False)
-        self._desk.tell = self._show_error
+        self._desk.show_error = self._show_error
         self._lines = TroubleLines()
 
     # Events of the board
@@ -175,14 +175,14 @@ class ModelPage:
         self._board.use(tool)
         if tool != SELECT and self._desk.cells_of is not None:
             self._desk.cells_of = None
-            self._desk.looked()
+            self._desk.notify_view_change()
         self._guide()
 
     def _robot(self, clicked: RobotClicked) -> None:
         desk = self._desk
         rule = None if desk.opened is None else desk.sketch.rule(desk.opened)
         if rule is not None:
-            desk.do(lambda sketch: with_robot_clicked(sketch, rule, clicked.name))
+            desk.try_edit(lambda sketch: with_robot_clicked(sketch, rule, clicked.name))
         elif clicked.more:
             others = [name for name in desk.selected if name != clicked.name]
             desk.select(others if clicked.name in desk.selected else [*others, clicked.name])
@@ -192,12 +192,12 @@ class ModelPage:
     def _cell(self, cell: Cell) -> None:
         desk = self._desk
         if self._tool == "add":
-            if desk.do(lambda sketch: with_robot(sketch, cell)):
+            if desk.try_edit(lambda sketch: with_robot(sketch, cell)):
                 desk.select_added(desk.sketch.robots[-1].name)
         elif self._tool == "block":
-            desk.do(lambda sketch: with_cell_blocked(sketch, cell, blocked=cell not in sketch.area.blocked))
+            desk.try_edit(lambda sketch: with_cell_blocked(sketch, cell, blocked=cell not in sketch.area.blocked))
         elif desk.cells_of is not None or desk.opened is not None:
-            desk.do(lambda sketch: with_cell_clicked(sketch, cell, desk.cells_of, desk.opened))
+            desk.try_edit(lambda sketch: with_cell_clicked(sketch, cell, desk.cells_of, desk.opened))
         elif desk.sketch.robots:
             desk.select([])
         else:  # on an empty map, a click adds a robot
@@ -205,12 +205,12 @@ class ModelPage:
             self._cell(cell)
 
     def _moved(self, moved: RobotDragged) -> None:
-        self._desk.do(lambda sketch: with_robot_moved(sketch, moved.name, Cell(moved.x, moved.y)))
+        self._desk.try_edit(lambda sketch: with_robot_moved(sketch, moved.name, Cell(moved.x, moved.y)))
 
     def _removed(self, name: str) -> None:
         selected = self._desk.selected
         names = tuple(selected) if name in selected else (name,)
-        self._desk.do(lambda sketch: without_robots(sketch, names))
+        self._desk.try_edit(lambda sketch: without_robots(sketch, names))
 
     def _cleared(self) -> None:
         self._desk.selected = []

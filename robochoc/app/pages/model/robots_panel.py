@@ -106,7 +106,7 @@ class _SelectedCard:
 
     def _remove(self) -> None:
         names = self._names
-        self._desk.do(lambda sketch: without_robots(sketch, names))
+        self._desk.try_edit(lambda sketch: without_robots(sketch, names))
 
 
 def without_robots(sketch: Sketch, names: tuple[str, ...]) -> Sketch:

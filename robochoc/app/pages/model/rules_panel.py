@@ -80,7 +80,7 @@ class PaletteMenu:
         self._dialog.close()
         before = {rule.id for rule in self._desk.sketch.rules}
         rule = first_rule(self._desk.sketch, entry, decision, self._desk.rule_robots)
-        if self._desk.do(lambda sketch: with_rule(sketch, rule)):
+        if self._desk.try_edit(lambda sketch: with_rule(sketch, rule)):
             self._desk.open(next(rule.id for rule in self._desk.sketch.rules if rule.id not in before))
 
 
@@ -236,10 +236,10 @@ class _RuleCard:
         self._desk.open(None if self._desk.opened == self._id else self._id)
 
     def _switched(self, *, on: bool) -> None:
-        self._desk.do(lambda sketch: with_rule_switched(sketch, self._id, on=on))
+        self._desk.try_edit(lambda sketch: with_rule_switched(sketch, self._id, on=on))
 
     def _removed(self) -> None:
-        self._desk.do(lambda sketch: without_rule(sketch, self._id))
+        self._desk.try_edit(lambda sketch: without_rule(sketch, self._id))
 
     def _point(self, rule: str | None) -> None:
         if self._desk.pointed != rule:

@@ -52,7 +52,7 @@ class Sources:
                 self._save = ui.button(say("model.save"), icon="download", on_click=self._download)
                 self._save.props("flat dense no-caps")
             self._state = ui.label().classes("soft").props("role=status")
-            self._ask = ui.button(say("model.write"), on_click=self._asked).props("outline no-caps dense")
+            self._ask = ui.button(say("model.write"), on_click=self._write_on_request).props("outline no-caps dense")
             with (
                 ui.element("div").classes("scroll").props(f'tabindex=0 role=region aria-label="{say("model.sources")}"')
             ):
@@ -72,7 +72,7 @@ class Sources:
         elif self._written is not self._desk.sketch:
             self._state.set_text(say("model.source-old"))
 
-    async def _asked(self) -> None:
+    async def _write_on_request(self) -> None:
         self._ask.set_visibility(False)
         await self._write()
 
@@ -115,7 +115,7 @@ class Sources:
         try:
             content = await run.io_bound(zipped, sketch)
         except InvalidInputError as error:
-            self._desk.tell(str(error))
+            self._desk.show_error(str(error))
             ui.notify(say("model.source-wrong"), type="negative")
             return
         if content is not None:

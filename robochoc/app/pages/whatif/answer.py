@@ -104,8 +104,8 @@ class WhatIfAnswer:
         with self._box:
             if story.running:
                 self._running(messages)
-            elif story.outcome is not None and story.kept is not None and story.run is not None:
-                self._show_outcome(story.outcome, story.kept, story.run)
+            elif story.outcome is not None and story.saved_change is not None and story.run is not None:
+                self._show_outcome(story.outcome, story.saved_change, story.run)
             elif why := _failure(story):
                 with ui.element("div").classes("panel"):
                     ui.label(why).classes("error")
@@ -117,29 +117,29 @@ class WhatIfAnswer:
             ui.label(text).classes("grow")
             ui.button(say("whatif.stop"), icon="stop", on_click=self._story.stop).props("no-caps outline dense")
 
-    def _show_outcome(self, found: DecisionComparison, kept: SavedChange, run: Run) -> None:
+    def _show_outcome(self, found: DecisionComparison, saved_change: SavedChange, run: Run) -> None:
         with ui.element("div").classes("panel whatif-part"):
             with ui.element("h2"):
                 ui.label(claim_words(run, _headline(found)))
-            ui.label(" ".join(kept.happened)).classes("soft")
-            if kept.anew:
-                ui.label(say("whatif.all-anew", why=kept.anew)).classes("soft")
+            ui.label(" ".join(saved_change.happened)).classes("soft")
+            if saved_change.anew:
+                ui.label(say("whatif.all-anew", why=saved_change.anew)).classes("soft")
             if costs := _costs(found):
                 ui.label(costs)
             with ui.element("div").classes("whatif-columns"):
                 _table(found)
-                self._figures(found, kept)
+                self._figures(found, saved_change)
             with ui.element("div").classes("whatif-row"):
-                if self._can_keep(kept):
-                    keep = ui.button(say("whatif.keep"), icon="check", on_click=self._keep, color=None)
+                if self._can_keep(saved_change):
+                    keep = ui.button(say("whatif.keep"), icon="check", on_click=self._keep_changes, color=None)
                     keep.props("no-caps unelevated").classes("go")
-                if kept.after.flies:
+                if saved_change.after.flies:
                     ui.link(say("whatif.fly"), f"/team/{self._project.id}/fly?run={run.id}").classes("flight")
                     ui.label(say("whatif.flight-hint")).classes("soft small grow")
                 else:
                     ui.label(say("whatif.no-flight")).classes("soft small grow")
             if found.after.verdict == "no-solution":
-                WaysOut(self._project, self._story, kept.after)
+                WaysOut(self._project, self._story, saved_change.after)
             if command := run.command:
                 with ui.element("details").classes("whatif-command"):
                     with ui.element("summary"):
@@ -147,16 +147,16 @@ class WhatIfAnswer:
                     with ui.element("pre"):
                         ui.label(command)
 
-    def _can_keep(self, kept: SavedChange) -> bool:
-        return bool(self._story.changes) and self._story.after() == kept.after
+    def _can_keep(self, saved_change: SavedChange) -> bool:
+        return bool(self._story.changes) and self._story.after() == saved_change.after
 
-    def _keep(self) -> None:
-        self._story.keep()
+    def _keep_changes(self) -> None:
+        self._story.apply_changes()
         ui.notify(say("whatif.kept"))
 
-    def _figures(self, found: DecisionComparison, kept: SavedChange) -> None:
-        beside = self._story.beside.result if self._story.beside else None
-        anew = None if beside is None or kept.anew else beside.messages
+    def _figures(self, found: DecisionComparison, saved_change: SavedChange) -> None:
+        second = self._story.second_run.result if self._story.second_run else None
+        anew = None if second is None or saved_change.anew else second.messages
         again = found.after.messages
         with ui.element("div").classes("whatif-figures"):
             with ui.element("h3"):
@@ -164,7 +164,7 @@ class WhatIfAnswer:
             most = max(again, anew or 0, 1)
             if anew is None:
                 _bar(say("whatif.deciding-anew"), again, most)
-                if not kept.anew:
+                if not saved_change.anew:
                     ui.label(say("whatif.compared-anew", again=f"{again:,}", protocol=found.protocol)).classes("soft")
                 return
             _bar(say("whatif.going-on"), again, most)
@@ -229,14 +229,14 @@ def _bar(name: str, count: int, most: int) -> None:
 
 
 def _messages(story: Story) -> int:
-    return sum(run.live.messages for run in (story.run, story.beside) if run)
+    return sum(run.live.messages for run in (story.run, story.second_run) if run)
 
 
 def _failure(story: Story) -> str:
     """Return the reason why there is no outcome; empty if no run was started."""
     if story.message:
         return say("whatif.failed", message=story.message)
-    for run in (story.run, story.beside):
+    for run in (story.run, story.second_run):
         if run is not None and run.state == RunState.FAILED:
             return say("whatif.failed", message=run.message)
         if run is not None and run.state == RunState.STOPPED:

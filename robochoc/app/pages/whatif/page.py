@@ -99,7 +99,7 @@ class WhatIfPage:
             _heading("h2", "whatif.list")
             self._list = ui.element("ol").classes("whatif-list")
             self._none = ui.label(say("whatif.none")).classes("soft")
-            self._anew = ui.label().classes("soft small")
+            self._from_scratch = ui.label().classes("soft small")
             with ui.element("div").classes("whatif-row"):
                 self._decide = ui.button(say("whatif.decide"), on_click=self._story.decide, color=None).props(
                     "no-caps unelevated"
@@ -169,8 +169,8 @@ class WhatIfPage:
         self._clear.set_enabled(bool(words))
         self._decide.set_enabled(bool(words) and not self._story.running)
         self._board.show(after, robots=robots_of(after))
-        self._board.offer(*_offered(after))
-        self._anew.set_visibility(bool(words))
+        self._board.set_menus(*_offered(after))
+        self._from_scratch.set_visibility(bool(words))
         self._robot_chosen()
         self._answer.follow()
         self._linking.activate()
@@ -182,7 +182,7 @@ class WhatIfPage:
             for place, text in enumerate(words):
                 with ui.element("li"), ui.element("div").classes("whatif-item"):
                     ui.label(text).classes("grow")
-                    back = ui.button(icon="undo", on_click=partial(self._story.take_back, place))
+                    back = ui.button(icon="undo", on_click=partial(self._story.remove_change, place))
                     back.props("flat round dense").props["aria-label"] = say("whatif.back", what=text)
 
     async def _link(self) -> None:
@@ -196,7 +196,7 @@ class WhatIfPage:
         found = await run.io_bound(_links_and_errors, *pair)
         if found is not None and self._linked is pair:
             links, wrong, anew = found
-            self._anew.set_text(anew)
+            self._from_scratch.set_text(anew)
             self._board.show(after, robots=robots_of(after), links=links.drawn)
             self._wrong.set_text(say("whatif.wrong", text=wrong) if wrong else "")
 

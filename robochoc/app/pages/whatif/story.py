@@ -101,9 +101,9 @@ class Story:
         self._project = project
         self._listeners = Listeners()
         self.changes: tuple[AnyTeamChange, ...] = self._loaded()
-        self.kept: SavedChange | None = None
+        self.saved_change: SavedChange | None = None
         self.run: Run | None = None
-        self.beside: Run | None = None
+        self.second_run: Run | None = None
         self.outcome: DecisionComparison | None = None
         self.message = ""
         """The error of a failed run."""
@@ -136,7 +136,7 @@ class Story:
         self.changes = (*self._possible(), change)
         self._changed()
 
-    def take_back(self, place: int) -> None:
+    def remove_change(self, place: int) -> None:
         """Remove one change, and later changes that are not possible without it."""
         self.changes = self.changes[:place] + self.changes[place + 1 :]
         self.changes = self._possible()
@@ -147,7 +147,7 @@ class Story:
         self.changes = ()
         self._changed()
 
-    def keep(self) -> None:
+    def apply_changes(self) -> None:
         """Apply the changes to the team, as one edit."""
         after = self.after()
         self._project.edit(lambda _: after)
@@ -158,21 +158,21 @@ class Story:
     @property
     def running(self) -> bool:
         """True if a run is in progress."""
-        return self.preparing or any(run.state == RunState.RUNNING for run in (self.run, self.beside) if run)
+        return self.preparing or any(run.state == RunState.RUNNING for run in (self.run, self.second_run) if run)
 
     async def decide(self) -> None:
         """Start a run of the team before and after the changes."""
         if self.running:
             return
         before, after, words = self._project.sketch, self.after(), self.words()
-        self.preparing, self.outcome, self.message, self.beside, self._task = True, None, "", None, None
+        self.preparing, self.outcome, self.message, self.second_run, self._task = True, None, "", None, None
         self._listeners()
         try:
-            self.kept = SavedChange(after, words)
+            self.saved_change = SavedChange(after, words)
             try:
                 self._model = await asyncio.to_thread(_checked, before, after)
             except FromScratchError as anew:
-                self._model, self.kept.anew = None, say(anew.key, **anew.named)
+                self._model, self.saved_change.anew = None, say(anew.key, **anew.named)
             model = self._model
             self.run = runs_of(self._project).start(
                 sketch=before, model=model_of if model is None else lambda _: model, purpose=PURPOSE
@@ -189,7 +189,7 @@ class Story:
 
     def stop(self) -> None:
         """Stop the runs."""
-        for run in (self.run, self.beside):
+        for run in (self.run, self.second_run):
             if run:
                 run.stop()
 
@@ -207,15 +207,15 @@ class Story:
 
     def _follow(self) -> None:
         """Start the second run after the first one, and compute the outcome after both."""
-        run, kept = self.run, self.kept
-        if run and kept and run.state != RunState.RUNNING:
-            if self.beside is None and run.state == RunState.ENDED and run.result and self._needs_second_run(run):
+        run, saved_change = self.run, self.saved_change
+        if run and saved_change and run.state != RunState.RUNNING:
+            if self.second_run is None and run.state == RunState.ENDED and run.result and self._needs_second_run(run):
                 protocol = run.result.protocol
-                options = RunOptions(protocol=protocol) if not kept.anew else RunOptions()
-                self.beside = runs_of(self._project).start(options, sketch=kept.after, purpose=BESIDE)
-                kept.beside = self.beside.id
+                options = RunOptions(protocol=protocol) if not saved_change.anew else RunOptions()
+                self.second_run = runs_of(self._project).start(options, sketch=saved_change.after, purpose=BESIDE)
+                saved_change.beside = self.second_run.id
                 self._save_change()
-                self.beside.on_change(self._on_run_change)
+                self.second_run.on_change(self._on_run_change)
             elif self.outcome is None and self._task is None and not self.running:
                 self._compute_later(self._comparison)
 
@@ -236,21 +236,23 @@ class Story:
 
     def _needs_second_run(self, run: Run) -> bool:
         """Return whether a run from scratch must be measured: the protocol is dynamic, or the first run is not."""
-        return bool(self.kept and self.kept.anew) or bool(run.result and is_dynamic(run.result.protocol))
+        return bool(self.saved_change and self.saved_change.anew) or bool(
+            run.result and is_dynamic(run.result.protocol)
+        )
 
     def _comparison(self) -> DecisionComparison | None:
-        run, kept, beside = self.run, self.kept, self.beside
-        if run is None or kept is None or run.result is None:
+        run, saved_change, second_run = self.run, self.saved_change, self.second_run
+        if run is None or saved_change is None or run.result is None:
             return None
         with suppress(ModelError, OSError, ValueError):
             before = run.sketch
-            if not kept.anew:
-                model = self._model or changing_model(before, kept.after)
-                found = parts_of_epochs(before, kept.after, model, run.result)
-                return _compared(before, kept.after, found, run.result.protocol) if found else None
-            if beside and beside.result:
-                parts = part_of(before, None, run.result), part_of(kept.after, None, beside.result)
-                return _compared(before, kept.after, parts, beside.result.protocol)
+            if not saved_change.anew:
+                model = self._model or changing_model(before, saved_change.after)
+                found = parts_of_epochs(before, saved_change.after, model, run.result)
+                return _compared(before, saved_change.after, found, run.result.protocol) if found else None
+            if second_run and second_run.result:
+                parts = part_of(before, None, run.result), part_of(saved_change.after, None, second_run.result)
+                return _compared(before, saved_change.after, parts, second_run.result.protocol)
         return None
 
     def _find_last(self) -> None:
@@ -260,14 +262,14 @@ class Story:
         if run is None or run.state == RunState.RUNNING:
             return
         with suppress(OSError, msgspec.DecodeError, ValueError, RecursionError):
-            self.kept = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=SavedChange)
-            self.run, self.beside = run, runs.find(self.kept.beside) if self.kept.beside else None
+            self.saved_change = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=SavedChange)
+            self.run, self.second_run = run, runs.find(self.saved_change.beside) if self.saved_change.beside else None
             self._compute_later(self._comparison)
 
     def _save_change(self) -> None:
-        if self.run and self.kept:
+        if self.run and self.saved_change:
             with suppress(OSError):
-                (self.run.folder / CHANGE).write_bytes(msgspec.json.encode(self.kept))
+                (self.run.folder / CHANGE).write_bytes(msgspec.json.encode(self.saved_change))
 
     def _possible(self) -> tuple[AnyTeamChange, ...]:
         """Return the changes that are possible for the present team."""

@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robochoc.app.conflicts.process import found_in
+from robochoc.app.conflicts.process import conflict_in
 from robochoc.app.conflicts.rules import candidates, minimal, rule_of
 from robochoc.app.conflicts.search import Conflict, ConflictSearch, Finder
 from tests.support.cases import looped
@@ -26,7 +26,7 @@ def test_that_it_cannot_hold_and_each_proper_subset_can(way: str, monkeypatch: p
     for seed in range(60):
         sketch = random_rules(Random(seed))
         names = [rule.id for rule in candidates(sketch)]
-        conflict = found_in(sketch, 60, use_cpmpy=use_cpmpy)
+        conflict = conflict_in(sketch, 60, use_cpmpy=use_cpmpy)
         assert conflict.finder is (Finder.CPMPY if use_cpmpy else Finder.OWN)
         assert (conflict.rules is None) is can_hold(sketch, names), seed
         if conflict.rules is None:

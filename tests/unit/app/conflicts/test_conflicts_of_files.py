@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.app.conflicts.by_cpmpy import can_be_undefined, limits_of
-from robochoc.app.conflicts.process import found_in, found_in_files, team_with_only
+from robochoc.app.conflicts.process import conflict_in, conflict_in_files, team_with_only
 from robochoc.app.conflicts.search import Conflict, ConflictSearch, Finder, TeamOfFiles
 from robochoc.formats import read_team, write_team
 from robochoc.model.assembly import assemble
@@ -80,7 +80,7 @@ def test_that_it_cannot_hold_and_each_proper_subset_can(tmp_path: Path, name: st
         pytest.importorskip("cpmpy")
     write_team(TEAMS[name], tmp_path / name)
     team = read_team(tmp_path / name)
-    conflict = found_in_files(tmp_path / name, 0, 60, use_cpmpy=use_cpmpy)
+    conflict = conflict_in_files(tmp_path / name, 0, 60, use_cpmpy=use_cpmpy)
     every = [str(number) for number, _ in enumerate(team.constraints())]
     assert (conflict.rules is None) is _has_solution(team, every)
     if conflict.rules is None:
@@ -94,7 +94,7 @@ def test_that_it_cannot_hold_and_each_proper_subset_can(tmp_path: Path, name: st
 
 def test_that_it_is_the_team_after_what_has_happened(tmp_path: Path) -> None:
     write_team(pair(ScenarioEvent((AddValue("A", 2),))), tmp_path / "pair")
-    before, after = (found_in_files(tmp_path / "pair", events, 60, use_cpmpy=False) for events in (0, 1))
+    before, after = (conflict_in_files(tmp_path / "pair", events, 60, use_cpmpy=False) for events in (0, 1))
     assert (before.rules, after.rules) == (("0",), None)
 
 
@@ -107,7 +107,7 @@ def test_that_only_some_constraints_are_left() -> None:
 
 def test_that_a_cost_without_a_value_is_told_as_such(tmp_path: Path) -> None:
     write_team(TEAMS["division"], tmp_path / "division")
-    words = found_in_files(tmp_path / "division", 0, 60, use_cpmpy=False).words
+    words = conflict_in_files(tmp_path / "division", 0, 60, use_cpmpy=False).words
     assert "RB: costs A / B, which is undefined for some decisions: these are forbidden" in words
 
 
@@ -124,8 +124,8 @@ def test_that_our_own_solver_looks_where_cpmpy_fails(
     monkeypatch.setattr("robochoc.app.conflicts.process.minimal_of_team", fails)
     monkeypatch.setattr("robochoc.app.conflicts.process.minimal_by_cpmpy", fails)
     write_team(triangle(2), tmp_path / "triangle")
-    assert found_in_files(tmp_path / "triangle", 0, 60).finder is Finder.OWN
-    assert found_in(slots(3, 2), 60).finder is Finder.OWN
+    assert conflict_in_files(tmp_path / "triangle", 0, 60).finder is Finder.OWN
+    assert conflict_in(slots(3, 2), 60).finder is Finder.OWN
     assert len(caplog.records) == 2
 
 

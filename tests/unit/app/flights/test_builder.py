@@ -78,7 +78,7 @@ def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path) -> None:
 
 def test_what_failed_can_be_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     making = FlightBuilder(kept_run(tmp_path, cube()))
-    monkeypatch.setattr(FlightBuilder, "_make_flight", _failing)
+    monkeypatch.setattr(FlightBuilder, "_build_flight", _failing)
     asyncio.run(_made(making))
     assert making.troubles[BuildStage.FLIGHT] == error_text(ValueError())
     assert not making.has_flight
@@ -86,9 +86,9 @@ def test_what_failed_can_be_tried_again(tmp_path: Path, monkeypatch: pytest.Monk
     assert making.stage is BuildStage.DONE  # not by itself
     monkeypatch.undo()
     monkeypatch.setattr(
-        FlightBuilder, "_make_flight", lambda self, _: self.run.folder.joinpath(FLIGHT).write_bytes(b"scene")
+        FlightBuilder, "_build_flight", lambda self, _: self.run.folder.joinpath(FLIGHT).write_bytes(b"scene")
     )
-    monkeypatch.setattr(FlightBuilder, "_make_conversation", lambda *_: None)
+    monkeypatch.setattr(FlightBuilder, "_build_conversation", lambda *_: None)
     making.retry()
     wait_until(lambda: making.stage is BuildStage.DONE, "it is not made")
     assert making.flight

@@ -13,7 +13,7 @@ import msgspec
 import pytest
 
 from robochoc.app.flights import saved_state
-from robochoc.app.flights.saved_state import MAX_BYTES, MOST_SAID, file_name, is_too_long, packed, unpack_run
+from robochoc.app.flights.saved_state import MAX_BYTES, MAX_JOURNAL_BYTES, file_name, is_too_long, packed, unpack_run
 from robochoc.app.imported.picture import picture_sketch
 from robochoc.app.runs.options import JOURNAL
 from robochoc.app.runs.run import CHANGE, SKETCH, Checked
@@ -150,7 +150,7 @@ def test_a_full_disk_leaves_no_part_of_a_run(tmp_path: Path, monkeypatch: pytest
 
 def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     run = kept_run(tmp_path, cube())
-    monkeypatch.setattr("robochoc.app.flights.saved_state.MOST_SAID", 12)
+    monkeypatch.setattr("robochoc.app.flights.saved_state.MAX_JOURNAL_BYTES", 12)
     assert is_too_long(run)
     with zipfile.ZipFile(io.BytesIO(packed(run))) as archive:
         assert not any(name.endswith("run.journal") for name in archive.namelist())
@@ -161,12 +161,12 @@ def test_the_messages_that_are_packed_can_be_opened_again(tmp_path: Path) -> Non
     run = kept_run(tmp_path / "here", cube())
     (run.folder / JOURNAL).write_bytes(Random(0).randbytes(1 << 20))  # nothing makes this any smaller
     others = len(packed(run)) - (1 << 20)
-    assert MOST_SAID + others <= open_from_disk.MAX_BYTES
+    assert MAX_JOURNAL_BYTES + others <= open_from_disk.MAX_BYTES
     with (run.folder / JOURNAL).open("r+b") as journal:
-        journal.truncate(MOST_SAID)
+        journal.truncate(MAX_JOURNAL_BYTES)
     assert not is_too_long(run)
     with (run.folder / JOURNAL).open("r+b") as journal:
-        journal.truncate(MOST_SAID + 1)
+        journal.truncate(MAX_JOURNAL_BYTES + 1)
     assert is_too_long(run)
 
 

@@ -12,7 +12,7 @@ from robochoc.app.imported.facts import facts_of
 from robochoc.app.imported.picture import picture_sketch
 from robochoc.app.imported.robot_file import read_robot_file, sentence
 from robochoc.app.pages.decide.answer import headline
-from robochoc.app.pages.imported.answer import epochs_html, says_of, table_html
+from robochoc.app.pages.imported.answer import epochs_html, table_html, values_in_short
 from robochoc.app.pages.imported.whatif import changes_html, moved
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.run import Record, Run, RunState
@@ -117,7 +117,7 @@ def test_the_answer_tells_every_decision_and_names_are_only_text() -> None:
     team = pair()
     found = facts_of(team)
     result = run_result(Verdict.SOLUTION, {"A": "<b>", "B": 2})
-    assert says_of(found, result.values) == {"RA": "<b>", "RB": "2"}
+    assert values_in_short(found, result.values) == {"RA": "<b>", "RB": "2"}
     assert "<td>&lt;b&gt;</td>" in table_html(found, result)
     epoch = run_epoch("unknown", {"A": "<u>"}, opened_by="<script>", robots=["RA"])
     told = epochs_html(found, run_result("unknown", epochs=[epoch]))

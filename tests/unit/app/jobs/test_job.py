@@ -54,8 +54,8 @@ def listening(folder: Path) -> None:
     wait_until(lambda: file.is_file() and b"listening" in file.read_bytes(), "its process does not begin")
 
 
-def over(told: list[str]) -> Job[Finished]:
-    return Job("test", lambda _: Finished(0, b"", ""), over=told.append)
+def quick_job(told: list[str]) -> Job[Finished]:
+    return Job("test", lambda _: Finished(0, b"", ""), on_incomplete=told.append)
 
 
 class TestProcess:
@@ -71,7 +71,7 @@ class TestProcess:
 
     def test_that_all_of_its_group_is_ended_with_it(self, folder: Path) -> None:
         told: list[str] = []
-        job = Job("test", lambda job: job.run(endless(folder)), over=told.append).start()
+        job = Job("test", lambda job: job.run(endless(folder)), on_incomplete=told.append).start()
         listening(folder)
         pid = job.pid
         assert pid
@@ -108,7 +108,7 @@ class TestProcess:
         def look() -> None:
             raise KeyError("unforeseen")
 
-        job = Job("looked at", lambda job: job.run(endless(folder), look), over=told.append).start()
+        job = Job("looked at", lambda job: job.run(endless(folder), look), on_incomplete=told.append).start()
         with pytest.raises(KeyError):
             job.future.result(HANG_S)
         assert told == ["That did not work. The team is unchanged."]
@@ -117,7 +117,7 @@ class TestProcess:
 
     def test_that_one_that_cannot_be_started_says_why(self, tmp_path: Path) -> None:
         told: list[str] = []
-        job = Job("test", lambda job: job.run(Command((), tmp_path / "gone")), over=told.append).start()
+        job = Job("test", lambda job: job.run(Command((), tmp_path / "gone")), on_incomplete=told.append).start()
         with pytest.raises(FileNotFoundError):
             job.future.result(HANG_S)
         assert told == ["The data cannot be saved: No such file or directory."]
@@ -126,7 +126,7 @@ class TestProcess:
 class TestEnd:
     def test_that_one_that_has_not_begun_does_nothing(self) -> None:
         told: list[str] = []
-        job = over(told)
+        job = quick_job(told)
         job.end()
         with pytest.raises(EndedError):
             job.start().future.result(HANG_S)
@@ -149,7 +149,7 @@ class TestEnd:
     def test_that_all_are_told_in_time_though_one_computes_on(self) -> None:
         told: list[str] = []
         release = threading.Event()
-        job = Job("test", lambda _: release.wait(HANG_S), over=told.append).start()
+        job = Job("test", lambda _: release.wait(HANG_S), on_incomplete=told.append).start()
         end_all(0)
         assert told == [""]
         release.set()
@@ -164,7 +164,7 @@ class TestEnd:
             raise ZeroDivisionError
 
         with pytest.raises(ZeroDivisionError):
-            Job("test", works, over=fails).start().future.result(HANG_S)
+            Job("test", works, on_incomplete=fails).start().future.result(HANG_S)
         assert [record.getMessage() for record in caplog.records] == ["test: ZeroDivisionError", "test: OSError"]
 
 

@@ -69,8 +69,12 @@ def test_that_a_growing_journal_is_followed_line_by_line(tmp_path: Path) -> None
     assert costs == sorted(costs, reverse=True)
     assert costs[-1] == facts.bound == journal.outcome.cost
     last = sent[-1]
-    assert (facts.said[0].sender, facts.said[0].receiver, facts.said[0].kind) == (last.sender, last.receiver, last.type)
-    assert len(facts.said) == LAST
+    assert (facts.last_messages[0].sender, facts.last_messages[0].receiver, facts.last_messages[0].kind) == (
+        last.sender,
+        last.receiver,
+        last.type,
+    )
+    assert len(facts.last_messages) == LAST
     reader.close()
 
 
@@ -78,8 +82,8 @@ def test_that_values_are_called_as_the_user_calls_them(tmp_path: Path) -> None:
     file, facts = tmp_path / "run.journal", Live()
     file.write_bytes(_text(_journal("adopt")))
     _catch_up(file, facts)
-    assert any("= <X" in said.words for said in facts.said)
-    assert not any(said.words.startswith(said.sender) for said in facts.said)
+    assert any("= <X" in said.words for said in facts.last_messages)
+    assert not any(said.words.startswith(said.sender) for said in facts.last_messages)
 
 
 HEADER = Header(team="t", protocol="syncbb", runtime="simulator", seed=0)
@@ -110,7 +114,7 @@ def test_that_hostile_records_are_survived(tmp_path: Path, order: int) -> None:
     file.write_bytes(recorder.content())
     _catch_up(file, facts)
     assert facts.messages == 3
-    assert all(len(said.words) <= 300 and said.words.isprintable() for said in facts.said)
+    assert all(len(said.words) <= 300 and said.words.isprintable() for said in facts.last_messages)
     assert "nobody" not in facts.values
     assert facts.bound is None
 
@@ -144,7 +148,7 @@ def test_that_what_is_kept_does_not_grow_with_what_is_said(tmp_path: Path, monke
     assert not reader.advance()
     monkeypatch.undo()
     while reader.advance():
-        assert len(facts.said) <= LAST
+        assert len(facts.last_messages) <= LAST
         assert len(facts.recent) <= 1
     reader.close()
     assert facts.messages == 40_000

@@ -193,7 +193,7 @@ class TestWhatIsRemoved:
     def test_that_an_old_run_goes_once_nobody_writes_to_it_any_more(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        monkeypatch.setattr("robochoc.app.runs.runs.MOST_KEPT", 2)
+        monkeypatch.setattr("robochoc.app.runs.runs.MAX_RUNS", 2)
         old = kept_run(tmp_path, slots(2, 2)).folder
         shutil.copytree(old, old.with_name("00002"))
         was_there: list[bool] = []

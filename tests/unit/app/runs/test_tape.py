@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from robochoc.app.runs.player import LARGE_S, LEAST_S, MOST_S, Frames, Player
-from robochoc.app.runs.tape import MOST_MOMENTS, WORDS_KEPT, Tape, recorded
+from robochoc.app.runs.tape import MOST_MOMENTS, WORDS_SAVED, Tape, recorded
 from robochoc.journal.entries import JournalEntry, JournalError
 from robochoc.journal.events import Began, Decided, Sent
 from robochoc.journal.journal import Header, JournalRecorder
@@ -55,7 +55,7 @@ def test_that_each_message_of_a_short_conversation_is_a_moment() -> None:
     assert [tape.unsettled_at(number) for number in range(2)] == [{"B"}, set()]
     assert [tape.messages_at(number) for number in range(2)] == [1, 2]
     assert [dict(moment.links) for moment in tape.moments] == [{("A", "B"): 1}, {("B", "C"): 1}]
-    assert [one.words for one in tape.said_at(1, 9)] == ["Hello (inform): number = 2", "Hello (inform): number = 1"]
+    assert [one.words for one in tape.words_at(1, 9)] == ["Hello (inform): number = 2", "Hello (inform): number = 1"]
 
 
 def test_that_strangers_are_no_part_of_it() -> None:
@@ -81,7 +81,7 @@ def test_that_an_epoch_without_a_word_is_a_moment_of_its_own() -> None:
     tape = _taken(_decided("A", 1), _said(1), Began(t=0, protocol="dynabt", epoch=1), _decided("A", 2))
     assert [moment.count for moment in tape.moments] == [1, 0]
     assert [tape.values_at(number) for number in range(2)] == [{"A.d": 1}, {"A.d": 2}]
-    assert tape.said_at(1, 9) == tape.said_at(0, 9)
+    assert tape.words_at(1, 9) == tape.words_at(0, 9)
 
 
 def test_that_who_decides_the_same_again_has_settled() -> None:
@@ -114,8 +114,8 @@ def test_that_a_long_conversation_has_few_moments_and_nothing_is_lost(count: int
     assert sum(moment.count for moment in tape.moments) == tape.messages == count
     assert tape.values_at(len(tape.moments) - 1) == now
     assert sum(sum(moment.links.values()) for moment in tape.moments) == count
-    assert all(len(moment.said) <= WORDS_KEPT for moment in tape.moments)
-    assert tape.said_at(len(tape.moments) - 1, 1)[0].words == f"Hello (inform): number = {count - 1}"
+    assert all(len(moment.last_messages) <= WORDS_SAVED for moment in tape.moments)
+    assert tape.words_at(len(tape.moments) - 1, 1)[0].words == f"Hello (inform): number = {count - 1}"
     if count <= 2 * MOST_MOMENTS:
         assert all(moment.count == 1 for moment in tape.moments)
 
@@ -131,7 +131,7 @@ def _written(file: Path, *events: Sent | Decided | Began) -> Path:
 def test_that_it_is_read_in_the_order_of_time(tmp_path: Path) -> None:
     file = _written(tmp_path / "j", Began(t=0, protocol="syncbb"), _said(3, 3), _said(1, 1), _said(2, 2))
     tape = recorded(file, _tape())
-    assert [moment.said[0].words[-1] for moment in tape.moments] == ["1", "2", "3"]
+    assert [moment.last_messages[0].words[-1] for moment in tape.moments] == ["1", "2", "3"]
     assert tape.is_whole
 
 
@@ -146,7 +146,7 @@ def test_that_no_more_is_read_and_sorted_than_is_played(tmp_path: Path, monkeypa
     late = (_said(number, t=number - 20_000) for number in range(10_000, 20_000))
     file = _written(tmp_path / "j", Began(t=0, protocol="syncbb"), *(_said(number) for number in range(10_000)), *late)
     read = recorded(file, _tape())
-    assert int(read.said_at(0, 1)[0].words.split()[-1]) < 10_000
+    assert int(read.words_at(0, 1)[0].words.split()[-1]) < 10_000
     assert not read.is_whole
     assert read.messages < 10_000
     monkeypatch.setattr("robochoc.app.runs.tape.MOST_READ", 30_000)
@@ -155,7 +155,7 @@ def test_that_no_more_is_read_and_sorted_than_is_played(tmp_path: Path, monkeypa
 
 def test_that_nobody_reads_on_when_nobody_waits(tmp_path: Path) -> None:
     file = _written(tmp_path / "j", *(_said(number) for number in range(9_000)))
-    tape = recorded(file, _tape(), wanted=lambda: False)
+    tape = recorded(file, _tape(), is_needed=lambda: False)
     assert not tape.is_whole
 
 
