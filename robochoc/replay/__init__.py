@@ -1,20 +1,20 @@
-"""Replay of a recorded run: the same protocol objects with the same packets, and the results compared."""
+"""Replay of a recorded run: its protocol objects process the same packets again, and the results are compared."""
 
 from robochoc.replay.claims import Contradiction
-from robochoc.replay.comparison import Difference
+from robochoc.replay.comparison import StepDifference
 from robochoc.replay.rebuild import CannotReplayError, ReplayOptions
 from robochoc.replay.replay import ReplayResult, StoppedRobot, replay
-from robochoc.replay.robot_states import Choice, RobotState, states_of
+from robochoc.replay.robot_states import RobotState, ValueState, states_of
 
 __all__ = [
     "CannotReplayError",
-    "Choice",
     "Contradiction",
-    "Difference",
     "ReplayOptions",
     "ReplayResult",
     "RobotState",
+    "StepDifference",
     "StoppedRobot",
+    "ValueState",
     "replay",
     "states_of",
 ]

@@ -1,11 +1,10 @@
-"""The messages of a recorded run, by channel, as they are to be delivered again.
+"""Restores the messages of a recorded run, by channel, for their second delivery.
 
-The n-th message that was received on a channel is the n-th that was sent on it. A journal does not hold messages as
-they travelled, but their fields. Its binary form keeps the fields as they were, and a message is made of them. In its
-text form infinite numbers, bytes, and keys that are no strings have become something else, and a message is made by its
-type. Where the fields are as they were the type is not used: where it says `float` a protocol may have sent 0, which
-travels as an integer. The size of the message, which the journal holds, shows whether this worked. Where it did not,
-the message is used that the sender has sent again.
+The n-th message received on a channel is the n-th message sent on it. A journal contains the fields of messages instead
+of their bytes. Its binary form preserves the fields, and messages are encoded from them. Its text form changes infinite
+numbers, bytes, and keys that are not strings; there messages are decoded by their types first. The type is not used for
+preserved fields, because in a `float` field a protocol may have sent 0, which is encoded as an integer. The recorded
+size of the message shows whether the restoration was successful. Otherwise the message of the replayed sender is used.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from robochoc.protocols.protocol import Protocol
 Edge = tuple[str, str]
 
 _UNFIT = (msgspec.MsgspecError, RecursionError, UnicodeError, TypeError, OverflowError)
-"""Raised for fields that are no message's; those of a journal may be anything."""
+"""Raised for fields that do not belong to a message: those of a journal are untrusted."""
 
 _encode = msgspec.msgpack.Encoder().encode
 
@@ -44,11 +43,11 @@ class MessageDecoder:
         return self._decoder.decode(content)
 
     def content(self, sent: Sent) -> bytes | None:
-        """Return the content of the message as it was sent; None if the record is not sufficient."""
+        """Return the original content of the message; None if the record does not suffice."""
         if sent.type not in self._tags:
             return None
         fields = [self._tags[sent.type], *sent.content.values()]
-        for read in (self._as_it_was, self._through_type, self._through_json):
+        for read in (self._unchanged, self._through_type, self._through_json):
             try:
                 content = read(fields)
             except _UNFIT:
@@ -70,9 +69,9 @@ class MessageDecoder:
         except _UNFIT:
             return False
 
-    def _as_it_was(self, fields: list[Any]) -> bytes:
+    def _unchanged(self, fields: list[Any]) -> bytes:
         content = _encode(fields)
-        self._decoder.decode(content)  # so that it is a message of the protocol's
+        self._decoder.decode(content)  # raises if it is not a message of the protocol
         return content
 
     def _through_type(self, fields: list[Any]) -> bytes:
@@ -84,9 +83,9 @@ class MessageDecoder:
 
 
 class RecordedChannels:
-    """The messages of one run, or epoch, by channel.
+    """The messages of a run or an epoch with these `events`, by channel.
 
-    `events` are the run's. A message that was sent again in the replay is delivered instead of the recorded one.
+    A message that was sent again in the replay is delivered instead of the recorded one.
     """
 
     def __init__(self, events: Iterable[AnyEvent], decoder: MessageDecoder) -> None:
@@ -109,7 +108,7 @@ class RecordedChannels:
                 self._again.setdefault(edge, deque()).append(envelope.content)
 
     def can_deliver(self, packet: Sequence[Received]) -> bool:
-        """Return whether each message of `packet` is either available or will never be."""
+        """Return False if a message of `packet` may become available later."""
         wanted = Counter((received.sender, received.receiver) for received in packet)
         for edge, count in wanted.items():
             here = len(self._again.get(edge, ()))
@@ -120,7 +119,7 @@ class RecordedChannels:
         return True
 
     def deliver(self, received: Received) -> tuple[Sent | None, Envelope | None]:
-        """Return a received message as recorded, and its envelope for the replay; None: it is lost."""
+        """Return the record of a received message, and its envelope for the replay; None if missing."""
         edge = (received.sender, received.receiver)
         recorded = self._recorded.get(edge)
         if not recorded:

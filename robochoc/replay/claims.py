@@ -1,8 +1,8 @@
-"""Claims of a journal besides its steps (header and outcome), compared with the results of the steps.
+"""Compares the header and the outcome of a journal with the results of its steps.
 
-All steps may be the same while the header, or the outcome, is another run's. Metrics are counted anew from the steps
-that were played. Verdict and values are those that the protocol objects have in the end. An answer that was published
-while the search went on (`--improve`) may be older than these: it is checked with the constraints, and must be as good.
+All steps may be equal while the header or the outcome is from another run. Metrics are counted again from the replayed
+steps. The verdict and the values are those of the protocol objects at the end. An answer published during the search
+(`--improve`) may be older: it is checked with the constraints, and must be as good.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.verification.checker import RefutedError, assignment_cost, violations
 
-_COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")
-_COUNTED_BEFORE = _COUNTED[:-1]
-"""In the first version of journals."""
+_COUNTS = ("messages", "bytes", "ncccs", "checks", "largest")
+_COUNTS_IN_FIRST_VERSION = _COUNTS[:-1]
+"""The counts in the first version of journals."""
 ANY_DEADLINE = 0.0
-"""Limits are not in a journal: what robots had when the journal ends may be an answer, by a deadline."""
+"""A journal does not contain limits: the robots' values at its end may be an answer at a deadline."""
 
 
 class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,7 +50,7 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """A replayed run of `team` with its answer; None: the journal does not hold enough for one."""
+    """A replayed run of `team` with its answer; None if the journal does not suffice for one."""
 
     run: RecordedRun
     team: Team
@@ -58,52 +58,52 @@ class ReplayedRun:
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
-    """Return a run that its robots have just replayed, with its answer."""
+    """Return a replayed run with its answer."""
     return ReplayedRun(run, robots.compiled.team, _answer(run, robots, outcome) if outcome else None)
 
 
-def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
-    """Yield the claims of the journal that do not follow from its steps.
+def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_complete: bool) -> Iterator[Contradiction]:
+    """Yield the claims of the journal that differ from the results of its steps.
 
     Args:
         journal: The journal.
         runs: Its runs, replayed.
-        whole: All robots were followed to the end of all runs. Otherwise the runs' answers are not known.
+        is_complete: Whether all robots were replayed to the end. Otherwise the runs' answers are unknown.
     """
     header, outcome = journal.header, journal.outcome
-    yield from _beginning(header, [one.run for one in runs], outcome.placed_by if outcome else None)
+    yield from _header_contradictions(header, [one.run for one in runs], outcome.placed_by if outcome else None)
     if outcome is None:
         return
     same = ["team", "protocol", "seed"]
-    if header.protocol != CENTRAL:  # which has no runtime
+    if header.protocol != CENTRAL:  # the central solver has no runtime
         same.append("runtime")
     yield from _differing("the outcome's ", outcome, header, same)
     events = list(chain.from_iterable(one.run.events for one in runs))
     lost = bool(outcome.lost) or any(isinstance(event, Lost) for event in events)
-    if not whole or lost or not runs or any(one.run.given is None for one in runs):
-        return  # who died took its last words with it; across machines robots tell what they like
+    if not is_complete or lost or not runs or any(one.run.given is None for one in runs):
+        return  # the last messages of lost robots are missing; reports from other machines are untrusted
     if outcome.verdict != Verdict.UNKNOWN or outcome.runtime == "simulator":
-        names = _COUNTED_BEFORE if header.version == STAMPED_LATE else _COUNTED
+        names = _COUNTS_IN_FIRST_VERSION if header.version == STAMPED_LATE else _COUNTS
         before = outcome.preprocessing.metrics if outcome.preprocessing else Metrics()
-        compared = _exceeding if _may_have_left_out(outcome) else _differing
+        compared = _exceeding if _may_be_incomplete(outcome) else _differing
         yield from compared("the outcome's ", before + outcome.metrics, metrics_of(journal.events), names)
     last = _last_runs(runs)
     for number, epoch in enumerate(outcome.epochs):
         if number in last:
-            yield from _answers(f"epoch {number}'s ", epoch, last[number])
-    yield from _answers("the outcome's ", outcome, runs[-1])
+            yield from _answer_contradictions(f"epoch {number}'s ", epoch, last[number])
+    yield from _answer_contradictions("the outcome's ", outcome, runs[-1])
 
 
-def _may_have_left_out(outcome: Outcome) -> bool:
-    """Return whether what some robots did may be counted in part: a process that computes at the end tells nothing.
+def _may_be_incomplete(outcome: Outcome) -> bool:
+    """Return whether the counts may lack steps of robots that were computing at the end of the search.
 
-    That is so where something ends a search from outside: a deadline, or an event in mid-run.
+    This is possible if a deadline or an event has ended the search.
     """
     return outcome.runtime != "simulator" and bool(outcome.epochs or outcome.improvements or outcome.deadline)
 
 
 def _exceeding(whose: str, recorded: Metrics, replayed: Metrics, names: Sequence[str]) -> Iterator[Contradiction]:
-    """Yield counts that are higher than those of the steps."""
+    """Yield recorded counts that exceed those of the steps."""
     for name in names:
         left, right = getattr(recorded, name), getattr(replayed, name)
         every = left if isinstance(left, dict) else {name: left}
@@ -113,7 +113,7 @@ def _exceeding(whose: str, recorded: Metrics, replayed: Metrics, names: Sequence
 
 
 def _last_runs(runs: Sequence[ReplayedRun]) -> dict[int, ReplayedRun]:
-    """Return the last run of each epoch, by its number: what robots do before a search belongs to the epoch."""
+    """Return the last run of each epoch, by its number. Preprocessing belongs to the epoch of the following search."""
     found: dict[int, ReplayedRun] = {}
     number = -1
     for one in runs:
@@ -126,14 +126,16 @@ def _last_runs(runs: Sequence[ReplayedRun]) -> dict[int, ReplayedRun]:
     return found
 
 
-def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | None) -> Iterator[Contradiction]:
-    """Yield contradictions between the header and the parameters that the robots were given.
+def _header_contradictions(
+    header: Header, runs: Sequence[RecordedRun], placed_by: str | None
+) -> Iterator[Contradiction]:
+    """Yield contradictions between the header and the robots' parameters.
 
-    The first run is one of `placed_by` if a robot had no solution by itself, and the search was therefore left out.
+    The first run is one of `placed_by` if the search was omitted because a robot had no solution by itself.
     Preprocessing before the search is not a run of the protocol.
     """
     names = [run.began.protocol for run in runs if run.began and run.began.protocol != DisAC.__name__]
-    # A class that is installed by no name may be played, too.
+    # The class may also be one that is not installed under a name.
     found = protocol_by_class(names[0], [header.protocol]) if names else None
     if found is not None and found[0] not in (header.protocol, placed_by):
         yield Contradiction(what="the header's protocol", recorded=header.protocol, replayed=found[0])
@@ -147,12 +149,12 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
 
 
-def _answers(whose: str, recorded: Answer, last: ReplayedRun) -> Iterator[Contradiction]:
+def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> Iterator[Contradiction]:
     replayed = last.answer
     if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # limits are not in a journal
         return
     if recorded.improvements:
-        yield from _published(whose, recorded, replayed, last.team)
+        yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
     left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
@@ -160,8 +162,8 @@ def _answers(whose: str, recorded: Answer, last: ReplayedRun) -> Iterator[Contra
         yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)
 
 
-def _published(whose: str, recorded: Answer, replayed: Answer, team: Team) -> Iterator[Contradiction]:
-    """Yield what is wrong with an answer that was published while the search went on, or was better than its end."""
+def _published_contradictions(whose: str, recorded: Answer, replayed: Answer, team: Team) -> Iterator[Contradiction]:
+    """Yield the contradictions of an answer that was published during the search, or is better than its end."""
     withdrawn = recorded.withdrawn
     faults = [*violations(team, recorded.assignment, withdrawn)]
     if faults:
@@ -189,7 +191,7 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
 
 
 def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseAnswer | None:
-    """Return the answer of `run`, computed as an orchestrator does; None: the journal does not hold enough."""
+    """Return the answer of `run`, computed as by an orchestrator; None if the journal does not suffice."""
     given = run.given
     if given is None or given.why or len(robots.hosts) < len(robots.compiled.team.robots):
         return None
@@ -213,7 +215,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseA
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:
-    """Return whether `run` is the one in which robots withdraw."""
+    """Return whether `run` is the phase in which robots withdraw."""
     found = protocol_by_class(run.began.protocol, filter(None, [outcome.placed_by])) if run.began else None
     return found is not None and found[0] == outcome.placed_by
 

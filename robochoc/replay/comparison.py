@@ -1,4 +1,4 @@
-"""Comparison of a replayed step with what was recorded of it."""
+"""Comparison of a replayed step with its record."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.replay.channels import MessageDecoder
 from robochoc.replay.steps import RecordedStep, RobotEvent
 
 
-class Difference(msgspec.Struct, frozen=True, kw_only=True):
+class StepDifference(msgspec.Struct, frozen=True, kw_only=True):
     """The first event that differs between journal and replay.
 
     Attributes:
@@ -21,10 +21,10 @@ class Difference(msgspec.Struct, frozen=True, kw_only=True):
         protocol: The name of the protocol's class.
         robot: The robot of the event.
         step: The number of the robot's step, over the whole journal, from 0 on.
-        packet: The messages that the step received; none: it is the robot's start.
-        recorded: The event in the journal; None: the journal has no more events of this step.
-        replayed: The event in the replay; None: the replay has no more.
-        raised: The exception that the protocol raised, with its place in the code; empty: none.
+        packet: The messages received in the step; empty for the robot's start.
+        recorded: The event in the journal; None if it has no more events of this step.
+        replayed: The event in the replay; None if it has no more events of this step.
+        raised: The exception raised by the protocol, with its place in the code; otherwise empty.
     """
 
     run: int
@@ -37,19 +37,19 @@ class Difference(msgspec.Struct, frozen=True, kw_only=True):
     raised: str = ""
 
     @property
-    def in_short(self) -> str:
+    def summary(self) -> str:
         """The difference in one line."""
         if self.raised:
             return f"in its step {self.step} the protocol raised {self.raised}"
         recorded = type(self.recorded).__name__ if self.recorded else "nothing more"
         replayed = type(self.replayed).__name__ if self.replayed else "nothing more"
-        return f"in its step {self.step} of run {self.run}, recorded is {recorded}, and replayed {replayed}"
+        return f"in its step {self.step} of run {self.run}, the record has {recorded}, and the replay {replayed}"
 
 
 class StepComparison:
     """Compares the events of steps. Times are not compared.
 
-    In the first version of journals events stood in another order, and messages had the clock of the step's end.
+    The first version of journals had another order of events, and messages had the clock of the step's end.
     """
 
     def __init__(self, decoder: MessageDecoder, header: Header | None) -> None:
@@ -59,12 +59,12 @@ class StepComparison:
     def first_difference(
         self, step: RecordedStep, replayed: Sequence[AnyEvent], *, raised: bool
     ) -> tuple[RobotEvent | None, AnyEvent | None] | None:
-        """Return the first pair of events that differ; None: all are equal.
+        """Return the first pair of different events; None if all are equal.
 
         Args:
             step: The recorded step.
             replayed: The events of the replayed step.
-            raised: The protocol has raised an exception, so that more events may be missing.
+            raised: Whether the protocol has raised an exception; then further events may be missing.
         """
         recorded = [*step.received, *step.done]
         if self._stamped_late:
@@ -73,7 +73,7 @@ class StepComparison:
             again = replayed[place] if place < len(replayed) else None
             if again is None or not self._same(event, again):
                 return event, again
-        if len(replayed) > len(recorded) and step.whole and not raised:
+        if len(replayed) > len(recorded) and step.is_complete and not raised:
             return None, replayed[len(recorded)]
         return None
 

@@ -1,8 +1,8 @@
 """A robot's state at one moment, in words. Inspection changes nothing, and its checks are not counted.
 
 Agent views, nogood stores, partial assignments and contexts are found by the names and types of the protocol's
-attributes. A protocol says itself what else is special about its state (`protocols/protocol.py`). All other
-attributes are shown by `safe_repr`.
+attributes. A protocol can describe other special attributes itself (`protocols/protocol.py`). All others are shown by
+`safe_repr`.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiled_core import attributes_of
 
 MOST_VALUES = 60
-"""Own values that are shown, beside the present one."""
+"""The most values of the robot that are shown besides the present one."""
 MOST_NOGOODS = 60
 MOST_SEEN = 200
-"""Robots whose values are shown."""
+"""The most robots whose values are shown."""
 MOST_ELSE = 40
 ALWAYS = "what holds whatever the others take"
 VIEWS = ("view", "cpa", "path", "assignments", "context")
-"""Attributes in which protocols keep what they know of others' values."""
+"""Attributes in which protocols store the known values of others."""
 _KNOWN = {
     *(
         "problem",
@@ -48,11 +48,11 @@ _KNOWN = {
         "allowed",
     )
 }
-"""Attributes that are shown elsewhere, or say nothing."""
+"""Attributes that are shown elsewhere, or are not informative."""
 
 
 class Inspector:
-    """Describes the state of one robot, which knows `part` of the problem."""
+    """Describes the state of a robot with its `part` of the problem."""
 
     def __init__(self, part: AgentProblem) -> None:
         self._part = part
@@ -60,39 +60,42 @@ class Inspector:
         self._own = ValueText(part.interfaces)
         self.agent = part.robot.name
         self._ranks = part.known.rank
-        self._heard: dict[str, Message] = {}
-        self._told: dict[str, Value] = {}
+        self._last_messages: dict[str, Message] = {}
+        self._last_values: dict[str, Value] = {}
 
-    def hear(self, sender: str, message: Message) -> None:
-        """Record a message that the robot received, for protocols that keep no view."""
-        self._heard[sender] = message
+    def record_received(self, sender: str, message: Message) -> None:
+        """Record a message received by the robot, for protocols without a view."""
+        self._last_messages[sender] = message
         value = as_value(getattr(message, "value", None))
         width = len(self._part.interfaces.get(sender, ()))
         if value is not None and len(value) == width and not hasattr(message, "lhs"):
-            self._told[sender] = value
+            self._last_values[sender] = value
 
     def view(self, protocol: Protocol) -> list[tuple[str, str]]:
-        """Return the known values of other robots, or else the last message of each."""
+        """Return the known values of other robots, or otherwise their last messages."""
         others = self._others(protocol)
         known = self._known(protocol)
         if protocol.numbered_values:
             pairs = {name: others.value(name, (number,)) for name, number in attributes_of(protocol)["view"].items()}
         elif known is not None:
-            pairs = {name: others.told(name, value) for name, value in known.items()}
+            pairs = {name: others.own_value_text(name, value) for name, value in known.items()}
         else:
-            pairs = {name: self.said(name, message) or type(message).__name__ for name, message in self._heard.items()}
-            pairs |= {name: self._own.told(name, value) for name, value in self._told.items()}
+            pairs = {
+                name: self.message_text(name, message) or type(message).__name__
+                for name, message in self._last_messages.items()
+            }
+            pairs |= {name: self._own.own_value_text(name, value) for name, value in self._last_values.items()}
         shown = [(name, pairs[name]) for name in sorted(pairs, key=self._rank)[:MOST_SEEN]]
         more = len(pairs) - len(shown)
         return [*shown, ("", f"and {more:,} more")] if more else shown
 
     def _rank(self, robot: str) -> tuple[int, object]:
-        """Return a sort key: robots in priority order, then names that are not in it."""
+        """Return a sort key: robots in priority order, then other names."""
         rank = self._ranks.get(robot)
         return (0, rank) if rank is not None else (1, natural_key(robot))
 
-    def said(self, sender: str, message: Message, receiver: str = "") -> str:
-        """Return a message in words; the receiver is this robot unless another `receiver` is given."""
+    def message_text(self, sender: str, message: Message, receiver: str = "") -> str:
+        """Return a message in words. The receiver is this robot unless `receiver` is given."""
         fields = {name: getattr(message, name) for name in message.__struct_fields__}
         value, lhs = as_value(fields.get("value")), fields.get("lhs")
         if value is not None and isinstance(lhs, Mapping):
@@ -100,7 +103,7 @@ class Inspector:
             against = self._own.against(receiver or self.agent, value)
             return f"while {held}: {against}" if held else f"{against}, whatever the others take"
         if value is not None:
-            fields["value"] = self._own.told(sender, value)
+            fields["value"] = self._own.own_value_text(sender, value)
         elif "value" in fields and fields["value"] is None:
             fields["value"] = "withdraws"
         for name in VIEWS:
@@ -110,7 +113,7 @@ class Inspector:
         return cut(", ".join(text if name == "value" else f"{name}: {text}" for name, text in told.items()))
 
     def domain(self, protocol: Protocol) -> list[tuple[str, str | None]]:
-        """Return each own value, with what rules it out (None: nothing known)."""
+        """Return each value of the robot with the known reason that excludes it, or None."""
         count = len(protocol.problem.values)
         places = list(range(min(count, MOST_VALUES)))
         if protocol.value is not None and protocol.value >= len(places):
@@ -121,7 +124,7 @@ class Inspector:
 
     def own_value(self, protocol: Protocol, index: int) -> str:
         """Return the value at `index` in words, with its cost if any value has one."""
-        text = self._own.told(self.agent, protocol.problem.values[index])
+        text = self._own.own_value_text(self.agent, protocol.problem.values[index])
         notes = protocol.value_notes(index)
         if notes:
             return f"{text} ({', '.join(f'{name} {safe_repr(number)}' for name, number in notes.items())})"
@@ -131,7 +134,7 @@ class Inspector:
         return text
 
     def against(self, protocol: Protocol, index: int) -> str | None:
-        """Return the known reason that excludes the value at `index`. None: it is not excluded."""
+        """Return the known reason that excludes the value at `index`; None if it is not excluded."""
         found = self.ruling(protocol, index)
         return None if found is None else found[0]
 
@@ -171,7 +174,7 @@ class Inspector:
                 told.setdefault(name.lstrip("_"), safe_repr(thing))
         return told
 
-    # What is known of others
+    # Knowledge of others
 
     def _others(self, protocol: Protocol) -> ValueText:
         """Return the words for others' values: some protocols (DisFC) send numbers of assignments instead."""
@@ -196,12 +199,12 @@ class Inspector:
         return {who: value for who, value in found.items() if who in self._part.interfaces}
 
     def _seen(self, protocol: Protocol) -> dict[str, Value]:
-        """Return the values that own values are checked against; without a view, those in others' messages."""
+        """Return the others' values that the robot checks its values against; without a view, those in messages."""
         known = protocol.checked_against
         if known is None:
             known = self._known(protocol)
         if known is None:
-            known = self._told
+            known = self._last_values
         widths = self._part.interfaces
         return {name: value for name, value in known.items() if len(value) == len(widths.get(name, ()))}
 
@@ -223,10 +226,10 @@ class Inspector:
         return self._own.all(lhs), self._own.against(self.agent, own)
 
 
-def safely(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - whatever is looked at
-    """Return the result of `look`, or `otherwise` if it raises: a user's protocol may hold any attributes."""
+def safely(inspect: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - any attribute
+    """Return the result of `inspect`, or `otherwise` if it raises: a user's protocol may have any attributes."""
     try:
-        return look()
+        return inspect()
     except Exception:  # noqa: BLE001 - see above
         return otherwise
 

@@ -1,4 +1,4 @@
-"""Reasons for a robot's new value, or for its end of the search: in words, a line for each reason."""
+"""The reasons for a robot's new value, or for its conclusion of the search, in words, one line each."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from robochoc.system.compiled_core import attributes_of
 
 MOST_REASONS = 8
 MOST_BACKTRACKS = 3
-"""In one step: after each, a robot may find that no value is left again."""
+"""The most backtracks shown for a step. A robot may backtrack repeatedly."""
 MOST_TOGETHER = 3
-"""Values that are named where one reason rules out several."""
+"""The most values listed for a common reason."""
 
 _CONCLUDED = {
     Verdict.NO_SOLUTION: "that there is no solution",
@@ -29,7 +29,7 @@ _CONCLUDED = {
 
 
 class _DeadEnd(NamedTuple):
-    """A moment without a remaining value: what ruled out each value, and the message sent then."""
+    """A moment without a remaining value: the reasons that exclude the values, and the message sent then."""
 
     ruled_out: list[str]
     kind: str
@@ -46,44 +46,44 @@ class _DeadEnd(NamedTuple):
 class Reasons:
     """Explains a robot's changes: inspects it before a step, at each message it sends, and after the step."""
 
-    def __init__(self, look: Inspector, protocol: Protocol) -> None:
-        self._look = look
+    def __init__(self, inspector: Inspector, protocol: Protocol) -> None:
+        self._inspector = inspector
         self._protocol = protocol
         self._value = protocol.value
-        self._text = safely(lambda: self._named(protocol.value), None)
+        self._text = safely(lambda: self._value_text(protocol.value), None)
         self._dead_ends: list[_DeadEnd] = []
 
-    def listen(self, receiver: str, message: Message) -> None:
-        """Record a message that the robot sends; at a dead end, also what rules out each value just then."""
+    def record_sent(self, receiver: str, message: Message) -> None:
+        """Record a message that the robot sends; at a dead end, also the reasons that exclude the values."""
         kind = type(message).__name__
         if not message.backtracks:
             return
         if self._store() is not None and self._protocol.value is not None:
-            return  # it has a value, and rules out another robot's
+            return  # the message excludes a value of another robot
         ruled_out = safely(self._ruled_out, [])
         if self._dead_ends and self._dead_ends[-1].ruled_out == ruled_out:
-            self._dead_ends[-1].receivers.append(receiver)  # of AWC all in the nogood are told
+            self._dead_ends[-1].receivers.append(receiver)  # AWC sends a nogood to all its robots
         elif len(self._dead_ends) <= MOST_BACKTRACKS:
-            said = safely(lambda: self._look.said(self._look.agent, message, receiver), "")
+            said = safely(lambda: self._inspector.message_text(self._inspector.agent, message, receiver), "")
             self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
 
-    def told(self, heard: Sequence[tuple[Sent, Message]], step: RecordedStep) -> list[str]:
-        """Return the reasons for a changed value, or the end of the search, after messages; empty: neither."""
+    def lines(self, received: Sequence[tuple[Sent, Message]], step: RecordedStep) -> list[str]:
+        """Return the reasons for a changed value, or for a conclusion of the search; otherwise empty."""
         concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
         if self._protocol.value == self._value and not concluded:
             return []
         lines = [line for dead_end in self._dead_ends[:MOST_BACKTRACKS] for line in dead_end.lines()]
         if len(self._dead_ends) > MOST_BACKTRACKS:
             lines.append("and so on, until a value was left")
-        hopeless = bool(concluded) and concluded[0] == str(Verdict.NO_SOLUTION) and self._hopeless()
+        hopeless = bool(concluded) and concluded[0] == str(Verdict.NO_SOLUTION) and self._is_hopeless()
         if hopeless:
             lines += self._ruled_out()
-        lines = lines or self._against_the_old(heard) or self._heard(heard)
+        lines = lines or self._reason_against_previous(received) or self._received_lines(received)
         if self._protocol.value != self._value:
-            lines.append(self._now())
-        return [*lines, *(self._ended(verdict, hopeless=hopeless) for verdict in concluded)]
+            lines.append(self._new_value_line())
+        return [*lines, *(self._conclusion_line(verdict, hopeless=hopeless) for verdict in concluded)]
 
-    # What rules values out
+    # Excluded values
 
     def _store(self) -> NogoodStore | None:
         store = attributes_of(self._protocol).get("store")
@@ -94,47 +94,47 @@ class Reasons:
         count = len(self._protocol.problem.values)
         by_reason: dict[str, list[str]] = {}
         for index in range(min(count, MOST_VALUES)):
-            reason = self._look.against(self._protocol, index)
+            reason = self._inspector.against(self._protocol, index)
             if reason is not None:
-                by_reason.setdefault(reason, []).append(self._look.own_value(self._protocol, index))
+                by_reason.setdefault(reason, []).append(self._inspector.own_value(self._protocol, index))
         lines = [f"{_together(values)} ruled out{_by(reason)}" for reason, values in by_reason.items()]
         shown = lines[:MOST_REASONS]
         rest = count - sum(map(len, list(by_reason.values())[:MOST_REASONS]))
         cut = count > MOST_VALUES or len(lines) > len(shown)
         return [*shown, f"and {rest:,} more values"] if cut and rest else shown
 
-    def _against_the_old(self, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
+    def _reason_against_previous(self, received: Sequence[tuple[Sent, Message]]) -> list[str]:
         """Return the reason that excludes the previous value, and the robot's message; empty if unknown."""
         protocol, old = self._protocol, self._value
         if old is None or self._text is None or old >= len(protocol.problem.values):
             return []
-        ruling = self._look.ruling(protocol, old)
+        ruling = self._inspector.ruling(protocol, old)
         if ruling is None:
             return []
         text, robots = ruling
         own = protocol.problem.values[old]
-        told = _last([(sent, message) for sent, message in heard if _is_about(message, sent.sender, robots, own)])
-        sources = "; ".join(self._words_of(sent, message) for sent, message in told[:MOST_REASONS])
+        told = _last([(sent, message) for sent, message in received if _is_about(message, sent.sender, robots, own)])
+        sources = "; ".join(self._message_line(sent, message) for sent, message in told[:MOST_REASONS])
         return [f"{self._text} was ruled out{_by(text)}{f' ({sources})' if sources else ''}"]
 
-    def _heard(self, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
-        more = len(heard) - MOST_REASONS
-        shown = [self._words_of(sent, message) for sent, message in heard[:MOST_REASONS]]
+    def _received_lines(self, received: Sequence[tuple[Sent, Message]]) -> list[str]:
+        more = len(received) - MOST_REASONS
+        shown = [self._message_line(sent, message) for sent, message in received[:MOST_REASONS]]
         return [*shown, *([f"and {more:,} more messages"] if more > 0 else [])]
 
-    def _words_of(self, sent: Sent, message: Message) -> str:
-        said = self._look.said(sent.sender, message)
+    def _message_line(self, sent: Sent, message: Message) -> str:
+        said = self._inspector.message_text(sent.sender, message)
         return f"{sent.sender} said {sent.type}{f': {said}' if said else ''}"
 
-    # What has come of it
+    # The result
 
-    def _now(self) -> str:
+    def _new_value_line(self) -> str:
         """Return a sentence on the new value."""
         index = self._protocol.value
         if index is None:
             return "it has no value now"
         first = safely(lambda: self._is_first(index), False)
-        text = self._named(index) or ""
+        text = self._value_text(index) or ""
         if text.startswith("withdraws"):
             return f"it {text}"
         return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
@@ -148,32 +148,32 @@ class Reasons:
             return store[index] is None and all(store[place] is not None for place in range(index))
         if index >= MOST_VALUES:
             return False
-        against = [self._look.against(protocol, place) is not None for place in range(index + 1)]
+        against = [self._inspector.against(protocol, place) is not None for place in range(index + 1)]
         return all(against[:-1]) and not against[-1]
 
-    def _hopeless(self) -> bool:
+    def _is_hopeless(self) -> bool:
         """Return whether all own values are ruled out, for any values of other robots."""
         store = self._store()
         if store is None:
             return False
         return all(store[index] is not None for index in range(len(self._protocol.problem.values))) and not any(store)
 
-    def _ended(self, verdict: str, *, hopeless: bool) -> str:
+    def _conclusion_line(self, verdict: str, *, hopeless: bool) -> str:
         words = next((words for known, words in _CONCLUDED.items() if str(known) == verdict), f"the search: {verdict}")
         return f"it concluded {words}{': no value is left, whatever the others take' if hopeless else ''}"
 
-    def _named(self, index: int | None) -> str | None:
-        return None if index is None else self._look.own_value(self._protocol, index)
+    def _value_text(self, index: int | None) -> str | None:
+        return None if index is None else self._inspector.own_value(self._protocol, index)
 
 
 def _by(reason: str) -> str:
     return f"{reason.removeprefix('what holds')}" if reason == ALWAYS else f" by: {reason}"
 
 
-def _last(heard: Sequence[tuple[Sent, Message]]) -> list[tuple[Sent, Message]]:
+def _last(received: Sequence[tuple[Sent, Message]]) -> list[tuple[Sent, Message]]:
     """Return each robot's last message about itself in one packet, and all nogoods."""
-    latest = {sent.sender: place for place, (sent, message) in enumerate(heard) if not hasattr(message, "lhs")}
-    return [pair for place, pair in enumerate(heard) if hasattr(pair[1], "lhs") or latest[pair[0].sender] == place]
+    latest = {sent.sender: place for place, (sent, message) in enumerate(received) if not hasattr(message, "lhs")}
+    return [pair for place, pair in enumerate(received) if hasattr(pair[1], "lhs") or latest[pair[0].sender] == place]
 
 
 def _together(values: Sequence[str]) -> str:

@@ -1,4 +1,4 @@
-"""The robots of each recorded run, rebuilt from the parameters they were given."""
+"""The robots of each recorded run, rebuilt from their recorded problems."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _UNCOMPILED = (
 
 
 class CannotReplayError(RobochocError):
-    """A run that cannot be replayed: why, and what would help. `broken`: the journal is damaged."""
+    """A run cannot be replayed, with the reason and a hint. `broken`: the journal is damaged."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:
         super().__init__(why)
@@ -57,7 +57,7 @@ class ReplayOptions(NamedTuple):
     """Inputs of a replay besides the journal.
 
     Attributes:
-        team: The team in files, for journals that do not record what robots were given.
+        team: The team in files, for journals without the robots' problems.
         protocols: Protocols by their classes' names, to be used instead of the installed ones.
         settings: The settings of the protocol, if the journal does not record them.
         limits: Limits for robots whose private constraints need a solver (`solver/compile.py`).
@@ -80,9 +80,9 @@ class RebuiltRobots(NamedTuple):
         protocol: Their protocol.
         hosts: Their hosts, by name.
         parts: Each robot's part of the problem.
-        lossless: No message of the epoch before was lost.
-        continuing: Robots that continue with their results of the epoch before.
-        compiled: The team that they were made of.
+        lossless: Whether no message of the previous epoch was lost.
+        continuing: Robots that continue with their results of the previous epoch.
+        compiled: Their compiled team.
     """
 
     protocol: type[Protocol]
@@ -94,26 +94,26 @@ class RebuiltRobots(NamedTuple):
 
 
 def reads_files(events: Iterable[AnyEvent]) -> bool:
-    """Return whether robots of a journal with these `events` are rebuilt from the team's files, for lack of others."""
+    """Return whether a journal with these `events` lacks the robots' problems, so that the team's files are needed."""
     given = [event for event in events if isinstance(event, Given)]
     return not given or any(one.why for one in given)
 
 
 class Rebuilder:
-    """Makes the robots of one run after the other; robots that continue into an epoch are the same objects.
+    """Creates the robots of each run in turn. Robots that continue into an epoch remain the same objects.
 
-    `only` names the robots to be made; None: all. Raises `CannotReplayError` for a run in which messages may be lost.
+    `only` are the robots to create; None for all. Raises `CannotReplayError` for a run in which messages may be lost.
     """
 
     def __init__(self, header: Header | None, options: ReplayOptions, only: Collection[str] | None = None) -> None:
         if header is not None and header.message_loss:
-            raise CannotReplayError("messages were lost in it (--message-loss), and no journal says which")
+            raise CannotReplayError("messages were lost in it (--message-loss), which no journal records")
         self._header = header
         self._options = options
         self._only = only
         self._reader = TeamReader(header.team if header else "")
         self._hosts: dict[type[Protocol], dict[str, Host]] = {}
-        """Of each protocol's last run: before each epoch there may be one of another protocol."""
+        """The hosts of each protocol's last run: before an epoch, there may be a run of another protocol."""
         self._before: Mapping[str, CompiledRobot] = {}
         self._lost: set[str] = set()
 
@@ -123,8 +123,8 @@ class Rebuilder:
         try:
             epoch = self._epoch(run, protocol)
             parts = epoch.parts(protocol)
-            goes_on = run.began is not None and isinstance(run.began.epoch, int)
-            before = self._hosts.get(protocol, {}) if goes_on else {}
+            continues = run.began is not None and isinstance(run.began.epoch, int)
+            before = self._hosts.get(protocol, {}) if continues else {}
             hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
             self._hosts[protocol] = hosts
         except GivenProblemError as why:
@@ -138,7 +138,7 @@ class Rebuilder:
         return RebuiltRobots(protocol, hosts, parts, lossless, continuing, epoch.compiled)
 
     def _protocol(self, run: RecordedRun) -> type[Protocol]:
-        """Return the class that the run names; a master's journal names it in the header."""
+        """Return the protocol of the run; in a master's journal, that of the header."""
         asked = self._header.protocol if self._header else None
         if run.began is None:
             return self._named(asked or "")
@@ -148,8 +148,8 @@ class Rebuilder:
         found = protocol_by_class(name, filter(None, [asked]))
         if found is not None:
             return found[1]
-        hint = "install the package that it came from (robochoc protocols shows what there is)"
-        raise CannotReplayError(f"no protocol whose class is called {name!r} is installed; {hint}")
+        hint = "install its package (robochoc protocols lists the installed ones)"
+        raise CannotReplayError(f"no protocol with the class {name!r} is installed; {hint}")
 
     @staticmethod
     def _named(name: str) -> type[Protocol]:
@@ -160,25 +160,25 @@ class Rebuilder:
 
     def _epoch(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
         if run.given is not None and not (run.given.why and self._options.team):
-            return self._as_given(run.given)
-        return self._as_filed(run, protocol)
+            return self._from_event(run.given)
+        return self._from_files(run, protocol)
 
-    def _as_given(self, given: Given) -> Epoch:
+    def _from_event(self, given: Given) -> Epoch:
         compiled = self._compiled(self._reader.team(given))
         return Epoch(compiled, invalidated_of(given), frozenset(given.fresh), run_parameters_of(given))
 
-    def _as_filed(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
-        """Return the epoch by the team's files, without robots that were lost before."""
+    def _from_files(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
+        """Return the epoch of the team in files, without the robots lost before."""
         if self._options.team is None:
             raise CannotReplayError(
-                "the journal does not say what the robots were given, as that of a run across machines;"
-                " name the folder with the team's files: --team DIR"
+                "the journal lacks the robots' problems, as in a run across machines;"
+                " give the folder of the team's files: --team DIR"
             )
         if run.began is not None and isinstance(run.began.epoch, int):
-            raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
+            raise CannotReplayError("the journal lacks the robots' problems after the change")
         try:
             filed = self._ordered(team_after_events(normalized(self._options.team), events=0))
-            team = self._left(filed)
+            team = self._without_lost(filed)
         except (OrderError, ChangeError, ValueError) as why:
             raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why
         seed = self._header.seed if self._header else 0
@@ -198,8 +198,8 @@ class Rebuilder:
             return with_priorities(team, order)
         return team
 
-    def _left(self, team: Team) -> Team:
-        """Return `team` without the robots lost before. Across machines, interfaces of the others stay."""
+    def _without_lost(self, team: Team) -> Team:
+        """Return `team` without the robots lost before. Across machines, the others keep their interfaces."""
         on_network = self._header is not None and self._header.runtime == "network"
         left = without_robots(team, self._lost, with_files=on_network)
         return keep_interfaces(left, team) if on_network else left
@@ -219,7 +219,7 @@ class Rebuilder:
 
 
 def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epoch: Epoch) -> Host:
-    """Return the host of the epoch before, if it continues, or a new one. Raises `CannotReplayError`."""
+    """Return the host of the previous epoch if it continues, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
         if before is None or name in epoch.restarted:
@@ -227,6 +227,6 @@ def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epo
         before.change(part, epoch.invalidated)
     except _UNCOMPILED:
         raise
-    except Exception as error:  # a protocol that is being written, or a journal that is not what it says
-        raise CannotReplayError(f"{name} could not begin: {type(error).__name__}: {error}") from error
+    except Exception as error:  # a protocol under development, or an altered journal
+        raise CannotReplayError(f"{name} could not start: {type(error).__name__}: {error}") from error
     return before

@@ -1,8 +1,8 @@
 """Replay: the protocol objects of a recorded run process its packets again.
 
-A protocol is a pure state machine. With the same packets it has to send the same messages again. If it does not, the
-protocol has changed, or the journal was altered. Everything that robots report is compared but the time: what they took
-in, decided, heard of and concluded, what they sent, with its size, their NCCC clocks and their constraint checks.
+A protocol is a pure state machine. With the same packets it must send the same messages again. If it does not, the
+protocol has changed, or the journal was altered. All events of robots are compared except for their times: received
+messages, decisions, incumbents, conclusions, sent messages and their sizes, NCCC clocks and constraint checks.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict
 from robochoc.replay.claims import Contradiction, ReplayedRun, contradicted_claims, with_answer
-from robochoc.replay.comparison import Difference
+from robochoc.replay.comparison import StepDifference
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
 from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import runs_of
@@ -28,7 +28,7 @@ PROGRESS_EVERY = 256
 
 
 class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot that could be followed only up to step `step` of run `run`, and the reason."""
+    """A robot that could be replayed only up to step `step` of run `run`, and the reason."""
 
     run: int
     robot: str
@@ -41,18 +41,18 @@ class ReplayResult:
     """The result of a replay.
 
     Attributes:
-        runs: The number of runs and epochs that were begun.
+        runs: The number of runs and epochs that were started.
         robots: The number of robots in them.
         steps: The number of steps that were replayed and found equal.
         messages: The number of messages sent in them.
-        unfinished: The number of steps that are only in part in the journal; that part was compared.
-        difference: The first difference; None: there is none.
-        stopped: Robots that could not be followed to the end.
-        damage: Why the journal ends early; None: it does not.
-        ended: The journal holds the end of the run.
-        contradictions: Claims of header and outcome that do not follow from the steps.
-        truncated: The journal is damaged at its end only; it was not altered.
-        decided_before: The run was decided before any robot began, as one has no solution by itself: there is no step.
+        unfinished: The number of steps that are incomplete in the journal; their recorded part was compared.
+        difference: The first difference; None if there is none.
+        stopped: Robots that could not be replayed to the end.
+        damage: The reason why the journal ends early; None if it does not.
+        ended: Whether the journal contains the end of the run.
+        contradictions: Claims of header and outcome that differ from the results of the steps.
+        truncated: Whether the only damage is a missing end.
+        decided_before: The run was decided without any step, because a robot has no solution by itself.
     """
 
     runs: int
@@ -60,7 +60,7 @@ class ReplayResult:
     steps: int
     messages: int
     unfinished: int
-    difference: Difference | None
+    difference: StepDifference | None
     stopped: tuple[StoppedRobot, ...]
     damage: str | None
     ended: bool
@@ -107,15 +107,15 @@ class _JournalReplay:
         self._steps = self._messages = self._unfinished = self._runs = 0
         self._stopped: list[StoppedRobot] = []
         self._played: list[ReplayedRun] = []
-        self._gone: set[str] = set()
-        """Robots whose state is not known any more."""
+        self._stopped_robots: set[str] = set()
+        """Robots whose state is no longer known."""
 
     def result(self) -> ReplayResult:
         difference = self._first_difference()
         found: Iterable[Contradiction] = ()
         if difference is None:
-            whole = not (self._stopped or self._unfinished or self._journal.damage)
-            found = contradicted_claims(self._journal, self._played, whole=whole)
+            is_complete = not (self._stopped or self._unfinished or self._journal.damage)
+            found = contradicted_claims(self._journal, self._played, is_complete=is_complete)
         return ReplayResult(
             runs=self._runs,
             robots=len(self._counts),
@@ -131,12 +131,12 @@ class _JournalReplay:
             decided_before=_decided_before(self._journal),
         )
 
-    def _first_difference(self) -> Difference | None:
+    def _first_difference(self) -> StepDifference | None:
         for run in runs_of(self._journal.events):
-            self._show(f"run {run.number + 1}: making the robots")
+            self._show(f"run {run.number + 1}: creating the robots")
             robots = self._rebuilder.robots_of(run)
             if robots.protocol.traits.secret_keys and self._journal.header.runtime == "network":
-                raise CannotReplayError("its robots drew keys on their own machines, which no journal holds")
+                raise CannotReplayError("its robots have drawn keys on their machines, which no journal contains")
             self._runs += 1
             self._counts.update({name: 0 for name in robots.hosts if name not in self._counts})
             difference = self._play(RunReplay(run, robots, self._journal.header))
@@ -145,25 +145,25 @@ class _JournalReplay:
             self._played.append(with_answer(run, robots, self._journal.outcome))
         return None
 
-    def _play(self, replay: RunReplay) -> Difference | None:
-        self._gone.intersection_update(replay.robots.continuing)
+    def _play(self, replay: RunReplay) -> StepDifference | None:
+        self._stopped_robots.intersection_update(replay.robots.continuing)
         for step in replay.steps():
             number = self._counts.get(step.robot, 0)
             self._counts[step.robot] = number + 1
-            if step.robot in self._gone:
+            if step.robot in self._stopped_robots:
                 continue
             try:
                 difference = replay.play(step, number)
             except ReplayStopsError as stops:
-                self._gone.add(step.robot)
+                self._stopped_robots.add(step.robot)
                 self._stopped.append(StoppedRobot(run=replay.run.number, robot=step.robot, step=number, why=str(stops)))
                 continue
             if difference:
                 return difference
             self._steps += 1
-            if not step.whole:
+            if not step.is_complete:
                 self._unfinished += 1
-                self._gone.add(step.robot)
+                self._stopped_robots.add(step.robot)
             self._messages += sum(isinstance(event, Sent) for event in step.done)
             if self._steps % PROGRESS_EVERY == 0:
                 self._show()
@@ -175,7 +175,7 @@ class _JournalReplay:
 
 
 def _decided_before(journal: Journal) -> bool:
-    """Return whether the journal says that no robot began, as one of them alone has no solution."""
+    """Return whether the outcome was decided without a run, because a robot has no solution by itself."""
     outcome = journal.outcome
     if outcome is None or journal.events or journal.damage is not None or outcome.metrics.messages:
         return False

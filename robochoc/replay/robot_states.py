@@ -19,8 +19,8 @@ from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import RecordedStep, runs_of, steps_of
 
 
-class Choice(msgspec.Struct, frozen=True):
-    """An own value, and what rules it out (None: nothing that the robot knows)."""
+class ValueState(msgspec.Struct, frozen=True):
+    """A value of the robot, and the known reason that excludes it (None if there is none)."""
 
     value: str
     ruled_out_by: str | None
@@ -31,18 +31,18 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
 
     Attributes:
         step: The number of the step.
-        value: The values of the robot's variables; empty: none.
+        value: The values of the robot's variables; empty if it has none.
         view: The known state of other robots, as pairs (robot, words).
-        domain: Each own value, with what rules it out.
+        domain: Each value of the robot, with the reason that excludes it.
         nogoods: The stored nogoods.
         more: Everything else that the protocol stores, by name.
-        why: Why the value has changed, or why the robot has concluded the search; empty: neither.
+        why: The reasons for a changed value, or for the conclusion of the search; otherwise empty.
     """
 
     step: int
     value: dict[str, int] = {}
     view: list[tuple[str, str]] = []
-    domain: list[Choice] = []
+    domain: list[ValueState] = []
     nogoods: list[str] = []
     more: dict[str, str] = {}
     why: list[str] = []
@@ -57,9 +57,9 @@ def states_of(
     since: int = 0,
     everything: Callable[[], Iterable[AnyEvent]] | None = None,
 ) -> Iterator[RobotState]:
-    """Yield the states of `robot` after its own steps; partial steps have none.
+    """Yield the states of `robot` after its complete steps.
 
-    If the journal does not hold the next messages to the robot, the last state says so in `more`.
+    If the journal lacks the next messages to the robot, `more` of the last state contains the reason.
 
     Args:
         journal: A journal, or events sorted as in one. Events of `robot` and messages to it are sufficient if
@@ -85,13 +85,13 @@ def states_of(
             for state in player.states(events, since):
                 yield state
                 since = state.step + 1
-        except _UnsaidError:
+        except _MissingContentError:
             continue
         return
 
 
-class _UnsaidError(Exception):
-    """A message to the robot that only a replay of its sender can rebuild."""
+class _MissingContentError(Exception):
+    """A message to the robot can only be restored by replaying its sender."""
 
 
 class _Player:
@@ -120,44 +120,44 @@ class _Player:
                     self._step += step.robot == self._robot
                     continue
                 try:
-                    state = self._played(replay, inspector, step, since)
+                    state = self._play_step(replay, inspector, step, since)
                 except ReplayStopsError as stops:
-                    if stops.unsaid and self._alone:
-                        raise _UnsaidError from stops
+                    if stops.needs_sender and self._alone:
+                        raise _MissingContentError from stops
                     gone.add(step.robot)
                     state = self._last(step, str(stops), since)
                 if state is not None:
                     yield state
 
-    def _played(self, replay: RunReplay, inspector: Inspector, step: RecordedStep, since: int) -> RobotState | None:
+    def _play_step(self, replay: RunReplay, inspector: Inspector, step: RecordedStep, since: int) -> RobotState | None:
         """Return the state after `step`; None if the step is another robot's, partial, or before `since`."""
         if step.robot != self._robot:
             replay.play(step, 0)
             return None
         number, protocol = self._step, replay.robots.hosts[self._robot].protocol
         self._step += 1
-        wanted = step.whole and number >= since
+        wanted = step.is_complete and number >= since
         reasons = Reasons(inspector, protocol) if wanted else None
-        difference = replay.play(step, number, reasons.listen) if reasons else replay.play(step, number)
+        difference = replay.play(step, number, reasons.record_sent) if reasons else replay.play(step, number)
         if difference is not None:
-            raise CannotReplayError(f"{self._robot} does not do again what was recorded: {difference.in_short}")
-        heard = replay.taken_in
-        for sent, message in heard:
-            inspector.hear(sent.sender, message)
+            raise CannotReplayError(f"the replay of {self._robot} differs from the record: {difference.summary}")
+        received = replay.received_messages
+        for sent, message in received:
+            inspector.record_received(sent.sender, message)
         if reasons is None:
             return None
         return RobotState(
             step=number,
             value=dict(protocol.assignment),
             view=safely(lambda: inspector.view(protocol), []),
-            domain=[Choice(*pair) for pair in safely(lambda: inspector.domain(protocol), [])],
+            domain=[ValueState(*pair) for pair in safely(lambda: inspector.domain(protocol), [])],
             nogoods=safely(lambda: inspector.nogoods(protocol), []),
             more=inspector.more(protocol),
-            why=safely(lambda: reasons.told(heard, step), []),
+            why=safely(lambda: reasons.lines(received, step), []),
         )
 
     def _last(self, step: RecordedStep, why: str, since: int) -> RobotState | None:
-        """Return a last state without content, which says why the states end."""
+        """Return a last state without content, except for the reason of the end."""
         if step.robot != self._robot:
             return None
         self._step += 1

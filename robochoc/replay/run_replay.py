@@ -12,13 +12,13 @@ from robochoc.journal.events import AnyEvent, Received, Sent
 from robochoc.journal.journal import Header
 from robochoc.protocols.message import Envelope, Message
 from robochoc.replay.channels import MessageDecoder, RecordedChannels
-from robochoc.replay.comparison import Difference, StepComparison
+from robochoc.replay.comparison import StepComparison, StepDifference
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun, RecordedStep, steps_of
 from robochoc.system.errors import RobochocError
 
 SIMULATED = "simulator"
-"""The runtime whose schedules may delay messages: a message may then move the receiver's clock on."""
+"""The runtime whose schedules may delay messages. The delay of a message advances the receiver's clock."""
 MAX_EXTRA_MESSAGES = 10_000
 """Messages that a replayed step may send beyond those recorded."""
 
@@ -27,34 +27,34 @@ Listener = Callable[[str, Message], None]
 
 
 class NoEndError(RobochocError):
-    """A step in which the protocol has sent so many messages that it may never end."""
+    """The protocol has sent so many messages in a step that the step may never end."""
 
 
 class ReplayStopsError(RobochocError):
-    """A robot that cannot be followed any further.
+    """A robot cannot be replayed any further.
 
-    `unsaid`: a message to it cannot be rebuilt from the journal, but by replaying its sender.
+    `needs_sender`: a message to it can only be restored by replaying its sender.
     """
 
-    def __init__(self, why: str, *, unsaid: bool = False) -> None:
+    def __init__(self, why: str, *, needs_sender: bool = False) -> None:
         super().__init__(why)
-        self.unsaid = unsaid
+        self.needs_sender = needs_sender
 
 
 class _Outbox(list[tuple[str, Message]]):
-    """An outbox of limited size, as most protocols that never end send messages endlessly."""
+    """An outbox of limited size, since most faulty protocols send messages endlessly."""
 
     def __init__(self, most: int, listener: Listener) -> None:
         super().__init__()
         self._most = most
         self._listener = listener
 
-    def append(self, said: tuple[str, Message]) -> None:
+    def append(self, sent: tuple[str, Message]) -> None:
         """Add one message. Raises `NoEndError` if there are too many."""
         if len(self) >= self._most:
-            raise NoEndError(f"{len(self):,} messages in one step, and no end of it")
-        super().append(said)
-        self._listener(*said)
+            raise NoEndError(f"{len(self):,} messages in one step, which may never end")
+        super().append(sent)
+        self._listener(*sent)
 
 
 class RunReplay:
@@ -63,8 +63,8 @@ class RunReplay:
     def __init__(self, run: RecordedRun, robots: RebuiltRobots, header: Header | None) -> None:
         self.run = run
         self.robots = robots
-        self.taken_in: list[tuple[Sent, Message]] = []
-        """The messages that the last step took in."""
+        self.received_messages: list[tuple[Sent, Message]] = []
+        """The messages received in the last step."""
         self._decoder = MessageDecoder(robots.protocol)
         self._channels = RecordedChannels(run.events, self._decoder)
         self._comparison = StepComparison(self._decoder, header)
@@ -82,11 +82,11 @@ class RunReplay:
                 waiting.setdefault(step.robot, deque()).append(step)
                 continue
             yield step
-            yield from self._now_possible(waiting)
+            yield from self._enabled_steps(waiting)
         for steps in waiting.values():
             yield from steps
 
-    def _now_possible(self, waiting: dict[str, deque[RecordedStep]]) -> Iterator[RecordedStep]:
+    def _enabled_steps(self, waiting: dict[str, deque[RecordedStep]]) -> Iterator[RecordedStep]:
         """Yield the delayed steps that can be played now; each may enable another one."""
         moved = True
         while moved:
@@ -98,8 +98,8 @@ class RunReplay:
                 if not steps:
                     del waiting[name]
 
-    def play(self, step: RecordedStep, number: int, listener: Listener = lambda *_: None) -> Difference | None:
-        """Play a step, and return the first difference; None: it is equal to the record.
+    def play(self, step: RecordedStep, number: int, listener: Listener = lambda *_: None) -> StepDifference | None:
+        """Play a step, and return the first difference; None if it equals the record.
 
         Args:
             step: The step.
@@ -117,17 +117,17 @@ class RunReplay:
         recorded = sum(isinstance(event, Sent) for event in step.done)
         host.protocol.outbox = _Outbox(recorded + MAX_EXTRA_MESSAGES, listener)
         host.protocol.checks_at_send.clear()
-        self.taken_in = []
+        self.received_messages = []
         sent: Sequence[Envelope] = ()
         packet: list[Sent] = []
         raised = ""
         try:
             self._receive(host, step, packet, events)
-            sent = self._go_on(host, step)
+            sent = self._finish_step(host, step)
         except ReplayStopsError:
             raise
         except Exception as error:  # noqa: BLE001 - a protocol under development may raise anything
-            raised = _with_place(error)
+            raised = _error_with_place(error)
         found = self._comparison.first_difference(step, events, raised=bool(raised))
         if found is None and not raised:
             self._channels.send_again(sent)
@@ -139,7 +139,7 @@ class RunReplay:
         for received in step.received:
             message, envelope = self._delivered(received)
             packet.append(message)
-            self._take_in(host, message, envelope)
+            self._receive_message(host, message, envelope)
             self._delay(host, received, events)
 
     def _delivered(self, received: Received) -> tuple[Sent, Envelope]:
@@ -149,12 +149,12 @@ class RunReplay:
             raise ReplayStopsError(f"the message {received.type} from {received.sender} is not in the journal")
         if envelope is None:
             why = f"the message {received.type} from {received.sender} cannot be restored from the journal"
-            raise ReplayStopsError(why, unsaid=True)
+            raise ReplayStopsError(why, needs_sender=True)
         return sent, envelope
 
-    def _take_in(self, host: Host, message: Sent, envelope: Envelope) -> None:
+    def _receive_message(self, host: Host, message: Sent, envelope: Envelope) -> None:
         host.receive(envelope)
-        self.taken_in.append((message, self._decoder.message(envelope.content)))
+        self.received_messages.append((message, self._decoder.message(envelope.content)))
 
     def _delay(self, host: Host, received: Received, events: list[AnyEvent]) -> None:
         """Advance the clock by the delay of a message: only the recorded clock shows it."""
@@ -162,10 +162,10 @@ class RunReplay:
             host.catch_up(received.clock)
             events[-1] = msgspec.structs.replace(events[-1], clock=received.clock)
 
-    def _go_on(self, host: Host, step: RecordedStep) -> Sequence[Envelope]:
-        """Let the robot settle, or start; no robot starts a run twice."""
+    def _finish_step(self, host: Host, step: RecordedStep) -> Sequence[Envelope]:
+        """Let the robot settle, or start unless it has started before."""
         sent: Sequence[Envelope] = ()
-        if step.received and (step.whole or step.done):
+        if step.received and (step.is_complete or step.done):
             sent = host.settle()
         elif not step.received and step.robot not in self._started:
             sent = host.start(lossless=self.robots.lossless)
@@ -179,8 +179,8 @@ class RunReplay:
         packet: Sequence[Sent],
         events: tuple[AnyEvent | None, AnyEvent | None],
         raised: str,
-    ) -> Difference:
-        return Difference(
+    ) -> StepDifference:
+        return StepDifference(
             run=self.run.number,
             protocol=self.robots.protocol.__name__,
             robot=step.robot,
@@ -192,7 +192,7 @@ class RunReplay:
         )
 
 
-def _with_place(error: Exception) -> str:
+def _error_with_place(error: Exception) -> str:
     """Return an exception with the file and line that raised it."""
     trace = error.__traceback__
     while trace is not None and trace.tb_next is not None:

@@ -15,11 +15,11 @@ from robochoc.system.compiled_core import attributes_of
 
 MAX_DEPTH = 3
 MAX_ENTRIES = 12
-"""Of a collection."""
+"""The maximum number of shown items of a collection."""
 MAX_LENGTH = 200
-"""Characters."""
+"""The maximum number of characters."""
 _CONTEXT = (LocalProblem, PriorityOrder, AgentProblem)
-"""Types of shared objects, which are no state of the object that refers to them."""
+"""Types of shared objects, which are not part of the state of objects that refer to them."""
 
 
 def safe_repr(thing: object) -> str:
@@ -28,7 +28,7 @@ def safe_repr(thing: object) -> str:
         if isinstance(thing, PriorityOrder):
             return cut(" > ".join(thing.names), MAX_LENGTH)
         return cut(_repr.repr(thing), MAX_LENGTH)
-    except Exception as error:  # noqa: BLE001 - another package's object may do anything when it is shown
+    except Exception as error:  # noqa: BLE001 - the `repr` of a third-party object may raise anything
         return f"<{type(thing).__name__} cannot be shown: {type(error).__name__}>"
 
 
@@ -61,7 +61,7 @@ class _Repr(reprlib.Repr):
         if collection is not None:
             return self.repr1(collection, level)
         shape = getattr(thing, "shape", None)
-        if isinstance(shape, tuple):  # of numpy, which need not be imported for it
+        if isinstance(shape, tuple):  # a numpy array, recognised without importing numpy
             return f"<array of {' x '.join(map(str, shape))}>"
         if callable(thing):
             return getattr(thing, "__name__", type(thing).__name__)
@@ -76,7 +76,7 @@ class _Repr(reprlib.Repr):
 
 
 def _as_builtin(thing: object) -> dict[object, object] | list[object] | set[object] | None:
-    """Return a collection of another type as a built-in one. None: it is not a collection."""
+    """Return a collection of another type as a built-in one; None if it is not a collection."""
     if isinstance(thing, Mapping):
         return dict(islice(thing.items(), MAX_ENTRIES + 1))
     if isinstance(thing, AbstractSet):

@@ -1,7 +1,7 @@
-"""A journal's events as runs, and a run's as the steps of its robots.
+"""Groups the events of a journal by run, and those of a run by the steps of its robots.
 
-A step is what a robot does with one packet: it takes the messages in, decides, speaks, and has settled. A step that
-takes nothing in is its start. The last one may be there in part only, where a journal, or a robot, ends early.
+In a step, a robot processes one packet: it receives the messages, decides, sends messages, and settles. Its start is a
+step without received messages. The last step may be incomplete if the journal or the robot ends early.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
 
 
 class RecordedRun(NamedTuple):
-    """A run, or an epoch of it, counted from 0; in a master's journal it has no `Began` and no `Given`."""
+    """A run or an epoch, counted from 0. In a master's journal it has no `Began` and no `Given`."""
 
     number: int
     began: Began | None
@@ -42,11 +42,11 @@ class RecordedStep(NamedTuple):
     robot: str
     received: Sequence[Received]
     done: Sequence[RobotEvent]
-    whole: bool
+    is_complete: bool
 
 
 def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
-    """Yield the runs in their order; omit those in which no robot was given, or did, anything."""
+    """Yield the runs in order, omitting those without problems and events of robots."""
     number = 0
     run = RecordedRun(0, None, None, [])
     for event in events:
@@ -64,12 +64,12 @@ def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
 
 
 def _is_one(run: RecordedRun) -> bool:
-    """Return whether a robot was given, or did, anything in the run."""
+    """Return whether the run has problems or events of robots."""
     return run.given is not None or any(actor(event) is not None for event in run.events)
 
 
 def steps_of(events: Iterable[AnyEvent]) -> Iterator[RecordedStep]:
-    """Yield the steps of one run in the order of their ends; then those without an end."""
+    """Yield the steps of one run in the order of their ends, then incomplete ones."""
     open_still: dict[str, list[RobotEvent]] = {}
     for event in events:
         robot = actor(event)

@@ -8,9 +8,9 @@ from robochoc.protocols.message import Value
 from robochoc.solver.agent_problem import Interfaces
 
 LONGEST = 200
-"""Characters of a phrase; what is longer is cut."""
+"""The most characters of a phrase; longer ones are cut."""
 MOST_NAMED = 12
-"""Robots that one phrase names."""
+"""The most robots in a phrase."""
 
 
 def cut(text: str, longest: int = LONGEST) -> str:
@@ -19,7 +19,7 @@ def cut(text: str, longest: int = LONGEST) -> str:
 
 
 class ValueText:
-    """Formats robots' values. `interfaces` are the variables that each robot shows to its neighbours."""
+    """Formats values of robots. `interfaces` are the variables that each robot shows its neighbours."""
 
     def __init__(self, interfaces: Interfaces) -> None:
         self._interfaces = interfaces
@@ -29,7 +29,7 @@ class ValueText:
         return self._pairs(robot, value, "=", ", ") or f"{robot}: any value"
 
     def against(self, robot: str, value: Sequence[int | None]) -> str:
-        """Return in words that `robot` cannot have `value`: V1.1 != 2."""
+        """Return the exclusion of `value` for `robot` in words: V1.1 != 2."""
         known = [part for part in value if part is not None]
         if len(known) == 1:
             return self._pairs(robot, value, "!=", "")
@@ -42,8 +42,8 @@ class ValueText:
         more = [f"{len(named) - MOST_NAMED:,} more"] if len(named) > MOST_NAMED else []
         return cut(" and ".join([*named[:MOST_NAMED], *more]))
 
-    def told(self, robot: str, value: Sequence[int | None]) -> str:
-        """Return a robot's own value in words; if all components are None, that it withdraws."""
+    def own_value_text(self, robot: str, value: Sequence[int | None]) -> str:
+        """Return the value of a robot in words; "withdraws" if all its components are None."""
         return self._pairs(robot, value, "=", ", ") or ("withdraws" if value else "shows no variable")
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:
@@ -55,13 +55,13 @@ class ValueText:
 
 
 def is_value(thing: object) -> bool:
-    """Return whether `thing` looks like a robot's value as others see it."""
+    """Return whether `thing` has the form of a robot's value in messages."""
     return isinstance(thing, tuple) and all(part is None or type(part) is int for part in thing)
 
 
 def as_value(thing: object) -> Value | None:
     """Return `thing` as a robot's value; None if it is not one."""
-    return thing if is_value(thing) else None  # type: ignore[return-value]  # it has been looked at
+    return thing if is_value(thing) else None  # type: ignore[return-value]  # checked by `is_value`
 
 
 class NumberedValueText(ValueText):

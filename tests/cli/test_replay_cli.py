@@ -198,7 +198,7 @@ def test_files_for_a_journal_that_has_none(two: Journal, tmp_path: Path) -> None
     path = written(without_given(two), tmp_path / "journal")
     refused = run(path)
     assert refused.exit_code == USAGE
-    assert "name the folder with the team's files: --team DIR" in refused.output
+    assert "give the folder of the team's files: --team DIR" in refused.output
     write_team(queens3d(2), tmp_path / "team")
     result = run(path, "--team", tmp_path / "team")
     assert "robots               4" in result.output

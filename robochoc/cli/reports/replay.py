@@ -17,7 +17,7 @@ from robochoc.journal.events import (
     Settled,
 )
 from robochoc.journal.journal import Journal
-from robochoc.replay import Contradiction, Difference, ReplayResult
+from robochoc.replay import Contradiction, ReplayResult, StepDifference
 
 LONGEST = 400
 """Characters that are shown of a message's content."""
@@ -95,7 +95,7 @@ def _shortfalls(replayed: ReplayResult) -> Iterator[str]:
         yield f"  and {len(replayed.stopped) - MOST:,} more robots"
 
 
-def _difference_lines(difference: Difference) -> Iterator[str]:
+def _difference_lines(difference: StepDifference) -> Iterator[str]:
     place = f"step {difference.step} of {difference.robot} in run {difference.run} ({difference.protocol})"
     yield f"  first difference: {place}"
     if difference.packet:

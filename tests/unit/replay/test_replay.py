@@ -255,7 +255,7 @@ class Stubborn(ABT):
 def test_a_protocol_that_goes_round_in_a_circle_is_stopped(four: Journal) -> None:
     difference = replay(four, ReplayOptions(protocols={"ABT": Stubborn})).difference
     assert difference is not None
-    assert "and no end of it" in difference.raised
+    assert "which may never end" in difference.raised
 
 
 def test_delays_are_the_simulators_only() -> None:
@@ -294,7 +294,7 @@ def test_settings_and_orders_that_only_the_command_line_knows() -> None:
 
 def test_a_protocol_that_is_not_installed(four: Journal) -> None:
     events = [msgspec.structs.replace(e, protocol="Telepathy") if isinstance(e, Began) else e for e in four.events]
-    with pytest.raises(CannotReplayError, match="no protocol whose class is called 'Telepathy' is installed"):
+    with pytest.raises(CannotReplayError, match="no protocol with the class 'Telepathy' is installed"):
         replay(with_events(four, events))
 
 

@@ -206,7 +206,7 @@ class Backwards(ABT):
 
 def test_another_protocol_than_the_one_recorded_is_no_insight() -> None:
     journal = recorded(pair(), SIMULATED)
-    with pytest.raises(CannotReplayError, match="RB does not do again what was recorded: in its step 0 of run 0"):
+    with pytest.raises(CannotReplayError, match="the replay of RB differs from the record: in its step 0 of run 0"):
         list(states_of(journal, "RB", ReplayOptions(protocols={"ABT": Backwards})))
 
 
