@@ -204,9 +204,9 @@ VALUES = [
 
 CONSTRAINTS = [
     change("a constraint goes that is not there", '<remove_constraint agent="Robot2" parent="Robot1" name="C9"/>',
-           "'Robot2' shares no constraint 'C9' with a parent 'Robot1'", "there are C1 C2 C3"),
+           "'Robot2' shares no constraint 'C9' with a parent 'Robot1'", "they share C1 C2 C3"),
     change("a constraint goes twice", '<remove_constraint agent="Robot2" parent="Robot1"  name="C3"/>',
-           "shares no constraint 'C3'", "there are C1 C2)",
+           "shares no constraint 'C3'", "they share C1 C2)",
            before='<remove_constraint agent="Robot2" parent="Robot1" name="C3"/>'),
     change("a constraint goes, upside down", '<remove_constraint agent="Robot1" parent="Robot2" name="C1"/>',
            "'Robot1' shares no constraint 'C1' with a parent 'Robot2'", "the parent is the robot"),

@@ -65,7 +65,7 @@ def test_a_run_reports_it(caplog: pytest.LogCaptureFixture) -> None:
 
 def test_a_refused_run_has_one_reason(caplog: pytest.LogCaptureFixture) -> None:
     team = random_pkc_team(Random(2))
-    with pytest.raises(UnsupportedError, match="such links are not turned"):
+    with pytest.raises(UnsupportedError, match="such links are not reversed"):
         solve(team, Options(kill=(Kill(team.order[0], 60),), order=tuple(reversed(team.order))))
     assert caplog.messages == []
 
