@@ -75,7 +75,7 @@ def _cost_one(instance: Instance) -> None:
     """Replace hard constraints by soft ones that cost 1 when violated."""
     tables: dict[int, ForeignTable] = {}
 
-    def costing_one(one: ForeignConstraint) -> ForeignConstraint:
+    def with_cost_one(one: ForeignConstraint) -> ForeignConstraint:
         match one.content:
             case Formula(definition=Predicate()) as formula:
                 return replace(one, content=replace(formula, cost=_ONE))
@@ -84,7 +84,7 @@ def _cost_one(instance: Instance) -> None:
             case _:
                 return one
 
-    instance.constraints = list(map(costing_one, instance.constraints))
+    instance.constraints = list(map(with_cost_one, instance.constraints))
 
 
 def _with_ones(table: ForeignTable) -> ForeignTable:

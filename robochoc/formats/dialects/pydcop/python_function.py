@@ -212,17 +212,17 @@ class _Compiler:
             case ast.AugAssign(target=ast.Name(id=name), op=op, value=value):
                 changed = ast.BinOp(ast.Name(name, ast.Load()), op, value)
                 return _assignment(name, self.expression(ast.copy_location(changed, node)))
-            case ast.For(target=ast.Name(id=name), iter=over, body=body, orelse=[]):
-                return self._loop(name, self.expression(over), body)
+            case ast.For(target=ast.Name(id=name), iter=iterable, body=body, orelse=[]):
+                return self._loop(name, self.expression(iterable), body)
             case _:
                 pass
         return _refuse(node)
 
-    def _loop(self, name: str, over: _Closure, statements: Sequence[ast.stmt]) -> _Statement:
+    def _loop(self, name: str, iterable: _Closure, statements: Sequence[ast.stmt]) -> _Statement:
         body, steps = self.block(statements), _steps_of(statements)
 
         def run(names: _Names) -> Value | _NoReturn:
-            for one in self._items(over(names)):
+            for one in self._items(iterable(names)):
                 self.step(steps)
                 names[name] = one
                 result = body(names)
@@ -261,8 +261,8 @@ class _Compiler:
             ):
                 return self._call(name, self._source_functions, arguments)
             case ast.Tuple(elts=parts) | ast.List(elts=parts):
-                made = [self.expression(one) for one in parts]
-                return lambda names: BoundedTuple([one(names) for one in made])
+                compiled = [self.expression(one) for one in parts]
+                return lambda names: BoundedTuple([one(names) for one in compiled])
             case ast.Dict(keys=keys, values=values) if None not in keys:
                 return _entries([self.expression(key) for key in keys if key], [*map(self.expression, values)])
             case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Slice):
@@ -276,10 +276,10 @@ class _Compiler:
 
     def _constant(self, node: ast.expr, value: object) -> _Closure:
         try:
-            made = literal(value)
+            constant = literal(value)
         except NoValueError:
             _refuse(node)
-        return lambda _: made
+        return lambda _: constant
 
     def _name(self, name: str) -> _Closure:
         if name in self._fixed:
@@ -300,10 +300,10 @@ class _Compiler:
         if any(isinstance(one, ast.Starred) for one in arguments):
             _refuse(arguments[0])
         read = self._members if name in AGGREGATES and len(arguments) == 1 else self.expression
-        made = [read(one) for one in arguments]
+        compiled = [read(one) for one in arguments]
 
         def call(names: _Names) -> Value:
-            values = [one(names) for one in made]
+            values = [one(names) for one in compiled]
             self.step(sum(map(size_of, values)))
             result = bounded(called(*values))
             self.step(size_of(result))
@@ -315,10 +315,10 @@ class _Compiler:
         """Return an expression of which only the members are used; it may be a set, with each member once."""
         if not isinstance(node, ast.Set):
             return self.expression(node)
-        made = [self.expression(one) for one in node.elts]
+        compiled = [self.expression(one) for one in node.elts]
 
         def members(names: _Names) -> Value:
-            return distinct([one(names) for one in made])
+            return distinct([one(names) for one in compiled])
 
         return members
 
@@ -344,7 +344,7 @@ class _Compiler:
     def _comprehension(self, part: ast.expr, loop: ast.comprehension) -> _Closure:
         if not isinstance(loop.target, ast.Name) or loop.is_async:
             _refuse(loop.target)
-        name, over, made = loop.target.id, self.expression(loop.iter), self.expression(part)
+        name, iterable, compiled = loop.target.id, self.expression(loop.iter), self.expression(part)
         conditions = [self.expression(one) for one in loop.ifs]
         steps = _steps_of([part, *loop.ifs])
 
@@ -353,11 +353,11 @@ class _Compiler:
             inner = dict(names)
             found: list[Value] = []
             size = 0
-            for one in self._items(over(names)):
+            for one in self._items(iterable(names)):
                 self.step(steps)
                 inner[name] = one
                 if all(condition(inner) for condition in conditions):
-                    found.append(made(inner))
+                    found.append(compiled(inner))
                     size += max(1, size_of(found[-1]))
                     if size > MAX_ITEMS:
                         break

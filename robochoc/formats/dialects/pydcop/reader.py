@@ -237,7 +237,7 @@ class _ConstraintBuilder:
     def __init__(self, names: NameMap, scale: Scale) -> None:
         self._names = names
         self._scale = scale
-        self._made: dict[tuple[str, Expression], Predicate | Function] = {}
+        self._definitions: dict[tuple[str, Expression], Predicate | Function] = {}
         self.constant = 0
 
     def constraint(self, parsed: ParsedConstraint) -> Constraint | None:
@@ -273,9 +273,11 @@ class _ConstraintBuilder:
         self, kind: type[Predicate | Function], name: str, scope: Sequence[str], body: Expression
     ) -> Predicate | Function:
         key = (f"{kind.__name__} {len(scope)}", body)
-        if key not in self._made:
-            self._made[key] = kind(definition_name(name), tuple(f"X{place}" for place in range(len(scope))), body)
-        return self._made[key]
+        if key not in self._definitions:
+            self._definitions[key] = kind(
+                definition_name(name), tuple(f"X{place}" for place in range(len(scope))), body
+            )
+        return self._definitions[key]
 
 
 def _over_formals(body: Expression) -> Expression:

@@ -27,7 +27,7 @@ def read_scenario(
     Raises:
         MistakeError: if the scenario is not valid.
     """
-    there, events, delays, left_out = {robot.name for robot in team.robots}, [], 0, 0
+    remaining, events, delays, left_out = {robot.name for robot in team.robots}, [], 0, 0
     listed, inputs = root.get("events"), root.get("inputs")
     if inputs is not None:
         inputs.skip()  # a remark of the program that wrote the file
@@ -43,10 +43,10 @@ def read_scenario(
             robot = _removed_robot(action, names, agents)
             if robot is None:
                 left_out += 1
-            elif robot in there:
-                there.remove(robot)
+            elif robot in remaining:
+                remaining.remove(robot)
                 changes.append(RemoveAgent(robot))
-        if not there:
+        if not remaining:
             raise MistakeError("an event removes the last robot", "keep at least one robot", event.line)
         if changes:
             events.append(ScenarioEvent(tuple(changes)))

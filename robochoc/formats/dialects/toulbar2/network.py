@@ -73,13 +73,13 @@ def to_team(network: CostFunctionNetwork, options: ImportOptions, dialect: str) 
     scale = Scale(amount for one in functions for amount in one.table.amounts())
     places, constant, constraints = list(network.variables), 0, []
     for one in functions:
-        made = _relation(one, scale, [codes[places[place]] for place in one.scope])
-        if isinstance(made, int):
-            constant += made
+        relation_or_constant = _relation(one, scale, [codes[places[place]] for place in one.scope])
+        if isinstance(relation_or_constant, int):
+            constant += relation_or_constant
         else:
-            scope = tuple(names.allowed(places[place]) for place in one.scope[: made.arity])
+            scope = tuple(names.allowed(places[place]) for place in one.scope[: relation_or_constant.arity])
             name = xml_name(one.table.name)
-            constraints.append(Constraint(name, made, scope, scope, ConstraintModel.TKC, line=one.line))
+            constraints.append(Constraint(name, relation_or_constant, scope, scope, ConstraintModel.TKC, line=one.line))
     reaches = _reaches_the_bound(network, functions)
     notes = [*network.notes, *_notes(network, scale, reaches=reaches)]
     notes += notes_on_names([*names.originals.items(), *symbols.originals.items()])
@@ -128,13 +128,13 @@ def _relation(function: CostFunction, scale: Scale, codes: Sequence[Sequence[int
         for values, cost in function.table.rows.items()
     }
     try:
-        made = relation(replace(function.table, rows=rows), len(function.scope), scale)
+        relation_or_constant = relation(replace(function.table, rows=rows), len(function.scope), scale)
     except MistakeError as mistake:
         raise MistakeError(mistake.message, mistake.hint, function.line) from None
-    if not isinstance(made, int) and not function.scope:
+    if not isinstance(relation_or_constant, int) and not function.scope:
         what = "the constant forbids all assignments"
         raise MistakeError(what, "delete it, or write a finite cost", function.line)
-    return made
+    return relation_or_constant
 
 
 def _with_hard_tuples(network: CostFunctionNetwork, infinity: int | None) -> Iterator[CostFunction]:

@@ -105,7 +105,7 @@ def read_instance(path: Path, options: ImportOptions, private_agent: PrivateAgen
     with open_xml(path, MAX_XML) as root:
         reader = _Xcsp21Reader(path, root, options, private_agent)
         reader.read()
-    return reader.found
+    return reader.instance
 
 
 class _Xcsp21Reader:
@@ -116,39 +116,39 @@ class _Xcsp21Reader:
         self._options = options
         self._private_agent = private_agent
         self._root = root
-        self.found = Instance(path)
+        self.instance = Instance(path)
         self._domains: dict[str, tuple[range, ...]] = {}
         self._relations: dict[str, ForeignTable | AsymmetricTable] = {}
         self._formulas: dict[str, Predicate | Function] = {}
         self._unit_places = 0
 
     def read(self) -> None:
-        """Fill `found`. Raises `MistakeError`."""
+        """Fill `instance`. Raises `MistakeError`."""
         if self._root.tag != "instance":
             raise self._root.mistake(f"the root element is <{self._root.tag}>", "expected <instance>")
         self._root.ignore("GuiPresentation")
-        for element in self._every("probabilities", "probability"):
+        for element in self._elements("probabilities", "probability"):
             self._not_stochastic(element)
-        self._present()
-        for element in self._every("agents", "agent"):
-            self._agent(element)
-        for element in self._every("domains", "domain"):
+        self._read_presentation()
+        for element in self._elements("agents", "agent"):
+            self._read_agent(element)
+        for element in self._elements("domains", "domain"):
             with _with_line(element):
                 element.ignore_attributes("nbValues")
                 self._domains[element.attribute("name")] = ranges(element.text())
-        for element in self._every("variables", "variable"):
-            self._variable(element)
-        self._define()
-        for element in self._every("constraints", "constraint"):
+        for element in self._elements("variables", "variable"):
+            self._read_variable(element)
+        self._read_definitions()
+        for element in self._elements("constraints", "constraint"):
             with _with_line(element):
-                self._constrain(element)
+                self._read_constraint(element)
 
-    def _present(self) -> None:
+    def _read_presentation(self) -> None:
         for presentation in self._root.children("presentation"):
-            self.found.name = presentation.attribute("name")
-            self.found.type = presentation.attribute("type")
-            self.found.constraint_model = presentation.attribute("constraintModel")
-            self.found.maximize = presentation.attribute("maximize").lower() in {"true", "1"}
+            self.instance.name = presentation.attribute("name")
+            self.instance.type = presentation.attribute("type")
+            self.instance.constraint_model = presentation.attribute("constraintModel")
+            self.instance.maximize = presentation.attribute("maximize").lower() in {"true", "1"}
             presentation.ignore_attributes(*_DESCRIPTIONS)
             for stats in presentation.children("stats"):
                 text = stats.text()
@@ -158,81 +158,81 @@ class _Xcsp21Reader:
             if not presentation.has_children:
                 presentation.text()
         for agents in self._root.children("agents"):
-            self.found.self_agent = agents.attribute("self")
+            self.instance.self_agent = agents.attribute("self")
         for constraints in self._root.children("constraints"):
             with _with_line(constraints):
-                self._bounds(constraints)
+                self._read_bounds(constraints)
 
-    def _bounds(self, constraints: ElementView) -> None:
+    def _read_bounds(self, constraints: ElementView) -> None:
         """Read the constant cost, and the bound of a weighted CSP (XCSP 2.1, "Representing WCSP")."""
         initial, most = constraints.attribute("initialCost"), constraints.attribute("maximalCost")
         if initial:
-            self.found.constant = finite_cost(initial)
-            if self.found.constant:
-                self.found.notes.append(ConversionNote("constant", f"initialCost {initial} is added to the cost"))
+            self.instance.constant = finite_cost(initial)
+            if self.instance.constant:
+                self.instance.notes.append(ConversionNote("constant", f"initialCost {initial} is added to the cost"))
         if most and most != "infinity":
             bound = finite_cost(most)
-            self.found.maximal_cost = bound
+            self.instance.maximal_cost = bound
             text = f"costs of {most} or more are infinite (maximalCost): an optimum of {most} or more is no solution"
-            self.found.notes.append(ConversionNote("bound", text))
+            self.instance.notes.append(ConversionNote("bound", text))
 
-    def _agent(self, element: ElementView) -> None:
+    def _read_agent(self, element: ElementView) -> None:
         name = element.attribute("name")
         element.ignore_attributes("description")
-        if name in self.found.agents:
+        if name in self.instance.agents:
             raise element.mistake(f"duplicate agent '{shortened(name)}'", "rename one of them")
-        self.found.agents.append(name)
+        self.instance.agents.append(name)
         if given := element.attribute("id"):
-            self.found.ids[given] = name
+            self.instance.ids[given] = name
 
-    def _variable(self, element: ElementView) -> None:
+    def _read_variable(self, element: ElementView) -> None:
         name, domain = element.attribute("name"), element.attribute("domain")
         element.ignore_attributes("description", "id")
         if element.attribute("type") == "random":
             self._not_stochastic(element)
-        if name in self.found.variables or not name:
+        if name in self.instance.variables or not name:
             raise element.mistake(f"duplicate or empty variable name '{shortened(name)}'", "write a unique name")
         if domain not in self._domains:
             hint = suggestion(domain, self._domains, "domains")
             raise element.mistake(f"there is no domain '{shortened(domain)}'", hint)
         owner = element.attribute("agent") or element.attribute("owner")
-        self.found.variables[name] = ForeignVariable(name, domain, self._domains[domain], owner, element.line)
+        self.instance.variables[name] = ForeignVariable(name, domain, self._domains[domain], owner, element.line)
 
     def _not_stochastic(self, element: ElementView) -> NoReturn:
         kind = "random variable" if element.tag == "variable" else "probability"
         what = f"the {kind} '{shortened(element.attribute('name'))}': stochastic problems are not supported"
         raise element.mistake(what, "give the variable one value")
 
-    def _define(self) -> None:
+    def _read_definitions(self) -> None:
         costs = CostReader(
-            maximize=self.found.maximize,
+            maximize=self.instance.maximize,
             infinity=self._options.infinity,
-            bound=self.found.maximal_cost,
+            bound=self.instance.maximal_cost,
             places=self._unit_places,
         )
-        for element in self._every("relations", "relation"):
+        for element in self._elements("relations", "relation"):
             with _with_line(element):
-                self._relations[self._new(element)] = read_relation(element, costs)
+                self._relations[self._new_name(element)] = read_relation(element, costs)
         for kind in ("predicate", "function"):
-            for element in self._every(f"{kind}s", kind):
+            for element in self._elements(f"{kind}s", kind):
                 with _with_line(element):
-                    self._formulas[self._new(element)] = read_formula(element)
+                    self._formulas[self._new_name(element)] = read_formula(element)
                     if self._unit_places and kind == "function":
                         what = f"functions are not supported in a file with a {UNIT}"
                         raise MistakeError(what, "write the costs as a relation")
 
-    def _new(self, element: ElementView) -> str:
+    def _new_name(self, element: ElementView) -> str:
         name = element.attribute("name")
         if name in self._relations or name in self._formulas:
             raise MistakeError(f"duplicate definition '{shortened(name)}'", "rename one of them")
         return name
 
-    def _constrain(self, element: ElementView) -> None:
+    def _read_constraint(self, element: ElementView) -> None:
         name, scope = element.attribute("name"), tuple(element.attribute("scope").split())
         element.ignore_attributes("arity")
         for variable in scope:
-            if variable not in self.found.variables:
-                hint = suggestion(variable, self.found.variables, "variables")
+            if variable not in self.instance.variables:
+                hint = suggestion(variable, self.instance.variables, "variables")
                 raise MistakeError(f"there is no variable '{shortened(variable)}'", hint)
         for content in self._contents(element, scope):
             if isinstance(content, Formula):
@@ -241,10 +241,10 @@ class _Xcsp21Reader:
                 scope_now = scope
             if not scope_now:
                 raise MistakeError(f"the constraint {shortened(name)} has no variables", "delete it")
-            if len(self.found.constraints) == MAX_CONSTRAINTS:
+            if len(self.instance.constraints) == MAX_CONSTRAINTS:
                 raise MistakeError(f"there are more than {MAX_CONSTRAINTS} constraints", "import a smaller problem")
-            private_agent = self._private_agent(element, self.found)
-            self.found.constraints.append(
+            private_agent = self._private_agent(element, self.instance)
+            self.instance.constraints.append(
                 ForeignConstraint(name, scope_now, content, private_agent, str(self._path), element.line)
             )
 
@@ -255,7 +255,7 @@ class _Xcsp21Reader:
             formulas = expand_global(kind, element, scope)
             for formula in formulas:
                 self._check_terms(formula.terms)
-            self.found.notes.append(
+            self.instance.notes.append(
                 ConversionNote("global", f"{kind} {element.attribute('name')}: {len(formulas)} predicates")
             )
             return [*formulas]
@@ -283,11 +283,11 @@ class _Xcsp21Reader:
 
     def _check_terms(self, terms: tuple[str | int, ...]) -> None:
         for term in terms:
-            if isinstance(term, str) and term not in self.found.variables:
-                hint = suggestion(term, self.found.variables, "variables")
+            if isinstance(term, str) and term not in self.instance.variables:
+                hint = suggestion(term, self.instance.variables, "variables")
                 raise MistakeError(f"'{shortened(term)}' is not a variable", hint)
 
-    def _every(self, section: str, tag: str) -> Iterator[ElementView]:
+    def _elements(self, section: str, tag: str) -> Iterator[ElementView]:
         for found in self._root.children(section):
             found.ignore_attributes(f"nb{section.capitalize()}")
             yield from found.children(tag)
@@ -305,7 +305,7 @@ def read_relation(element: ElementView, costs: CostReader) -> ForeignTable | Asy
         what = f"the semantics '{shortened(semantics)}' is not valid"
         raise MistakeError(what, f"write one of {' '.join(_SEMANTICS)}")
     if semantics == "soft":
-        return _soft(element, costs)
+        return _read_soft_relation(element, costs)
     listed, other = (_ZERO, INFINITE) if semantics == "supports" else (INFINITE, _ZERO)
     found: dict[tuple[int, ...], Price] = {}
     for cost, values in split_tuples(element.text()):
@@ -316,7 +316,7 @@ def read_relation(element: ElementView, costs: CostReader) -> ForeignTable | Asy
     return _table(element, found, other)
 
 
-def _soft(element: ElementView, costs: CostReader) -> ForeignTable | AsymmetricTable:
+def _read_soft_relation(element: ElementView, costs: CostReader) -> ForeignTable | AsymmetricTable:
     default = element.attribute("defaultCost")
     other = [costs.cost(word) for word in default.split()] or [INFINITE]
     now: list[Price] = []
@@ -369,7 +369,7 @@ def read_formula(element: ElementView) -> Predicate | Function:
     if function:
         element.ignore_attributes("return")
     formals = _parameters(parameters.text() if parameters else "")
-    body = expression(functional.text(), formals, Type.INTEGER if function else Type.BOOLEAN)
+    body = read_expression(functional.text(), formals, Type.INTEGER if function else Type.BOOLEAN)
     return Function(name, formals, body) if function else Predicate(name, formals, body)
 
 
@@ -382,12 +382,12 @@ def _parameters(text: str) -> tuple[str, ...]:
     return tuple(words[1::2])
 
 
-def expression(text: str, names: tuple[str, ...], wanted: Type) -> Expression:
+def read_expression(text: str, names: tuple[str, ...], result_type: Type) -> Expression:
     """Return the functional expression in `text`. Raises `MistakeError`."""
     if not {"true", "false"} & set(names):
         text = _TRUTH.sub(lambda word: _TRUTH_VALUES[word[0]], text)
     try:
-        return parse(text, names, wanted)
+        return parse(text, names, result_type)
     except ExpressionError as error:
         raise MistakeError(f"in the expression: {error.message}", error.hint or "see the format's reference") from None
 

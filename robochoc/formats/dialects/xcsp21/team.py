@@ -100,7 +100,7 @@ class _TeamBuilder:
         agents = list(dict.fromkeys([*instance.agents, *filter(None, owner.values())]))
         if not agents:
             return self._owned_by_names()
-        seen = _agents_that_see(instance, owner)
+        seen = _constrained_agents(instance, owner)
         owned: dict[str, list[str]] = {agent: [] for agent in agents}
         for name in instance.variables:
             agent = owner[name] or next((agent for agent in agents if agent in seen[name]), agents[0])
@@ -230,7 +230,7 @@ class _Definitions:
         return free
 
 
-def _agents_that_see(instance: Instance, owner: Mapping[str, str]) -> Mapping[str, set[str]]:
+def _constrained_agents(instance: Instance, owner: Mapping[str, str]) -> Mapping[str, set[str]]:
     """Return, for each variable without an owner, the agents with constraints on it."""
     seen: dict[str, set[str]] = defaultdict(set)
     for one in instance.constraints:
@@ -243,22 +243,22 @@ def _agents_that_see(instance: Instance, owner: Mapping[str, str]) -> Mapping[st
 def _all_prices(instance: Instance) -> Iterator[Price]:
     """Yield every cost; the costs of a shared table are yielded once."""
     yield instance.constant
-    met: set[int] = set()
+    seen_tables: set[int] = set()
     for one in instance.constraints:
         match one.content:
             case Formula(cost=cost):
                 if cost is not None:
                     yield cost
             case ForeignTable() as table:
-                yield from _prices(table, met)
+                yield from _prices(table, seen_tables)
             case AsymmetricTable(first=first, second=second):
-                yield from _prices(first, met)
-                yield from _prices(second, met)
+                yield from _prices(first, seen_tables)
+                yield from _prices(second, seen_tables)
 
 
-def _prices(table: ForeignTable, met: set[int]) -> Iterator[Price]:
-    if id(table) not in met:
-        met.add(id(table))
+def _prices(table: ForeignTable, seen_tables: set[int]) -> Iterator[Price]:
+    if id(table) not in seen_tables:
+        seen_tables.add(id(table))
         yield table.default
         yield from table.costs.values()
 

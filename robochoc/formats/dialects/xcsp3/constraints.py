@@ -161,7 +161,7 @@ def cardinality(element: Element, posting: Posting) -> None:
 
 def extremum(operator: str) -> Callable[[Element, Posting], None]:
     """Return the function for a condition on the least or greatest value of a list, or on its index, or on both."""
-    easy = {"max": {"lt", "le"}, "min": {"gt", "ge"}}[operator]
+    direct_operators = {"max": {"lt", "le"}, "min": {"gt", "ge"}}[operator]
 
     def post(element: Element, posting: Posting) -> None:
         members = as_integers(items(element.words("list"), posting))
@@ -171,7 +171,7 @@ def extremum(operator: str) -> Callable[[Element, Posting], None]:
             if not element.has("condition"):
                 return
         condition = posting.condition(element.text("condition"))
-        if condition.operator in easy:
+        if condition.operator in direct_operators:
             for member in members:
                 posting.post(condition.on(member))
         else:

@@ -210,39 +210,39 @@ class Posting:
         """Post that `scope` has one of the values in `rows`, or none of them."""
         if any(isinstance(item, Apply) for item in scope):
             raise MistakeError("the scope of a table contains an expression", "use variables and integers")
-        own = [item.name for item in scope if isinstance(item, Name)]
-        if len(own) != len(scope) or len(set(own)) != len(own):
-            own = list(dict.fromkeys(own))
-            rows = _matching_rows(scope, own, rows)
+        scope_names = [item.name for item in scope if isinstance(item, Name)]
+        if len(scope_names) != len(scope) or len(set(scope_names)) != len(scope_names):
+            scope_names = list(dict.fromkeys(scope_names))
+            rows = _matching_rows(scope, scope_names, rows)
         found = tuple(sorted({tuple(row) for row in rows}))
         if len(found) > MAX_TUPLES:
             raise MistakeError(f"the table has {len(found):,} tuples", f"use at most {MAX_TUPLES:,} tuples")
-        if not own:
+        if not scope_names:
             self.post(TRUE if bool(found) == allowed else FALSE)
             return
         self._count_work(len(found) + 1)
         if not found:
-            self.post(_unsatisfiable(own[0]) if allowed else TRUE)
+            self.post(_unsatisfiable(scope_names[0]) if allowed else TRUE)
             return
         semantics = Semantics.SUPPORTS if allowed else Semantics.CONFLICTS
         relation = self._shared(
-            ("relation", semantics, found), lambda name: Relation(name, len(own), semantics, found), "r"
+            ("relation", semantics, found), lambda name: Relation(name, len(scope_names), semantics, found), "r"
         )
-        self._add(relation, own)
+        self._add(relation, scope_names)
 
     def post_enumerated(self, kind: str, scope: Sequence[Item], test: Test) -> None:
         """Post the table of all combinations of values of `scope` for which `test` returns True."""
-        own = list(dict.fromkeys(name for item in scope for name in names(item)))
-        if self.size(own) > MAX_ENUMERATED:
-            message = f"<{kind}> has {readable_number(self.size(own))} combinations of values"
+        scope_names = list(dict.fromkeys(name for item in scope for name in names(item)))
+        if self.size(scope_names) > MAX_ENUMERATED:
+            message = f"<{kind}> has {readable_number(self.size(scope_names))} combinations of values"
             raise MistakeError(message, f"use at most {MAX_ENUMERATED:,}, since it becomes a table")
-        domains = [self.domain(Name(name)) for name in own]
-        place = {name: index for index, name in enumerate(own)}
+        domains = [self.domain(Name(name)) for name in scope_names]
+        place = {name: index for index, name in enumerate(scope_names)}
 
         def holds(row: Sequence[int]) -> bool:
             return test([item.value if isinstance(item, Constant) else row[place[names(item)[0]]] for item in scope])
 
-        self.post_table([Name(name) for name in own], filter(holds, itertools.product(*domains)), allowed=True)
+        self.post_table([Name(name) for name in scope_names], filter(holds, itertools.product(*domains)), allowed=True)
 
     def post_cost(self, expression: Expression) -> None:
         """Add an integer expression to the costs."""
@@ -343,9 +343,9 @@ def _unsatisfiable(name: str) -> Expression:
 
 
 def _matching_rows(
-    scope: Sequence[Item], own: Sequence[str], rows: Iterable[Sequence[int]]
+    scope: Sequence[Item], scope_names: Sequence[str], rows: Iterable[Sequence[int]]
 ) -> Iterator[tuple[int, ...]]:
-    """Yield the values of the variables `own` in the rows that match the integers and repetitions in `scope`."""
+    """Yield the values of `scope_names` in the rows that match the integers and repetitions in `scope`."""
     for row in rows:
         bound: dict[str, int] = {}
         for item, value in zip(scope, row, strict=True):
@@ -353,4 +353,4 @@ def _matching_rows(
             if fixed != value:
                 break
         else:
-            yield tuple([bound[name] for name in own])
+            yield tuple([bound[name] for name in scope_names])

@@ -102,8 +102,8 @@ def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imp
             maximize = post_objective(objectives, posting)
     root.ignore("annotations")
     root.report.finish()
-    own = {name: Variable(ids[name], domains[name]) for name in variables.domains}
-    robots = _robots(own, options.owner, path)
+    team_variables = {name: Variable(ids[name], domains[name]) for name in variables.domains}
+    robots = _robots(team_variables, options.owner, path)
     _add_auxiliaries(robots, posting)
     team = assemble(
         _team_name(path, options),
@@ -191,7 +191,7 @@ def _names(variables: Variables) -> dict[str, str]:
     return found
 
 
-def _robots(own: Mapping[str, Variable], owner: str | None, path: Path) -> dict[str, list[Variable]]:
+def _robots(team_variables: Mapping[str, Variable], owner: str | None, path: Path) -> dict[str, list[Variable]]:
     """Return the variables of each robot, by its name."""
     try:
         pattern = re.compile(owner) if owner is not None else None
@@ -201,7 +201,7 @@ def _robots(own: Mapping[str, Variable], owner: str | None, path: Path) -> dict[
         ) from None
     names = NameMap()
     robots: dict[str, list[Variable]] = {}
-    for original, variable in own.items():
+    for original, variable in team_variables.items():
         match = pattern.search(original) if pattern else None
         if pattern and not match:
             what = f"--owner {owner} does not match the variable '{original}'"

@@ -47,8 +47,8 @@ class Extensions:
         allowed = element.has("supports") or not element.has("conflicts")
         scope = items(element.words("list"), posting)
         text = element.text("supports" if allowed else "conflicts")
-        wild = "*" in text or ".." in text
-        key = text, tuple(tuple(posting.domain(item)) for item in scope) if wild else len(scope)
+        has_wildcards = "*" in text or ".." in text
+        key = text, tuple(tuple(posting.domain(item)) for item in scope) if has_wildcards else len(scope)
         if key not in self._tables:
             try:
                 self._tables[key] = tuple(_rows(text, scope, posting))
