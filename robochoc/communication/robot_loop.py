@@ -120,20 +120,20 @@ class RobotLoop(ABC):
         """
         if self._host is None or self._mute:
             return []
-        said = self._host.handle_lossy(packet, dropper.missing, lost=True)
-        if said is None:
+        replies = self._host.handle_lossy(packet, dropper.missing, lost=True)
+        if replies is None:
             self._mute = True
             dropper.mark_lossy()
             return []
-        return said
+        return replies
 
     def go_on(self) -> None:
         """Continue without the messages that the protocol waits for, and report to the master whether it does."""
         host = self._host
-        said = host.go_on() if host is not None and self._searching else None
-        if host is not None and said is not None:
-            self._send(host, said)
-        self._send_to_master(WentOn(self.epoch, said is not None))
+        replies = host.go_on() if host is not None and self._searching else None
+        if host is not None and replies is not None:
+            self._send(host, replies)
+        self._send_to_master(WentOn(self.epoch, replies is not None))
 
     def pause(self) -> None:
         """Stop, and send the final report. Messages that arrive later are dropped."""

@@ -17,7 +17,7 @@ _MOST_NAMED = 5
 
 
 class RobotsLostError(RobochocError):
-    """Robots were lost whose loss ends the run. `robots` says why, by name."""
+    """Robots were lost whose loss ends the run. `robots` maps their names to the reasons."""
 
     def __init__(self, robots: Mapping[str, str]) -> None:
         losses = [f"{name} was lost: {why}" for name, why in itertools.islice(robots.items(), _MOST_NAMED)]

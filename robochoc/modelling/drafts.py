@@ -310,7 +310,7 @@ def _units(price: Price, factor: int) -> float:
 
 
 def _predefined(body: Expression, names: Mapping[str, str]) -> tuple[Predicate, tuple[Actual, ...]] | None:
-    """Return the predefined predicate that compares two terms, and the terms. None: the body is no such comparison."""
+    """Return the predefined predicate that compares two terms, and the terms. None: there is none."""
     if not isinstance(body, Apply) or body.operator not in PREDEFINED:
         return None
     terms: list[Actual] = []

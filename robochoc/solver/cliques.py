@@ -86,12 +86,12 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
             compiled.append(CodeTable(clique, allowed=True, rows=tuple(sorted(rows))))
         elif not is_small_permutation(clique, network.domains):
             different.append(clique)
-    said = {pair for scope in different for pair in itertools.combinations(scope, 2)}
+    different_pairs = {pair for scope in different for pair in itertools.combinations(scope, 2)}
     covered = [set(table.scope) for table in compiled]
     kept = [
         table
         for table, demand in zip(network.tables, demanded, strict=True)
-        if not (demand == Demand.DIFFER and table.scope in said)
+        if not (demand == Demand.DIFFER and table.scope in different_pairs)
         and not any(scope.issuperset(table.scope) for scope in covered)
     ]
     return replace(network, tables=(*compiled, *kept), different=(*network.different, *different))

@@ -1,8 +1,8 @@
-"""Conflicts of all own values at once, for compiled domains of thousands of values.
+"""Conflicts of all values of this robot at once, for compiled domains of thousands of values.
 
-Instead of checking the constraints for one value, as `LocalProblem.conflict` does, it computes all values in a few
-numpy operations: for each constraint a mask over the own domain, for each group of constraints with the same robots the
-first one that each value violates, and for a view the first of all, with the number of checks of the other method.
+`LocalProblem.conflict` checks the constraints for one value. Here a few numpy operations compute all values: for each
+constraint a mask over this robot's domain, for each group of constraints with the same robots the first one that each
+value violates, and for a view the first of all, with the number of checks of the other method.
 """
 
 from __future__ import annotations

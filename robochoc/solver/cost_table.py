@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 
 class CostTable(NamedTuple):
-    """The costs of the constraint called `key`: one axis for each robot of `agents`, the last for the own values.
+    """The costs of the constraint called `key`: one axis for each robot of `agents`, the last for this robot's values.
 
     The indices of an axis follow the order of the robot's values.
     """

@@ -6,7 +6,7 @@ from robochoc.system.errors import RobochocError
 
 
 class UnsupportedError(RobochocError):
-    """The problem is valid, but not supported by this version or protocol. The message says what to do instead."""
+    """The problem is valid, but not supported by this version or protocol. The message names an alternative."""
 
 
 class TooLargeError(UnsupportedError):

@@ -46,7 +46,7 @@ class Filters:
         """The position of each own value in filters."""
 
     def of(self, index: int, receiver: str) -> tuple[int, bytes]:
-        """Return the number of evaluated pairs, and the filter of `receiver` for the own value at `index`."""
+        """Return the number of evaluated pairs, and the filter of `receiver` for this robot's value at `index`."""
         made = self._made.get((index, receiver))
         if made is None:
             made = self._made[index, receiver] = self._filter(index, receiver)

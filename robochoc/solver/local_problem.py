@@ -44,7 +44,7 @@ constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 
 class Charged(NamedTuple):
-    """The costs of the own values in one constraint.
+    """The costs of this robot's values in one constraint.
 
     Attributes:
         number: The constraint's index in `LocalProblem`.
@@ -327,7 +327,7 @@ class LocalProblem:
     def least_and_most(self, number: int) -> tuple[Cost, Cost]:
         """Return the minimum and maximum cost of the constraint with this `number`, infinite ones included.
 
-        They are over the own values and all declared values of the others. With more than `MAX_BOUNDED_ROWS`
+        They are over this robot's values and all declared values of the others. With more than `MAX_BOUNDED_ROWS`
         combinations, they are 0 and the maximum in the constraint's definition.
         """
         constraint = self._constraints[number]
@@ -346,7 +346,7 @@ class LocalProblem:
     def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
         """Return the data that determine `tables` for these `robots`, except their domains: equal for equal tables.
 
-        The data are the own values and their charges, and the constraints whose other robots are all in `robots`.
+        The data are this robot's values and their charges, and the constraints whose other robots are all in `robots`.
         """
         known = {*robots}
         return self.values, self.charges, [c.definition for c in self._constraints if known.issuperset(c.agents)]
@@ -412,8 +412,8 @@ class LocalProblem:
     ) -> list[tuple[tuple[str, ...], dict[tuple[int, ...], int]]]:
         """Return the result of `tables` for `lowest` as bit masks, for problems without costs.
 
-        For each constraint: its other robots, and the own values (bit i for the i-th) that are consistent with each
-        combination of indices of their values. No robot may withdraw.
+        For each constraint: its other robots, and the values of this robot (bit i for the i-th) that are consistent
+        with each combination of indices of their values. No robot may withdraw.
 
         Raises:
             UnsupportedError: if there are too many combinations.

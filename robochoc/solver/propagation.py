@@ -21,7 +21,7 @@ LARGEST_PERMUTATION = 5
 
 
 def propagate(network: Network) -> Network:
-    """Return an equivalent arc consistent network; `impossible` if that shows that there is no solution.
+    """Return an equivalent arc consistent network; `impossible` if this proves that there is no solution.
 
     Every variable in a table or a `different` has at least two values. Tables of forbidden tuples remain only if there
     are more than `MAX_ALLOWED_ROWS` allowed ones.

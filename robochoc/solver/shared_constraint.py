@@ -31,7 +31,7 @@ class Gap(NamedTuple):
 
 
 class OwnValues:
-    """The own compiled domain: `values` of the variables `names`, and the codes by which constraints distinguish them.
+    """This robot's compiled domain: `values` of the variables `names`, and the codes that constraints distinguish.
 
     A constraint contains some of the variables; values that agree on these have the same code. Many constraints share
     their codes.
@@ -43,7 +43,7 @@ class OwnValues:
         self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
-        """Return the indices and names of the own variables in `scope`."""
+        """Return the indices and names of this robot's variables in `scope`."""
         places = tuple([place for place, name in enumerate(self._names) if name in scope])
         return places, [self._names[place] for place in places]
 
@@ -66,11 +66,11 @@ def _plain(domain: Domain) -> Domain | range:
 
 
 class SharedConstraint:
-    """A constraint on the own compiled variable and those of `agents` (in priority order).
+    """A constraint on this robot's compiled variable and those of `agents` (in priority order).
 
-    After `compile` it returns the own values that are consistent with values of the others. Answers are computed on
-    first use and cached: one for each combination of the others' variables in the constraint, however many values
-    their robots have.
+    After `compile` it returns the values of this robot that are consistent with values of the others. Answers are
+    computed on first use and cached: one for each combination of the others' variables in the constraint, however many
+    values their robots have.
 
     Args:
         key: The constraint's name in explanations.
@@ -111,7 +111,7 @@ class SharedConstraint:
         self._counts_when_absent = may_count_when_absent(self._constraint)
 
     def compile(self, own: OwnValues) -> None:
-        """Compile the constraint for the own domain."""
+        """Compile the constraint for this robot's domain."""
         self._own = own
         self._places, names = own.seen(self._scope)
         self._test = allows_function(self._constraint, [*self._names, *names])
@@ -281,7 +281,7 @@ class SharedConstraint:
                 yield place, others
 
     def mask(self, others: OtherValues) -> int:
-        """Return the own values that are consistent with `others`: bit i for the i-th."""
+        """Return this robot's values that are consistent with `others`: bit i for the i-th."""
         mask = self._masks.get(others)
         if mask is None:
             holds = self.holds(others)
@@ -328,11 +328,11 @@ class SharedConstraint:
         return self.conflict(others)
 
     def own_part(self, index: int) -> Value:
-        """Return the variables of the constraint in the own value at `index`; None for others."""
+        """Return the variables of the constraint in this robot's value at `index`; None for others."""
         return self._own.shown(index, self._places)
 
     def row(self, index: int, columns: Sequence[Sequence[int]]) -> tuple[int, list[bool]]:
-        """Return which values of the single other robot are consistent with the own value at `index`.
+        """Return which values of the single other robot are consistent with this robot's value at `index`.
 
         `columns` are the values of that robot's variables; the answers follow their product, as in `itertools`. Every
         pair that the constraint distinguishes is evaluated once, whatever the answers are. Also return the number of

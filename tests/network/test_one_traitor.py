@@ -163,7 +163,7 @@ def test_what_not_all_have_is_no_answer() -> None:
 @looped(
     ("liar", "why"),
     [
-        ({"copies": (Charge("RA", ("A", "B"), 1, 5),)}, "RB says that the constraint over A B charges 5, and RA"),
+        ({"copies": (Charge("RA", ("A", "B"), 1, 5),)}, "RB reports that the constraint over A B charges 5, but RA"),
         ({}, "the variable A is RA's, and RB's too"),
     ],
 )
@@ -286,7 +286,9 @@ def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., I
     judged(office)
     (doubt,) = office.state.doubts_about_verdict
     assert set(doubt.between) == {"RA", "RB"}
-    assert doubt.why == ("RA says that the constraint over A B is broken, and RB, which holds it, says that it holds")
+    assert doubt.why == (
+        "RA reports that the constraint over A B is broken, but RB, which holds it, reports that it holds"
+    )
 
 
 def test_its_parent_was_told_the_constraint_before_the_search(lied: Callable[..., InMemoryNetwork]) -> None:
@@ -321,7 +323,7 @@ def test_a_copy_of_what_nobody_holds(lied: Callable[..., InMemoryNetwork]) -> No
     judged(office)
     (doubt,) = office.state.doubts_about_verdict
     assert doubt.between == ("RC", "RB")
-    assert doubt.why.endswith("and RC, which holds it, has no such constraint")
+    assert doubt.why.endswith("but RC, which holds it, has no such constraint")
 
 
 @looped(

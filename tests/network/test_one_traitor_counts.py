@@ -86,9 +86,9 @@ def exchanging(change: Callable[[Exchanged], Exchanged], who: str = "RA") -> Lie
     [
         (
             lambda one: one._replace(received=one.received + 3),
-            "RA says that it has sent RB 1 messages, and RB that it has had 4",
+            "RA reports 1 messages sent to RB, but RB reports 4",
         ),
-        (lambda one: one._replace(clock=1000), "RB says that the clock of RA was at 1,000 when it spoke"),
+        (lambda one: one._replace(clock=1000), "RB reports 1,000 as the clock of RA in its messages"),
     ],
 )
 def test_messages_that_nobody_has_sent(
@@ -159,7 +159,7 @@ def test_who_keeps_it_awake() -> None:
     assert not state.handle("RA", reported(RB=Exchanged(150, 3)))
     assert not state.handle("RB", reported(RA=Exchanged(3, 2), RC=Exchanged(0, 0)))
     assert not state.handle("RC", reported())
-    assert state.unfinished == "RA says that it has sent RB 150 messages, and RB that it has had 2 of it"
+    assert state.unfinished == "RA reports 150 messages sent to RB, but RB reports 2 received from it"
 
 
 def test_who_does_not_answer() -> None:

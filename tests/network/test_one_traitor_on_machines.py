@@ -99,7 +99,10 @@ def test_it_judges_its_own_constraint(site: Deployment) -> None:
 def test_its_parent_has_a_copy_of_the_constraint(site: Deployment) -> None:
     master, status = betrayed(site, "a wrong value", team=PAIR, copied=True)
     assert status == 4, master.output
-    assert "RA says that the constraint over A B is broken, and RB, which holds it, says that it holds" in master.errors
+    assert (
+        "RA reports that the constraint over A B is broken, but RB, which holds it, reports that it holds"
+        in master.errors
+    )
 
 
 @SLOW
@@ -113,7 +116,7 @@ def test_others_find_that_its_value_breaks_theirs(site: Deployment) -> None:
 @pytest.mark.parametrize(
     ("lie", "why"),
     [
-        ("awake", r"RA says that it has sent RB .* messages, and RB that it has had"),
+        ("awake", r"RA reports .* messages sent to RB, but RB reports"),
         ("silent", r"RB.* not answered the master"),
     ],
 )

@@ -223,15 +223,15 @@ class CycleRun(ABC):
         if self.clocks is not None:
             self.clocks = self.greatest(self.clocks, self.clocks.copy())
 
-    def greatest(self, told: Integers, heard: Integers) -> Integers:
-        """Raise `heard` to the largest `told` number of the neighbours of each row, and return it."""
+    def greatest(self, numbers: Integers, largest: Integers) -> Integers:
+        """Raise `largest` to the largest `numbers` number of the neighbours of each row, and return it."""
         for group, lists, neighbours, _ in self.layout.links:
-            part = heard[group.first : group.last]
+            part = largest[group.first : group.last]
             if isinstance(lists, slice):
-                np.maximum(part[lists], told.take(neighbours), out=part[lists])
+                np.maximum(part[lists], numbers.take(neighbours), out=part[lists])
             else:
-                part[lists] = np.maximum(part[lists], told.take(neighbours))
-        return heard
+                part[lists] = np.maximum(part[lists], numbers.take(neighbours))
+        return largest
 
     def _settle_alone(self, group: RobotGroup) -> None:
         """Give robots without neighbours their cheapest values."""

@@ -43,15 +43,15 @@ class Factors:
     tables: Floats
     which: Integers
 
-    def least(self, told: list[Floats], place: int) -> Floats:
-        """Return R: the minimum cost for each value of the robots at `place`, given the others' Q in `told`."""
+    def least(self, received: list[Floats], place: int) -> Floats:
+        """Return R: the minimum cost for each value of the robots at `place`, given the others' Q in `received`."""
         shape = self.tables.shape[1:]
         found = np.empty((len(self.rows), shape[place]))
         step = max(1, _CHUNK // int(np.prod(shape)))
         for first in range(0, len(self.rows), step):
             part = slice(first, first + step)
             total = self.tables if len(self.tables) == 1 else self.tables[self.which[part]]
-            for axis, row in enumerate(told):
+            for axis, row in enumerate(received):
                 if axis != place:
                     wide = [1] * len(shape)
                     wide[axis] = shape[axis]
@@ -213,7 +213,7 @@ class ArrayMaxSum(CycleRun):
         self._count_tables()
 
     def _step(self) -> None:
-        """Tell R, take values, tell Q (`MaxSum._send_r`, `MaxSum._decide`)."""
+        """Send R, decide values, send Q (`MaxSum._send_r`, `MaxSum._decide`)."""
         self._weigh()
         self._send_r()
         z = self._z()
@@ -247,9 +247,9 @@ class ArrayMaxSum(CycleRun):
     def _send_r(self) -> None:
         """Compute R of all functions (2)."""
         for factors, sides in zip(self._factors, self._sides, strict=True):
-            told = [ports.q[rows] for ports, rows in sides]
+            received = [ports.q[rows] for ports, rows in sides]
             for place, (ports, rows) in enumerate(sides):
-                ports.r[rows] = factors.least(told, place)
+                ports.r[rows] = factors.least(received, place)
         self.tally.add(R.__name__, self._link_bytes, np.ones_like(self._link_bytes))
         self._raise_clocks(below=True)
 
@@ -326,12 +326,12 @@ class ArrayMaxSum(CycleRun):
     def _raise_clocks(self, *, below: bool) -> None:
         """Raise clocks to those of the robots below, or above, that have sent a message."""
         if self.clocks is not None:
-            heard = self.clocks.copy()
+            clocks_after = self.clocks.copy()
             for (group, lists, neighbours, _), higher in zip(self.layout.links, self.layout.higher, strict=True):
-                part = heard[group.first : group.last]
-                told = np.where(higher != below, self.clocks.take(neighbours), 0)
-                part[lists] = np.maximum(part[lists], told)
-            self.clocks = heard
+                part = clocks_after[group.first : group.last]
+                received = np.where(higher != below, self.clocks.take(neighbours), 0)
+                part[lists] = np.maximum(part[lists], received)
+            self.clocks = clocks_after
 
 
 def _fresh(ports: Ports, preferred: Floats, costs: Floats) -> Floats:

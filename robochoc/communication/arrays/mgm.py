@@ -46,10 +46,10 @@ class ArrayGainers(CycleRun):
         greatest = np.zeros(self.layout.many, gains.dtype)
         for (group, lists, neighbours, _), higher in zip(self.layout.links, self.layout.higher, strict=True):
             part = greatest[group.first : group.last]
-            told = gains.take(neighbours) + higher
+            others = gains.take(neighbours) + higher
             if partners is not None:
-                told[partners[group.first : group.last][lists] == neighbours] = 0
-            part[lists] = np.maximum(part[lists], told)
+                others[partners[group.first : group.last][lists] == neighbours] = 0
+            part[lists] = np.maximum(part[lists], others)
         return (gains > 0) & (greatest <= gains)
 
 

@@ -195,10 +195,10 @@ class ArrayMGM2(ArrayGainers):
                 chosen = np.flatnonzero(inside)
                 if not chosen.size:
                     continue
-                told = self._offered_gains(offers, chosen, number, found[number], met.size)
-                sizes[chosen] += self._offer_bytes(told) - 1
+                offered = self._offered_gains(offers, chosen, number, found[number], met.size)
+                sizes[chosen] += self._offer_bytes(offered) - 1
                 open_ = ~making[offers.receivers[chosen]]
-                gains = self._joint(offers, chosen[open_], other, found[other])[:, :, None] + told[open_]
+                gains = self._joint(offers, chosen[open_], other, found[other])[:, :, None] + offered[open_]
                 joint.append(_Joint(chosen[open_], gains.reshape(len(gains), met.size * group.size), group.size))
         links = int(self.layout.degrees.sum())
         self.tally.add(Offer.__name__, sizes, np.ones_like(sizes))
@@ -273,17 +273,19 @@ class ArrayMGM2(ArrayGainers):
 
     # Counts
 
-    def _offer_bytes(self, told: Integers) -> Integers:
+    def _offer_bytes(self, offered: Integers) -> Integers:
         costs = self.layout.costs
-        numbers = integer_bytes(costs.broken(told)) + integer_bytes(costs.paid(told)) + 1
-        heads = list_bytes(told.shape[1]) + told.shape[1] * list_bytes(told.shape[2])
+        numbers = integer_bytes(costs.broken(offered)) + integer_bytes(costs.paid(offered)) + 1
+        heads = list_bytes(offered.shape[1]) + offered.shape[1] * list_bytes(offered.shape[2])
         total: Integers = numbers.sum(axis=(1, 2)) + heads
         return total
 
     def _send_answers(self, offers: _Offers, makers: Integers, targets: Integers, gains: Integers) -> None:
         """Count the answers, and raise the clocks of the makers of offers to them."""
-        costs, told = self.layout.costs, gains[makers]
-        numbers = integer_bytes(targets[makers]) + integer_bytes(costs.broken(told)) + integer_bytes(costs.paid(told))
+        costs, offered = self.layout.costs, gains[makers]
+        numbers = (
+            integer_bytes(targets[makers]) + integer_bytes(costs.broken(offered)) + integer_bytes(costs.paid(offered))
+        )
         self.tally.add(Accept.__name__, _ACCEPT + numbers, np.ones_like(numbers))
         self.tally.add(Reject.__name__, len(encode(Reject())), len(offers.makers) - len(makers))
         self.count_checks(self._joint_checks(offers))
@@ -310,16 +312,16 @@ class ArrayMGM2(ArrayGainers):
         self.count_checks(made)
         if self.clocks is None:
             return
-        said = self.clocks - made
+        sent_clocks = self.clocks - made
         before = np.zeros(layout.many, np.int64)
         before[offers.makers] = layout.robots[offers.receivers]
-        heard = self.clocks.copy()
+        clocks_after = self.clocks.copy()
         for group, lists, neighbours, _ in layout.links:
             ranks = layout.robots[group.first : group.last][lists]
             late = np.where(ranks >= before[neighbours], made[neighbours], 0)
-            part = heard[group.first : group.last]
-            part[lists] = np.maximum(part[lists], said[neighbours] + late)
-        self.clocks = heard
+            part = clocks_after[group.first : group.last]
+            part[lists] = np.maximum(part[lists], sent_clocks[neighbours] + late)
+        self.clocks = clocks_after
 
     # Constant data
 

@@ -89,12 +89,12 @@ def journal_qos() -> dict[str, Any]:
 def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
     """Return the rules for `name`, which writes frames to the keys `written`."""
     read = [frame_key(name, ALL)]
-    says = ["put", "reply", "declare_queryable", "liveliness_token"]
+    sends = ["put", "reply", "declare_queryable", "liveliness_token"]
     hears = ["declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query", "liveliness_token"]
     return [
-        _rule(f"{name} writes", "ingress", says, [*written, *map(_recovery, written)]),
+        _rule(f"{name} writes", "ingress", sends, [*written, *map(_recovery, written)]),
         _rule(f"{name} reads", "ingress", hears, [*read, *map(_recovery, read)]),
-        _rule(f"{name} receives", "egress", says, [*read, *map(_recovery, read)]),
+        _rule(f"{name} receives", "egress", sends, [*read, *map(_recovery, read)]),
         _rule(f"{name} is asked", "egress", hears, [frame_key(ALL, ALL), _recovery(frame_key(ALL, ALL))]),
         _rule(f"{name} lives", "ingress", ["liveliness_token"], [life_key(name)]),
         _rule(f"{name} watches", "ingress", ["declare_liveliness_subscriber", "liveliness_query"], [life_key(ALL)]),

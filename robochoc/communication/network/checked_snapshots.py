@@ -53,9 +53,9 @@ class CheckedSnapshots:
 
     def advance(self) -> SearchResult | None:
         """Do the next step of the round. Return its snapshot once all robots have checked it; None before."""
-        told = self._state.completed_snapshot() if self._unchecked is None else None
-        if told is not None:
-            self._continue_round(told)
+        snapshot = self._state.completed_snapshot() if self._unchecked is None else None
+        if snapshot is not None:
+            self._continue_round(snapshot)
         checks = self._state.snapshot_checks if self._unchecked is not None else None
         if checks is None:
             return None
@@ -63,22 +63,22 @@ class CheckedSnapshots:
         self.number, self.checks = self._asked, checks
         return self._checked
 
-    def _continue_round(self, told: SearchResult) -> None:
-        """Request better values than `told`, or have `told` checked."""
+    def _continue_round(self, snapshot: SearchResult) -> None:
+        """Request better values than `snapshot`, or have `snapshot` checked."""
         if self._first is not None:
             first, self._first = self._first, None
-            self._have_checked(replace(told, findings=first.findings))
+            self._have_checked(replace(snapshot, findings=first.findings))
             return
-        bests = [found.best for found in told.findings.values() if found.best is not None]
-        parts = self._parts_of_best(bests) or self._parts_of_cycle(told)
+        bests = [found.best for found in snapshot.findings.values() if found.best is not None]
+        parts = self._parts_of_best(bests) or self._parts_of_cycle(snapshot)
         number = self._state.start_snapshot() if parts else None
         if number is not None:
-            self._first = told
+            self._first = snapshot
             self._ask(number, parts)
         elif bests and self._checked is not None:  # nothing new; the robots' present trials are no answer
-            self._have_checked(replace(told, assignments=self._checked.assignments))
+            self._have_checked(replace(snapshot, assignments=self._checked.assignments))
         else:
-            self._have_checked(told)
+            self._have_checked(snapshot)
 
     def _parts_of_best(self, bests: list[Incumbent]) -> dict[str, _Part]:
         """Return each robot's value in the cheapest assignment that was not tried before; empty if there is none.
@@ -93,22 +93,22 @@ class CheckedSnapshots:
                 return {name: _Part(value=best.values[name]) for name in order}
         return {}
 
-    def _parts_of_cycle(self, told: SearchResult) -> dict[str, _Part]:
+    def _parts_of_cycle(self, snapshot: SearchResult) -> dict[str, _Part]:
         """Return the requests for the last cycle that all robots have completed; empty if there is none."""
         order = self._state.order
-        cycles = [found.trail.cycle for found in told.findings.values() if found.trail is not None]
+        cycles = [found.trail.cycle for found in snapshot.findings.values() if found.trail is not None]
         known = len(cycles) == len(order) and min(cycles, default=-1) >= 0
         return dict.fromkeys(order, _Part(cycle=min(cycles))) if known else {}
 
-    def _have_checked(self, told: SearchResult) -> None:
-        """Have all robots check the values in `told`, unless they were checked before."""
-        self._unchecked = told
-        if self._checked is not None and told.assignments == self._checked.assignments:
+    def _have_checked(self, snapshot: SearchResult) -> None:
+        """Have all robots check the values in `snapshot`, unless they were checked before."""
+        self._unchecked = snapshot
+        if self._checked is not None and snapshot.assignments == self._checked.assignments:
             self._asked = self.number
             return
         self._state.start_check(self._asked)
         for name in self._state.order:
-            values = self._members.neighbourhood(name, told.assignments)
+            values = self._members.neighbourhood(name, snapshot.assignments)
             self._send(name, CheckRequest(self._state.epoch, values, self._asked))
 
     def _ask(self, number: int, parts: Mapping[str, _Part]) -> None:

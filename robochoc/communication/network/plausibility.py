@@ -169,8 +169,8 @@ def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:
         return f"it has reported {many}, which is impossible"
     if spent.checks > CHECKS_PER_S * (duration_s + 1):
         return f"it has reported {spent.checks:,} constraint checks in {duration_s:.1f} s, which is impossible"
-    heard = max((one.clock for one in account.exchanged.values()), default=0)
-    if spent.ncccs > heard + spent.checks:
+    latest = max((one.clock for one in account.exchanged.values()), default=0)
+    if spent.ncccs > latest + spent.checks:
         return f"its clock is at {spent.ncccs:,}, more than its {spent.checks:,} checks and received clocks explain"
     others = (spent.wall_s, spent.compile_s, spent.simulated_s)
     return "it has reported costs that are not its own" if any(others) or spent.memory > LARGEST_MEMORY else ""
@@ -242,8 +242,8 @@ def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool
             if name not in accounts[other].exchanged and mine.received:
                 yield Doubt((other, name), _gap(other, 0, name, mine.received))
             if mine.clock > accounts[other].metrics.ncccs:
-                why = f"{name} says that the clock of {other} was at {mine.clock:,} when it spoke, and {other} that it"
-                yield Doubt((other, name), f"{why} came to {accounts[other].metrics.ncccs:,}")
+                why = f"{name} reports {mine.clock:,} as the clock of {other} in its messages, but {other}"
+                yield Doubt((other, name), f"{why} reports {accounts[other].metrics.ncccs:,} at its end")
 
 
 def widest_gap(accounts: Mapping[str, DetailedReport]) -> str:
@@ -259,7 +259,7 @@ def widest_gap(accounts: Mapping[str, DetailedReport]) -> str:
 
 
 def _gap(name: str, sent: int, other: str, had: int) -> str:
-    return f"{name} says that it has sent {other} {sent:,} messages, and {other} that it has had {had:,} of it"
+    return f"{name} reports {sent:,} messages sent to {other}, but {other} reports {had:,} received from it"
 
 
 def doubts_about_values(assignments: Mapping[str, Mapping[str, int]]) -> Iterator[Doubt]:
@@ -294,8 +294,8 @@ def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
             alike = charged is not None and math.isclose(charged, one.price, rel_tol=_ROUNDED - 1)
             if not alike and one.holder in checks:
                 what = f"the constraint over {shortened(' '.join(one.variables))}"
-                says = "has no such constraint" if charged is None else f"says that it {_charges(charged)}"
-                why = f"{name} says that {what} {_charges(one.price)}, and {one.holder}, which holds it, {says}"
+                claim = "has no such constraint" if charged is None else f"reports that it {_charges(charged)}"
+                why = f"{name} reports that {what} {_charges(one.price)}, but {one.holder}, which holds it, {claim}"
                 yield Doubt((one.holder, name), why)
 
 

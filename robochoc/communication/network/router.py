@@ -126,8 +126,8 @@ class Router:
             raise RouterError("the router's process has no standard streams")
         process.stdin.write(f"{json.dumps(self._scratch)}\n{json.dumps(self._settings(reach, sniffers))}\n".encode())
         process.stdin.flush()
-        said = self._wait_until_ready(process.stdout)
-        self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), said], daemon=True)
+        first_output = self._wait_until_ready(process.stdout)
+        self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), first_output], daemon=True)
         self._reader.start()
         self._is_closed.clear()
         self._response.clear()
@@ -199,18 +199,18 @@ class Router:
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:
         """Wait until the router is ready, and return its output so far. Waiting peers connect before that."""
-        said: list[bytes] = []
+        first_output: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
         try:
             for line in output:
                 if line.strip() == _READY.encode():
-                    return b"".join(said)
-                said.append(line)
+                    return b"".join(first_output)
+                first_output.append(line)
         finally:
             watch.cancel()
         silence = f"it was not ready after {START_S:g} s" if self._was_late else "it ended without a message"
-        why = b"; ".join(line.strip() for line in said[-2:]).decode(errors="replace") or silence
+        why = b"; ".join(line.strip() for line in first_output[-2:]).decode(errors="replace") or silence
         raise RouterError(f"cannot listen on {self.endpoint}: {why}")
 
     def _give_up(self) -> None:
@@ -218,10 +218,10 @@ class Router:
         if self._process:
             self._process.kill()
 
-    def _read(self, output: IO[bytes], log: Log, said: bytes) -> None:
+    def _read(self, output: IO[bytes], log: Log, first_output: bytes) -> None:
         """Read the log to its end in chunks (up to 80,000 lines a second), and report refusals."""
         rest = b""
-        for refusal in log.refusals(said):
+        for refusal in log.refusals(first_output):
             if self._refused:
                 self._refused(refusal)
         while chunk := cast("io.BufferedReader", output).read1(_CHUNK):

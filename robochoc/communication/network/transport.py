@@ -46,7 +46,7 @@ DESCRIPTORS = 24
 
 
 class CannotConnectError(RobochocError):
-    """There is no master at that address, or it does not admit us."""
+    """There is no master at that address, or it does not admit this agent."""
 
 
 TEAM = (MASTER, ALL)

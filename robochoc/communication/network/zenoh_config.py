@@ -18,7 +18,7 @@ RX_BYTES = 32 * 2**20
 def config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
     """Return a configuration of zenoh with `settings`, and without discovery or other listeners.
 
-    Other settings are taken from `file`, or are zenoh's defaults.
+    Other settings come from `file`, or are zenoh's defaults.
     """
     made = zenoh.Config() if file is None else zenoh.Config.from_file(file)
     common = {

@@ -95,16 +95,16 @@ class Concurrent(Schedule):
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
         """Send `envelope` with a random delay, to arrive not earlier than its predecessor in the same channel."""
-        sender, receiver, _, said = envelope
+        sender, receiver, _, sent_at = envelope
         reader = self._readers.get(receiver)
         if reader is None:
             reader = self._readers[receiver] = _Reader(receiver)
-        arrival = said + self._chance.randint(0, self._longest) if self._longest else said
+        arrival = sent_at + self._chance.randint(0, self._longest) if self._longest else sent_at
         before = reader.last_arrival.get(sender, 0)
         if before > arrival:  # noqa: PLR1730 - faster
             arrival = before
         reader.last_arrival[sender] = arrival
-        if arrival > said:
+        if arrival > sent_at:
             envelope = envelope._replace(clock=arrival)
         inbox = reader.inbox
         first = not inbox or arrival < inbox[0][0]

@@ -194,7 +194,7 @@ class Simulation(Session):
         for host in self._hosts.values():
             self._checks = host.checks
             self._send(host, host.start(lossless=lossless))
-        packets, told_s = 0, 0.0
+        packets, shown_s = 0, 0.0
         schedule, hosts, watch = self._schedule, self._hosts, self.watch
         most_ncccs, most_cycles = self._limits.ncccs, self._limits.cycles
         while self._verdict is None:
@@ -211,8 +211,8 @@ class Simulation(Session):
                 return
             if most_cycles is not None and schedule.next_cycle > most_cycles:
                 return
-            if packets % PROGRESS_EVERY == 0 or elapsed_s - told_s >= PROGRESS_S:
-                told_s = elapsed_s
+            if packets % PROGRESS_EVERY == 0 or elapsed_s - shown_s >= PROGRESS_S:
+                shown_s = elapsed_s
                 if self._is_to_stop(elapsed_s):
                     return
             packet = schedule.get()
@@ -229,11 +229,11 @@ class Simulation(Session):
 
         If its protocol cannot continue without the lost messages, the search is over.
         """
-        said = host.handle_lossy(packet, losses.missing_before, lost=losses.lost > 0)
-        if said is None:
+        replies = host.handle_lossy(packet, losses.missing_before, lost=losses.lost > 0)
+        if replies is None:
             self._verdict = Verdict.UNKNOWN
             return []
-        return said
+        return replies
 
     def _go_on(self) -> bool:
         """Let all robots continue without the messages they wait for; return whether one does."""
@@ -243,10 +243,10 @@ class Simulation(Session):
         went = False
         for host in self._hosts.values():
             self._checks = host.counted
-            said = host.go_on()
-            if said is not None:
+            replies = host.go_on()
+            if replies is not None:
                 went = True
-                self._send(host, said)
+                self._send(host, replies)
         return went
 
     def _is_to_stop(self, elapsed_s: float) -> bool:
