@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import copy
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Self
+from typing import Any, Self
 
 from robochoc.formats import InvalidInputError, encodable, read_team, write_team
 from robochoc.formats.diagnostics import Diagnostic
@@ -40,6 +40,7 @@ from robochoc.modelling.solving import Solvable
 from robochoc.modelling.team_builder import build_team, saved_order
 from robochoc.modelling.team_contents import TeamContents, contents_of, model_variable
 from robochoc.modelling.terms import ModelVariable, all_of, number
+from robochoc.run.defaults import CENTRAL
 from robochoc.system.plain_text import counted
 from robochoc.system.suggestions import did_you_mean
 
@@ -305,6 +306,46 @@ class Model(Solvable):
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
         """Return the user's values for the integers of an assignment, such as that of an event or an epoch."""
         return UserValues(self._variables, None)(assignment)
+
+    def solutions(self, protocol: str = CENTRAL, *, limit: int | None = None, **options: Any) -> Iterator[Solution]:  # noqa: ANN401 - those of `solve`
+        """Yield all solutions, one after the other; where costs are minimised, the cheapest first.
+
+        Each search starts when the next solution is requested. Solutions differ in at least one value.
+
+        Args:
+            protocol: The protocol, or `central`: one solver with the constraints of all robots.
+            limit: The largest number of solutions. None: all.
+            **options: The other options of `solve`.
+
+        Example:
+            >>> model = robochoc.Model()
+            >>> x = model.robot("r1").variable("x", range(3))
+            >>> [solution[x] for solution in model.solutions()]
+            [0, 1, 2]
+        """
+        from robochoc.modelling.exploration import solutions_of  # noqa: PLC0415 - start-up: seldom used
+
+        return solutions_of(self, protocol, limit, options)
+
+    def conflict(self, *, timeout: float | None = None) -> tuple[ModelConstraint, ...] | None:
+        """Return constraints that cannot hold together, and could without any one of them.
+
+        Empty: a robot has a variable without values. None: all hard constraints can hold together.
+
+        Args:
+            timeout: A time limit, in seconds. None: no limit.
+
+        Raises:
+            ConflictTimeoutError: if the time limit was reached.
+        """
+        from robochoc.modelling.exploration import conflict_of  # noqa: PLC0415 - start-up: seldom used
+
+        return conflict_of(self, timeout)
+
+    def clear_objective(self) -> None:
+        """Remove all costs that were added by `minimize` or `maximize`."""
+        self._objective.clear()
+        self.changed()
 
     def save(self, folder: Path | str, *, replace: bool = False) -> None:
         """Write the robots' files, and `scenario.xml` if there are events: all of the files, or none.

@@ -21,6 +21,8 @@ from robochoc.modelling.terms import ModelVariable, Term
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+
     from robochoc.modelling.scene_page import ScenePage
 
 
@@ -139,6 +141,24 @@ class Solution(Outcome, Mapping[str, object]):
         changed = {name: _in_json(one) for name, one in numbers.items() if one != self.assignment[name]}
         result: dict[str, Any] = json.loads(result_json(self, values=changed))
         return result
+
+    def to_frame(self) -> DataFrame:
+        """Return the values as a pandas `DataFrame` with the columns `robot`, `variable`, `value` and `withdrawn`.
+
+        Variables of withdrawn robots have no value. Requires pandas.
+        """
+        import pandas as pd  # noqa: PLC0415 - optional
+
+        owner = self.problem.owner if self.problem else {}
+        names = [*owner] or [*self.assignment]
+        return pd.DataFrame(
+            {
+                "robot": [owner.get(name) for name in names],
+                "variable": names,
+                "value": [self.values.get(name) for name in names],
+                "withdrawn": [owner.get(name) in self.withdrawn for name in names],
+            }
+        )
 
     def __repr__(self) -> str:
         robots = len(self.problem.robots) if self.problem else len(self.assignment)

@@ -132,7 +132,20 @@ def test_numbers_with_a_common_unit_are_values_in_json() -> None:
 
 
 def test_pandas_reads_values() -> None:
-    pandas = pytest.importorskip("pandas")
+    pd = pytest.importorskip("pandas")
     model, _ = coloured()
     found = solved(model)
-    assert pandas.Series(found).to_dict() == found.values
+    assert pd.Series(found).to_dict() == found.values
+
+
+def test_values_as_a_data_frame() -> None:
+    pd = pytest.importorskip("pandas")
+    model = robochoc.Model()
+    x = [model.robot(f"r{i}").variable("x", ["red", "green"]) for i in range(3)]
+    model.add(robochoc.all_different(x))
+    frame = model.solve(withdraw=True).to_frame()
+    assert [*frame.columns] == ["robot", "variable", "value", "withdrawn"]
+    assert frame["variable"].tolist() == ["r0.x", "r1.x", "r2.x"]
+    assert frame["withdrawn"].sum() == 1
+    assert {*frame.loc[~frame["withdrawn"], "value"]} == {"red", "green"}
+    assert pd.isna(frame.loc[frame["withdrawn"], "value"]).all()

@@ -1,0 +1,99 @@
+"""All solutions of a model, one after the other; and the reason why a model has none."""
+
+from __future__ import annotations
+
+import copy
+import time
+from collections.abc import Callable, Collection, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from robochoc.model.outcome import Verdict
+from robochoc.modelling.terms import any_of
+from robochoc.run.defaults import CENTRAL
+from robochoc.run.options import Options
+from robochoc.run.orchestrator import solve
+from robochoc.solver.ace import AceProcess
+from robochoc.system.errors import RobochocError
+
+if TYPE_CHECKING:
+    from robochoc.modelling.constraints import ModelConstraint
+    from robochoc.modelling.model import Model
+    from robochoc.modelling.solution import Solution
+
+Test = Callable[[Collection[int]], bool]
+"""Returns whether the constraints at these places can hold together."""
+
+
+def solutions_of(model: Model, protocol: str, limit: int | None, options: dict[str, object]) -> Iterator[Solution]:
+    """Yield different solutions of a model: after each, a constraint excludes its values."""
+    rest = copy.copy(model)
+    number = 0
+    while limit is None or number < limit:
+        solution = rest.solve(protocol, **options)  # type: ignore[arg-type] # options of `solve`
+        if not solution:
+            return
+        yield solution
+        number += 1
+        values = solution.values
+        rest.add(any_of(variable != values[name] for name, variable in rest.variables.items() if name in values))
+
+
+class ConflictTimeoutError(RobochocError):
+    """The search for a conflict has reached its time limit."""
+
+
+def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, ...] | None:
+    """Return a minimal set of hard constraints that cannot hold together; None if all can.
+
+    Algorithm QuickXplain (Junker, AAAI 2004); the central solver tests sets.
+
+    Raises:
+        ConflictTimeoutError: if the time limit was reached.
+    """
+    until = None if timeout is None else time.monotonic() + timeout
+    every = _constraints(model)
+    hard = [place for place, one in enumerate(every) if one.cost is None]
+    with AceProcess() as solver:
+
+        def can_hold(places: Collection[int]) -> bool:
+            left = None if until is None else max(0.0, until - time.monotonic())
+            options = Options(protocol=CENTRAL, timeout=left)
+            verdict = solve(_with_only(model, places).team, options, solver=solver).verdict
+            if verdict == Verdict.UNKNOWN:
+                raise ConflictTimeoutError(f"no conflict was found within {timeout:g} s: set a longer timeout")
+            return verdict != Verdict.NO_SOLUTION
+
+        if can_hold(hard):
+            return None
+        found = sorted(_minimal([], hard, can_hold, test=False)) if can_hold([]) else []
+    return tuple(every[place] for place in found)
+
+
+def _constraints(model: Model) -> list[ModelConstraint]:
+    return [*model.constraints, *(part for robot in model.robots.values() for part in robot.parts)]
+
+
+def _with_only(model: Model, places: Collection[int]) -> Model:
+    """Return a copy of a model without costs, with only the constraints at these places."""
+    smaller = copy.copy(model)
+    smaller.clear_objective()
+    for place, constraint in enumerate(_constraints(smaller)):
+        if place not in places:
+            smaller.remove(constraint)
+    return smaller
+
+
+def _minimal(given: Sequence[int], open_: Sequence[int], can_hold: Test, *, test: bool) -> list[int]:
+    """Return a minimal subset of `open_` that cannot hold together with `given`, while all of `open_` cannot.
+
+    `test`: whether `given` alone may be in conflict.
+    """
+    if test and not can_hold(given):
+        return []
+    if len(open_) == 1:
+        return [*open_]
+    half = len(open_) // 2
+    first, second = open_[:half], open_[half:]
+    of_second = _minimal([*given, *first], second, can_hold, test=True)
+    of_first = _minimal([*given, *of_second], first, can_hold, test=bool(of_second))
+    return of_first + of_second

@@ -1,0 +1,77 @@
+"""All solutions of a model, and minimal conflicts, compared with brute force."""
+
+from __future__ import annotations
+
+import itertools
+from random import Random
+
+import pytest
+
+import robochoc
+from robochoc.modelling.exploration import ConflictTimeoutError
+from tests.support.cases import looped
+
+DIFFERENCES = (-1, 0, 1)
+
+
+def random_model(seed: int) -> tuple[robochoc.Model, list[tuple[int, int, int]]]:
+    """Return a model of four robots, and its constraints: x[i] - x[j] is not a number."""
+    chance = Random(seed)
+    model = robochoc.Model(f"m{seed}")
+    x = [model.robot(f"r{i}").variable("x", range(2)) for i in range(4)]
+    pairs = [(i, j) for i in range(4) for j in range(4) if i != j]
+    rules = [(*chance.choice(pairs), chance.choice(DIFFERENCES)) for _ in range(chance.randrange(4, 11))]
+    for i, j, number in rules:
+        model.add(x[i] - x[j] != number)
+    return model, rules
+
+
+def solved_by(rules: list[tuple[int, int, int]]) -> list[tuple[int, ...]]:
+    every = itertools.product(range(2), repeat=4)
+    return [values for values in every if all(values[i] - values[j] != number for i, j, number in rules)]
+
+
+@looped("seed", range(30))
+def test_all_solutions_and_conflicts(seed: int) -> None:
+    model, rules = random_model(seed)
+    expected = solved_by(rules)
+    found = [tuple(solution.values.values()) for solution in model.solutions()]
+    assert sorted(map(str, found)) == sorted(map(str, expected))
+    conflict = model.conflict()
+    assert (conflict is None) is bool(expected)
+    if conflict is not None:
+        places = [next(i for i, one in enumerate(model.constraints) if one is constraint) for constraint in conflict]
+        assert not solved_by([rules[place] for place in places])
+        for place in places:
+            assert solved_by([rules[other] for other in places if other != place])
+    assert len(model.constraints) == len(rules)
+
+
+def test_the_cheapest_solutions_come_first() -> None:
+    model = robochoc.Model()
+    x = [model.robot(f"r{i}").variable("x", range(3)) for i in range(3)]
+    model.add(robochoc.all_different(x))
+    model.minimize(x[0] + 2 * x[1])
+    costs = [solution.cost for solution in model.solutions(limit=4)]
+    assert costs == sorted(a + 2 * b for a, b, _ in itertools.permutations(range(3)))[:4]
+    assert [one.cost for one in model.solutions("sfb", limit=2, seed=3)] == costs[:2]
+
+
+def test_costs_and_parts_of_robots_in_conflicts() -> None:
+    model = robochoc.Model()
+    robot = model.robot("a")
+    x, y = robot.variable("x", range(3)), model.robot("b").variable("y", range(3))
+    model.add(x == 2, cost=5)
+    low = model.add(x < 2, name="low")
+    model.add(y > 0, name="free")
+    high = model.add(x + y > 3, name="high")
+    model.minimize(x + y)
+    assert model.conflict() == (low, high)
+    model.remove(high)
+    assert model.conflict() is None
+
+
+def test_the_time_limit() -> None:
+    model, _ = random_model(3)
+    with pytest.raises(ConflictTimeoutError, match="within 0 s"):
+        model.conflict(timeout=0)
