@@ -1,7 +1,6 @@
-"""The ground below a mission, as a map: where robots stand, which cells are blocked, and where walls are.
+"""The map of the ground below a mission: places of robots, blocked cells, and walls.
 
-Robots' files do not have it. It is a file beside them, `map.json` in the team's folder, or handed over (`robochoc fly
---map`).
+It is not in robots' files, but in a separate file: `map.json` in the team's folder, or given by `robochoc fly --map`.
 """
 
 from __future__ import annotations
@@ -14,13 +13,13 @@ from robochoc.system.decode_errors import describe_decode_error
 
 MAX_BYTES = 8 << 20
 MAX_BLOCKED = 10_000
-"""Blocked cells of a map: each is a block to draw, and a point that routes avoid."""
+"""The maximum number of blocked cells: each is drawn as a block, and avoided by routes as a point."""
 ALL_SIDES = 0b111111
-"""The sides of a cube, from which it is seen."""
+"""All sides of a cube, as visible sides."""
 MAX_PIXELS = 4_000_000
-"""As many as an image of a map may have (`occupancy/pgm.py`)."""
+"""The maximum number of pixels, as for images of maps (`occupancy/pgm.py`)."""
 MAX_VOXELS = 16_000_000
-"""As many as a three-dimensional map may have (`octomap/voxels.py`)."""
+"""The maximum number of voxels, as for three-dimensional maps (`octomap/voxels.py`)."""
 _SIDE_MAX = 1_000
 _FAR = 1_000_000
 
@@ -30,7 +29,7 @@ _First = Annotated[int, msgspec.Meta(ge=-_FAR, le=_FAR)]
 
 
 class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A cell that is blocked from an epoch on."""
+    """A cell that is blocked from epoch `epoch` on."""
 
     x: _Coordinate
     y: _Coordinate
@@ -38,21 +37,21 @@ class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class WallVoxels(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The voxels of a three-dimensional map, and the robots for which ways between them were found.
+    """The voxels of a three-dimensional map, and the radius and speed of robots for which travel times were computed.
 
     Voxels are flags in bytes (`occupancy/packed.py`): by z, then y, then x, each from the lowest on. Lengths are in
     metres.
 
     Attributes:
         columns: The number of voxels along x.
-        rows: The same along y.
-        levels: The same along z.
+        rows: The number of voxels along y.
+        levels: The number of voxels along z.
         resolution: The side of a voxel.
         corner: The x, y and z of the lowest corner of the first voxel.
-        radius: The robots' radius: their centres are no nearer to voxels that are not free, nor to the outside.
-        speed: The speed, in m/s, of which travel times were told.
+        radius: The robots' radius, which their centres keep from voxels that are not free, and from the outside.
+        speed: The speed of the travel times, in m/s.
         free: Which voxels are free.
-        occupied: Which are occupied. A voxel that is neither is not known.
+        occupied: Which voxels are occupied. A voxel that is neither free nor occupied is unknown.
     """
 
     columns: Annotated[int, msgspec.Meta(ge=1, le=MAX_VOXELS)]
@@ -72,12 +71,12 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     Attributes:
         levels: The number of levels.
         first: The z of topics in the first level.
-        starts: The levels at which robots are in the beginning, by their names. All others stand on the ground.
-        blocked: The cells that are blocked: column, row and level.
-        sides: From which sides each blocked cell is seen: 1 from a lower x, 2 from a higher one, 4 and 8 for y, 16 and
-            32 for z, added up. Empty: from all.
-        walls: Walls that drones fly around; None: they fly straight. A map with walls has a scale.
-        heights: The z at which robots are exactly, in metres, by their names.
+        starts: The levels of robots in the beginning, by their names. All others stand on the ground.
+        blocked: The blocked cells: column, row and level.
+        sides: The visible sides of each blocked cell, as a sum: 1 for visible from a lower x, 2 from a higher x, 4 and
+            8 for y, 16 and 32 for z. Empty: all sides.
+        walls: Walls that drones fly around; None: drones fly straight. A map with walls has a scale.
+        heights: The exact z of robots, in metres, by their names.
     """
 
     levels: _Coordinate
@@ -98,7 +97,7 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
 
 
 class WallPixels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """The pixels of a map of a building, and the robots for which ways around its walls were found.
+    """The pixels of a map of a building, and the radius and speed of robots for which travel times were computed.
 
     Pixels are flags in bytes (`occupancy/packed.py`): rows from the lowest y on. Lengths are in metres.
 
@@ -107,10 +106,10 @@ class WallPixels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
         rows: The number of rows.
         resolution: The side of a pixel.
         corner: The x and the y of the lower left corner of the lower left pixel.
-        radius: The robots' radius: their centres are no nearer to pixels that are not free, nor to the outside.
-        speed: The speed, in m/s, of which travel times were told.
+        radius: The robots' radius, which their centres keep from pixels that are not free, and from the outside.
+        speed: The speed of the travel times, in m/s.
         free: Which pixels are free.
-        occupied: Which are occupied. A pixel that is neither is not known.
+        occupied: Which pixels are occupied. A pixel that is neither free nor occupied is unknown.
         yaw: The counterclockwise angle, in radians, by which the pixels are turned around `corner`.
     """
 
@@ -126,18 +125,18 @@ class WallPixels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_d
 
 
 class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
-    """A map. Columns and rows are numbered from 1; unless `first` says otherwise, they are the x and y of topics.
+    """A map. Columns and rows are numbered from 1; with the default of `first`, they are the x and y of topics.
 
     Attributes:
         columns: The number of columns.
         rows: The number of rows.
-        starts: Where robots stand in the beginning, by their names: column and row.
-        blocked: The cells that are blocked.
+        starts: The cells of robots in the beginning, by their names: column and row.
+        blocked: The blocked cells.
         first: The x and y of topics in the first column and row.
-        scale: Metres a unit of topics; None: the map does not say.
+        scale: The length of a unit of topics, in metres; None: not known.
         volume: The third dimension, if the map has one.
-        walls: Walls that drones fly around; None: there are none. A map with walls has a scale.
-        places: Where robots stand exactly, in metres, by their names.
+        walls: Walls that drones fly around; None: no walls. A map with walls has a scale.
+        places: The exact places of robots, in metres, by their names.
     """
 
     columns: _Coordinate
@@ -164,7 +163,7 @@ def read_ground_map(content: bytes) -> GroundMap:
     """Return the map in the content of a JSON file.
 
     Raises:
-        ValueError: It is not a map, or something lies beside it.
+        ValueError: The content is not a valid map, or a robot or cell is outside of it.
     """
     if len(content) > MAX_BYTES:
         raise ValueError(f"it has more than {MAX_BYTES:,} bytes")
@@ -178,7 +177,7 @@ def read_ground_map(content: bytes) -> GroundMap:
         raise ValueError(describe_decode_error(error, GroundMap)) from None
     for what, (x, y) in (*found.starts.items(), *(("a blocked cell", (cell.x, cell.y)) for cell in found.blocked)):
         if x > found.columns or y > found.rows:
-            raise ValueError(f"{what} is at ({x}, {y}), beside the map of {found.columns} x {found.rows} cells")
+            raise ValueError(f"{what} is at ({x}, {y}), outside the map of {found.columns} x {found.rows} cells")
     if found.volume:
         _check_volume(found, found.volume)
     _check_walls(found)
@@ -189,9 +188,9 @@ def _check_volume(ground: GroundMap, volume: Volume) -> None:
     sides = (ground.columns, ground.rows, volume.levels)
     for cell in volume.blocked:
         if any(at > side for at, side in zip(cell, sides, strict=True)):
-            raise ValueError(f"a blocked cell is at {cell}, beside the map of {' x '.join(map(str, sides))} cells")
+            raise ValueError(f"a blocked cell is at {cell}, outside the map of {' x '.join(map(str, sides))} cells")
     if volume.sides and len(volume.sides) != len(volume.blocked):
-        raise ValueError(f"it has sides of {len(volume.sides)} blocked cells, and {len(volume.blocked)} of these")
+        raise ValueError(f"it has {len(volume.sides)} sides, but {len(volume.blocked)} blocked cells")
     for name, level in volume.starts.items():
         if level > volume.levels:
             raise ValueError(f"{name} is at level {level}, above the map's {volume.levels}")
@@ -201,9 +200,9 @@ def _check_walls(ground: GroundMap) -> None:
     volume = ground.volume
     walls, voxels = ground.walls, volume.walls if volume else None
     if (walls or voxels or ground.places or (volume and volume.heights)) and ground.scale is None:
-        raise ValueError("it has walls or places, which are in metres, and no scale")
+        raise ValueError("it has walls or places, which are in metres, but no scale")
     if walls and volume:
-        raise ValueError("it has walls in the plane, and a volume")
+        raise ValueError("it has both walls in the plane and a volume: remove one")
     if walls:
         _check_flags(walls, walls.columns * walls.rows, MAX_PIXELS, "pixels")
     if voxels:
@@ -215,4 +214,4 @@ def _check_flags(walls: WallPixels | WallVoxels, count: int, most: int, what: st
         raise ValueError(f"its walls have {count:,} {what}, more than {most:,}")
     for name, content in (("free", walls.free), ("occupied", walls.occupied)):
         if len(content) != -(-count // 8):
-            raise ValueError(f"its walls have {count:,} {what}, and {name} has flags for {8 * len(content):,}")
+            raise ValueError(f"its walls have {count:,} {what}, but {name} has flags for {8 * len(content):,}")

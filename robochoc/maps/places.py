@@ -1,8 +1,8 @@
-"""The places that values of a team on a map stand for, in metres of the map's frame.
+"""The places on a map that the values of a team represent, in metres of the map's frame.
 
-Robots' files say where a robot goes by a formula over its variables, its waypoint, in cells of the map (`topics`); the
-map beside them says how long a cell is. A robot that plans several visits has a waypoint for the first one only. Its
-other variables stand for places by the same formula, if all their values are places of somebody's waypoint.
+A robot's file has its waypoint as a formula over its variables, in cells of the map (`topics`); the map has the length
+of a cell. A robot that plans several visits has a waypoint only for the first one. The formula also applies to its
+other variables if all their values are places of some robot's waypoint.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ Place = tuple[float, ...]
 """An x and a y in metres; on a three-dimensional map a z, too."""
 _Formulas = tuple[Expression, ...]
 _VALUES_MAX = 1_000_000
-"""Of teams with more values, of all variables together, only the waypoints themselves are told."""
+"""In teams with more values of all variables together, only variables of waypoints have places."""
 _PLACES = 6
-"""Decimal places: what floating point adds beyond is none of the map's."""
+"""Decimal places of coordinates: further ones are rounding errors."""
 
 
 class MapPlaces:
-    """The places that values stand for.
+    """The places that values represent.
 
     Args:
         team: The team.
-        ground: Its map. None, or one that does not say how long a cell is: nothing is known of places.
+        ground: Its map. Without a map, or with a map without scale, values have no places.
     """
 
     def __init__(self, team: Team, ground: GroundMap | None) -> None:
@@ -39,8 +39,8 @@ class MapPlaces:
             self._formulas.update(_waypoints(robot, has_height=ground.volume is not None))
         self._formulas |= dict(self._later_visits(team))
 
-    def of(self, assignment: Mapping[str, int]) -> dict[str, Place]:
-        """Return the place of each variable whose value stands for one, in the order of `assignment`."""
+    def places_of(self, assignment: Mapping[str, int]) -> dict[str, Place]:
+        """Return the place of each variable whose value represents one, in the order of `assignment`."""
         found = {}
         for name, value in assignment.items():
             if name in self._formulas and self._scale is not None:
@@ -53,7 +53,7 @@ class MapPlaces:
         return found
 
     def _later_visits(self, team: Team) -> Iterator[tuple[str, tuple[str, _Formulas]]]:
-        """Yield the other variables of robots with one waypoint, if their values are places, with its formulas."""
+        """Yield the other variables of robots with one waypoint, with its formulas, if their values are places."""
         domains = {name: variable.domain for name, variable in team.variables.items()}
         if sum(map(len, domains.values())) > _VALUES_MAX:
             return
@@ -67,7 +67,7 @@ class MapPlaces:
 
 
 def _waypoints(robot: Robot, *, has_height: bool) -> Iterator[tuple[str, tuple[str, _Formulas]]]:
-    """Yield the variables of a robot that are, one each, all that a waypoint depends on, with its formulas."""
+    """Yield each variable of a robot that alone determines a waypoint, with the formulas of the waypoint."""
     own = {variable.name for variable in robot.variables}
     for topic in robot.topics:
         formulas = tuple(part for part in (topic.x, topic.y, topic.z)[: 3 if has_height else 2] if part is not None)

@@ -1,4 +1,4 @@
-"""The walls of a mission's map, as data: what drones fly around, and how fast they are to be."""
+"""The walls of a mission's map, as data, and the place of its pixels or voxels in the map's frame."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class Walls:
     Attributes:
         solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first. On a map in three
             dimensions the voxels, by z, then y, then x.
-        occupied: Those of them that are occupied. Of the others nobody knows.
-        frame: Where they lie.
+        occupied: The occupied ones among them. The others are unknown.
+        frame: Their place in the map's frame.
         radius: The robots' radius.
-        speed: The mean speed of which the team was told, in m/s.
+        speed: The mean speed of the team's travel times, in m/s.
     """
 
     solid: Flags
@@ -49,7 +49,7 @@ class Walls:
 
 
 def walls_of(ground: GroundMap | None) -> Walls | None:
-    """Return the walls on a map, if it has some."""
+    """Return the walls on a map; None without walls."""
     found = (ground.volume.walls if ground.volume else ground.walls) if ground else None
     if found is None:
         return None
@@ -89,7 +89,7 @@ class PixelFrame:
         return np.column_stack((cosine * x + sine * y, cosine * y - sine * x)) / self.size
 
     def in_metres(self, places: _Array) -> _Array:
-        """Return points (K, 2) that are given in pixels."""
+        """Return points (K, 2) given in pixels, in metres."""
         x, y = self.size * places[:, 0], self.size * places[:, 1]
         cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
         return np.column_stack((cosine * x - sine * y + self.corner[0], sine * x + cosine * y + self.corner[1]))
@@ -117,5 +117,5 @@ class VoxelFrame:
         return np.asarray((points - np.array(self.corner)) / self.size)
 
     def in_metres(self, places: _Array) -> _Array:
-        """Return points (K, 3) that are given in voxels."""
+        """Return points (K, 3) given in voxels, in metres."""
         return np.asarray(places * self.size + np.array(self.corner))

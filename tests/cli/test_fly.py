@@ -302,5 +302,5 @@ def test_a_map_says_where_it_begins(tmp_path: Path) -> None:
     for command in ("fly", "animate"):
         refused = ran(command, result, "--map", ground, "--html", page)
         assert refused.exit_code == 1
-        assert "A is at (5, 4), beside the map of 4 x 4 cells" in refused.stderr
+        assert "A is at (5, 4), outside the map of 4 x 4 cells" in refused.stderr
     assert ran("fly", result, "--map", ground, "--html", ground).exit_code == 2

@@ -79,7 +79,7 @@ def test_on_an_octomap_they_fly_around_its_voxels(tmp_path: Path) -> None:
     whole = json.loads((folder / "map.json").read_text())
     whole["volume"]["walls"]["free"] = "AAAA"
     (folder / "map.json").write_text(json.dumps(whole))
-    assert "voxels, and free has flags for 24" in ran("fly", path, "--team", folder).stderr
+    assert "voxels, but free has flags for 24" in ran("fly", path, "--team", folder).stderr
 
 
 def test_a_drone_that_is_blown_against_a_wall_is_told(team: Path, result: Path) -> None:
@@ -121,7 +121,7 @@ def test_what_is_wrong_with_a_map_is_said_with_its_file(team: Path, result: Path
     ground = team / "map.json"
     whole = json.loads(ground.read_text())
     for walls, why in (
-        ({**whole["walls"], "free": "AAAA"}, "its walls have 63 pixels, and free has flags for 24"),
+        ({**whole["walls"], "free": "AAAA"}, "its walls have 63 pixels, but free has flags for 24"),
         ({**whole["walls"], "resolution": "x"}, "walls.resolution: expected a number, found a text"),
     ):
         ground.write_text(json.dumps({**whole, "walls": walls}))

@@ -168,7 +168,7 @@ def _print_outcome(
         from robochoc.maps.places import MapPlaces
         from robochoc.model.change import team_after_events
 
-        places = MapPlaces(team_after_events(problem.team, outcome.events), ground).of(outcome.assignment)
+        places = MapPlaces(team_after_events(problem.team, outcome.events), ground).places_of(outcome.assignment)
         shown = result_json(renamed_outcome(outcome, names)) if problem.foreign else result_json(outcome, names, places)
         click.echo(shown)
     else:

@@ -38,7 +38,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     team = team_after_events(team, outcome.events)
     places = MapPlaces(team, ground)
     if outcome.assignment:
-        lines += _values(team, outcome.labelled(outcome.assignment), places.of(outcome.assignment))
+        lines += _values(team, outcome.labelled(outcome.assignment), places.places_of(outcome.assignment))
     lines += _listed(team, outcome, places)
     if outcome.withdrawn_alive:
         lines += [
@@ -373,7 +373,7 @@ def _listed(team: Team, outcome: Outcome, places: MapPlaces) -> list[str]:
         f"  one of {number:,} {'solutions' if what == 'solution' else 'optima'}; {shown} are listed, the others are:"
     ]
     for place, one in enumerate(others, start=2):
-        lines += [f"  {place:,}.", *_values(team, outcome.labelled(one), places.of(one))]
+        lines += [f"  {place:,}.", *_values(team, outcome.labelled(one), places.places_of(one))]
     return lines
 
 

@@ -1,12 +1,12 @@
 """Moves between walls, floors and ceilings: paths in space, and an order in which drones get past each other.
 
-No sky is above all drones here. A drone goes to its goal when that is free and a way leads there, clear of all that
-rest meanwhile; those whose goals are in fewer others' ways go first. Where none can go, one is let through: all drones
-on its way go to points beside it, which are in nobody else's way if there are such, and later on to their goals. What
-is done for a drone that does not get through after all is undone.
+There is no sky above all drones here. A drone moves to its goal when the goal is free and a path leads there that is
+clear of all resting drones. Drones whose goals block fewer others' paths move first. If none can move, one drone is let
+through: all drones on its path move to points beside it, preferably on nobody's path, and later to their goals. If the
+drone does not get through, these moves are undone.
 
-That is not complete: a corridor may hold drones in an order in which they cannot leave it. Other orders of precedence
-are tried then, and at last it is `NoRouteError`.
+The method is not complete: drones in a corridor may be in an order in which they cannot leave it. Then other orders of
+precedence are tried, and finally `NoRouteError` is raised.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from robochoc.maps.routes.voxel_plan import Resting, VoxelPlan
 _ORDERS = 6
 """The number of orders of precedence that are tried."""
 _AWAY_M = (3.0, 12.0, math.inf)
-"""The distances within which a drone looks for a point where it is in nobody's way, one after the other."""
+"""The search distances for a point at which a drone blocks nobody, one after the other."""
 _SPOTS = 2_000
-"""The number of such points of which the best is taken."""
+"""The number of such points from which the best is chosen."""
 
 
 @dataclass(frozen=True)
 class IndoorSpace(Spacing):
-    """The space between the walls of a `plan`. Heights of all points are divided by `downwash`, those of it are not."""
+    """The space between the walls of a `plan`. Heights of points, but not of the plan, are divided by `downwash`."""
 
     plan: VoxelPlan
     downwash: float = 1.0
 
     def way(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Return a short path that keeps from walls and from `points`; None if none is found."""
+        """Return a short path that keeps its distance from walls and from `points`; None if none is found."""
         found = self.plan.way_among(self._unsquashed(start), self._unsquashed(goal), self._resting(points))
         if found is None:
             return None
@@ -47,12 +47,12 @@ class IndoorSpace(Spacing):
         return path if self.is_clear(path, points) else None
 
     def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
-        """Yield other paths that are about as good: none are looked for."""
+        """Yield no alternative paths: they are not searched for in this space."""
         del start, goal, points
         yield from ()
 
     def spots(self, start: Array, points: Array, most: float) -> Array:
-        """Return points (K, 3) to which paths lead from `start`, clear of others, the nearest first."""
+        """Return points (K, 3) that can be reached from `start` clear of `points`, the nearest first."""
         found = self.plan.reached(self._unsquashed(start), self._resting(points), most)
         return squashed(found, self.downwash)
 
@@ -64,7 +64,7 @@ class IndoorSpace(Spacing):
 
 
 def moves_indoors(starts: Array, goals: Array, standing: Array, space: IndoorSpace, delays: Array) -> list[DroneMove]:
-    """Return moves, one after the other, that bring all drones from `starts` to `goals`. Raises `NoRouteError`."""
+    """Return a sequence of moves of all drones from `starts` to `goals`. Raises `NoRouteError`."""
     refused: NoRouteError | None = None
     for number in range(_ORDERS):
         turns = np.random.default_rng(number).permutation(len(starts)) if number else np.arange(len(starts))
@@ -76,7 +76,7 @@ def moves_indoors(starts: Array, goals: Array, standing: Array, space: IndoorSpa
 
 
 class _IndoorMoves(MoveOrder[IndoorSpace]):
-    """Moves in one order of precedence: of drones that are alike else, the one with the least of `turns` goes first."""
+    """Moves in one order of precedence: of drones with equal ranks, the one with the least of `turns` moves first."""
 
     def __init__(
         self,
@@ -102,7 +102,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return self.moves
 
     def move(self, drone: int, path: Array) -> None:
-        """Move a drone, and note whether it is at its goal."""
+        """Move a drone, and record whether it is at its goal."""
         super().move(drone, path)
         if (self.rests[drone] == self.goals[drone]).all():
             self.away.discard(drone)
@@ -110,7 +110,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
             self.away.add(drone)
 
     def _way(self, drone: int) -> Array:
-        """Return the path of a drone to its goal, whatever other drones are on it."""
+        """Return the path of a drone to its goal, ignoring other drones."""
         key = drone, self.rests[drone].tobytes()
         if key not in self._ways:
             found = self.space.way(self.rests[drone], self.goals[drone], self._standing)
@@ -120,12 +120,12 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return self._ways[key]
 
     def _is_on_path(self, drone: int, points: Array) -> Flags:
-        """Return which of `points` (P, 3) are on the way of a drone."""
+        """Return which of `points` (P, 3) are on the path of a drone."""
         way = self._way(drone)
         return np.asarray(self.space.near(way[:-1], way[1:], points).any(axis=0))
 
     def _by_precedence(self) -> list[int]:
-        """Return the drones not at their goals, in the order of delay, and of others in whose way their goals are."""
+        """Return the drones not at their goals, ordered by delay, and by the number of others that they would block."""
         away = sorted(self.away)
         hinders = np.zeros(self.count)
         for drone in away:
@@ -148,7 +148,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return path is not None
 
     def _let_one_through(self) -> bool:
-        """Move all drones that are on the way of one out of it, and then that one; return whether that was possible."""
+        """Move all drones away from the path of one drone, and then that drone; return whether that was possible."""
         self._attempts_left -= 1
         if self._attempts_left < 0:
             return False
@@ -169,7 +169,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return False
 
     def _make_room(self, other: int, drone: int) -> bool:
-        """Move `other` off the way of a drone, if it is still on it; return whether it is."""
+        """Move `other` off the path of a drone; return whether the path is clear of it."""
         if not self._is_on_path(drone, self.rests[other][None])[0]:
             return True
         others = self.others(other)
@@ -184,7 +184,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return False
 
     def _best(self, spots: Array, without: set[int]) -> Array:
-        """Return the first of those of `spots` that are on fewest ways, and near to fewest goals, of other drones."""
+        """Return the first of `spots` that is on the fewest paths, and near the fewest goals, of other drones."""
         rest = [drone for drone in range(self.count) if drone not in without]
         hindered = (norms(spots[:, None] - self.goals[rest][None]) < self.space.distance).sum(axis=1)
         for drone in self.away - without:

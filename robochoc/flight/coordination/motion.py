@@ -1,8 +1,8 @@
-"""Motion of drones along their paths, and where all of them are at any time.
+"""Motion of drones along their paths, and the positions of all drones at any time.
 
 Every straight piece of a path begins and ends at rest, in minimum-jerk motion: the polynomial of degree five whose
 velocity and acceleration are zero at both ends (Flash and Hogan, "The coordination of arm movements", 1985). So both
-are continuous over a whole path, and a controller can take them as its feed-forward.
+are continuous over a whole path, and a controller can use them as its feed-forward.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from robochoc.maps.routes.distances import Array, norms, squashed
 
 PEAK = 15 / 8
-"""The greatest speed of minimum-jerk motion over a unit of length in a unit of time; half way."""
+"""The greatest speed of minimum-jerk motion over a unit of length in a unit of time, reached half way."""
 _TOP_ACCELERATION = 10 / math.sqrt(3)
-"""The greatest acceleration of the same."""
+"""The greatest acceleration of this motion."""
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2, and the least seconds from rest to rest.
+    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2, and the least time from rest to rest.
 
-    In much less than a second a drone cannot lean to one side and to the other: it overshoots where one short piece
-    follows upon another.
+    In much less than a second a drone cannot lean to one side and then to the other: it overshoots between consecutive
+    short pieces.
     """
 
     speed: float = 2.0
@@ -37,10 +37,10 @@ class MotionLimits:
 
     def __post_init__(self) -> None:
         if not (0 < self.speed < math.inf and 0 < self.acceleration < math.inf):
-            raise ValueError(f"limits are positive numbers, not {self.speed} m/s and {self.acceleration} m/s^2")
+            raise ValueError(f"limits must be positive numbers, not {self.speed} m/s and {self.acceleration} m/s^2")
 
     def durations(self, lengths: Array) -> Array:
-        """Return the shortest times (K,), in seconds, of motion over `lengths` (K,), from rest to rest."""
+        """Return the shortest durations (K,) of motion over `lengths` (K,) from rest to rest, in seconds."""
         least: Array = np.maximum(PEAK * lengths / self.speed, np.sqrt(_TOP_ACCELERATION * lengths / self.acceleration))
         return np.maximum(least, self.least_s)
 
@@ -55,9 +55,9 @@ class Motion:
 
 
 class Route:
-    """One drone's motion along a path (K + 1, 3), from rest to rest. Time begins at 0 with it.
+    """One drone's motion along a path (K + 1, 3), from rest to rest, which begins at time 0.
 
-    Heights of the path are divided by `downwash`; `limits` are of the motion where they are not.
+    Heights of the path are divided by `downwash`; `limits` apply to the motion with undivided heights.
     """
 
     def __init__(self, drone: int, path: Array, limits: MotionLimits, downwash: float = 1.0) -> None:
@@ -77,7 +77,7 @@ class Route:
         return points
 
     def pieces(self, begins_s: float) -> tuple[Array, Array, Array, Array, Array]:
-        """Return its straight pieces, begun at `begins_s`: beginnings, ends, durations, origins, goals."""
+        """Return its straight pieces, if it begins at `begins_s`: beginnings, ends, durations, origins, goals."""
         ends = begins_s + self._ends
         begins = np.concatenate(([begins_s], ends[:-1]))
         return begins, ends, self._durations, self.path[:-1], self.path[1:]
@@ -85,7 +85,7 @@ class Route:
 
 @dataclass(frozen=True)
 class _MotionWindow:
-    """A time in which no drone begins or ends a piece: the pieces in motion, and where the other drones rest."""
+    """A time interval in which no drone begins or ends a piece: the pieces in motion, and the places of all others."""
 
     begins_s: float
     ends_s: float
@@ -98,9 +98,9 @@ class _MotionWindow:
 
 
 class RoutePlan:
-    """The positions of all drones from second 0 to `duration_s`. `plan_routes` makes it.
+    """The positions of all drones from second 0 to `duration_s`, as planned by `plan_routes`.
 
-    Heights of `starts` and `flights` are divided by `downwash`, those of the plan are not.
+    Heights of `starts` and `flights` are divided by `downwash`, but not those of the plan.
     """
 
     def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]], downwash: float = 1.0) -> None:
@@ -117,7 +117,7 @@ class RoutePlan:
         self._window = self._window_at(0.0)
 
     def at(self, s: float) -> Motion:
-        """Return the motion of all drones at second `s`. Before 0 it is as at 0, and after the end as there."""
+        """Return the motion of all drones at second `s`, limited to the time of the plan."""
         s = min(max(s, 0.0), self.duration_s)
         window = self._window
         if not window.begins_s <= s < window.ends_s:
@@ -143,7 +143,7 @@ class RoutePlan:
         ends = self._bounds[place] if place < len(self._bounds) else math.inf
         resting = self._starts.copy()
         done = self._ends <= begins
-        # Pieces are sorted by their beginning: of several of one drone the last one counts.
+        # Pieces are sorted by their beginning: the last piece of a drone counts.
         resting[self._drones[done]] = self._goals[done]
         now = (self._begins <= begins) & ~done
         origins = self._origins[now]
@@ -163,6 +163,6 @@ _NONE = [np.empty(0), np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3
 
 
 def _progress(share: Array) -> Array:
-    """Return the share of the length that is done after a `share` of the time."""
+    """Return the share of the length that is flown after a `share` of the time."""
     way: Array = share * share * share * (10 + share * (6 * share - 15))
     return way

@@ -1,4 +1,4 @@
-"""Moves of drones one after the other, whatever the space is in which they fly."""
+"""Moves of drones one after the other, in any space."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _Space = TypeVar("_Space", bound=Spacing)
 class NoRouteError(RobochocError, ValueError):
     """No order of moves was found in which `drones` reach their goals.
 
-    Standing points enclose them; or drones are in each other's way between walls, if these are `indoors`.
+    Either standing points enclose them, or, if `indoors`, drones block each other between walls.
     """
 
     def __init__(self, drones: Sequence[int], *, indoors: bool = False) -> None:
@@ -36,11 +36,11 @@ class DroneMove:
     drone: int
     path: Array
     points: Array
-    """The places of all drones that rest meanwhile. Any other path that is clear of them is as good."""
+    """The places of all drones that rest during the move. Another path has to be clear of them, too."""
 
 
 class MoveOrder(Generic[_Space]):
-    """The moves so far, and where all drones rest after them."""
+    """The moves so far, and the places of all drones after them."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: _Space, delays: Array) -> None:
         self.goals = goals
@@ -53,7 +53,7 @@ class MoveOrder(Generic[_Space]):
         self.moves: list[DroneMove] = []
 
     def others(self, drone: int) -> Array:
-        """Return where all others rest, and all standing points."""
+        """Return the places of all other drones, and all standing points."""
         return np.delete(self.points, drone, axis=0)
 
     def move(self, drone: int, path: Array) -> None:

@@ -1,18 +1,17 @@
-"""The order in which drones move, if one moves at a time: each path is clear of all drones that rest meanwhile.
+"""The order in which drones move, one at a time: each path is clear of all drones that rest during the move.
 
-A drone goes to its goal when that is free and a path leads there (`paths.py`). Where all that are not there yet block
-each other (they swap places, say), one of them makes room, near its place if that helps, else in the sky.
+A drone moves to its goal when the goal is free and a path leads there (`paths.py`). If all remaining drones block each
+other (they swap places, for example), one of them makes room, near its place if possible, else in the sky.
 
-This always ends: a drone makes room near its place once and in the sky once, and then goes to its goal. If no drone can
-do even that, all begin anew with `_MovesBySky`: every drone, those that stay too, goes up, each to a place in the sky
-whose column is no other's, and then down to its goal. Each drone that can go up does, so that fewer are in the way of
-others: if it gets stuck, any other order does too. They go down in the reverse of an order in which they could leave
-the goals.
+This always ends: a drone makes room near its place once and in the sky once, and then moves to its goal. If no drone
+can do that, all start again with `_MovesBySky`: every drone, even one that stays, moves up to its own column in the
+sky, and then down to its goal. Each drone that can move up does, so that fewer block others: if this order gets stuck,
+any other order does, too. They move down in the reverse of an order in which they could leave the goals.
 
-So a solution is found if all could go up from their starts, and from their goals, one after the other. Without standing
-points they can: the way up from the topmost leads away from all others, and drones cross at a height at which none
-rests, a distance above all places and a distance below those who wait. With standing points it fails only where these,
-or drones between which none fits, enclose a drone: that is `NoRouteError`.
+So a solution is found if all drones could move up from their starts, and from their goals, one after the other. Without
+standing points they can: the path up from the topmost drone leads away from all others, and drones cross at a height at
+which none rests, a distance above all places and a distance below waiting drones. With standing points the method fails
+only if these, or drones with too little space between them, enclose a drone: then `NoRouteError` is raised.
 """
 
 from __future__ import annotations
@@ -28,14 +27,15 @@ from robochoc.flight.coordination.paths import OutdoorSpace
 from robochoc.maps.routes.distances import Array, Flags, norms
 
 _RINGS = 20
-"""The most rings of a distance away at which a drone waits in the sky where there are walls."""
+"""The largest radius, in distances, of the search for a waiting place in the sky between walls."""
 _PathFinder = Callable[[Array, Array, Array], Array | None]
 
 
 def moves_between(starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> list[DroneMove]:
-    """Return moves, one after the other, that bring all drones from `starts` to `goals`. Raises `NoRouteError`.
+    """Return a sequence of moves of all drones from `starts` to `goals`. Raises `NoRouteError`.
 
-    `space.sky` is two distances or more above all of them. Drones that wait less, or block fewer others, come first.
+    `space.sky` is at least two distances above all of them. Drones with less delay, or that block fewer others, move
+    first.
     """
     found = _DirectMoves(starts, goals, standing, space, delays)
     if not found.solve():
@@ -44,7 +44,7 @@ def moves_between(starts: Array, goals: Array, standing: Array, space: OutdoorSp
 
 
 class _MovesUnderSky(MoveOrder[OutdoorSpace]):
-    """Moves where nothing is above all drones, so that they can wait there."""
+    """Moves in a space with a sky above all drones, in which they can wait."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> None:
         super().__init__(starts, goals, standing, space, delays)
@@ -52,12 +52,12 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
         """The drones in the sky."""
 
     def move(self, drone: int, path: Array) -> None:
-        """Move a drone, which then does not wait in the sky."""
+        """Move a drone; it no longer waits in the sky."""
         super().move(drone, path)
         self.waiting.discard(drone)
 
     def to_goal(self, drone: int, ways: Iterable[_PathFinder], *, low: bool = True) -> bool:
-        """Move to the goal if one of `ways` leads there; along the ground only if `low`. Return whether it moved."""
+        """Move to the goal by a path of one of `ways`, along the ground only if `low`. Return whether it moved."""
         if not self.goal_is_free(drone):
             return False
         others = self.others(drone)
@@ -69,7 +69,7 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
         return False
 
     def to_sky(self, drone: int) -> bool:
-        """Move up to wait there, a distance above the height at which drones cross. Return whether it moved."""
+        """Move up to a waiting place, a distance above the height at which drones cross. Return whether it moved."""
         others = self.others(drone)
         up = self.space.path_up(self.rests[drone], others)
         if up is None:
@@ -88,9 +88,9 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
         return True
 
     def _spot(self, start: Array, up: Array) -> Array | None:
-        """Return the nearest point in the sky whose column is apart from those of all drones that wait there.
+        """Return the nearest point in the sky that keeps the distance, seen from above, from all waiting drones.
 
-        It can be reached from `up`. Walls may leave none.
+        It can be reached from `up`. None: walls leave no such point.
         """
         taken = self.rests[[*self.waiting], :2]
         offsets = _spiral(self.space.distance, math.inf if self.space.floor_plan is None else _RINGS)
@@ -101,7 +101,7 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
 
 
 class _DirectMoves(_MovesUnderSky):
-    """Drones go to their goals as soon as they can; drones that block others make room."""
+    """Drones move to their goals as soon as they can; drones that block others make room."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> None:
         super().__init__(starts, goals, standing, space, delays)
@@ -111,9 +111,9 @@ class _DirectMoves(_MovesUnderSky):
         self._top = space.sky - space.distance
         active = [*self.away]
         self._blocked = np.zeros((self.count, len(self.points)), dtype=bool)
-        """Element [i, j]: the straight way of drone i is blocked by drone j, which is at rest."""
+        """Element [i, j]: the straight path of drone i is blocked by drone j, which is at rest."""
         self._blocked_by_goal = np.zeros((self.count, self.count), dtype=bool)
-        """Element [i, j]: the straight way of drone i would be blocked by drone j at its goal."""
+        """Element [i, j]: the straight path of drone i would be blocked by drone j at its goal."""
         self._lengths = norms(goals - starts)
         self._blocked[active] = space.near(starts[active], goals[active], self.points)
         self._blocked_by_goal[active] = space.near(starts[active], goals[active], goals)
@@ -136,7 +136,7 @@ class _DirectMoves(_MovesUnderSky):
         return True
 
     def move(self, drone: int, path: Array) -> None:
-        """DroneMove, and update which ways that blocks or clears."""
+        """Move a drone, and update which paths are blocked."""
         super().move(drone, path)
         here, goal = self.rests[drone], self.goals[drone]
         self._blocked[:, drone] = False
@@ -156,11 +156,11 @@ class _DirectMoves(_MovesUnderSky):
             self._lengths[drone] = norms(goal - here)
 
     def _barred(self, starts: Array, goals: Array) -> Flags:
-        """Return which straight ways (K,) are none: they lead along the ground, or through walls."""
+        """Return which straight paths (K,) are not allowed: they lead along the ground, or through walls."""
         return self.space.slides(starts, goals) | self.space.is_walled(starts, goals)
 
     def _by_precedence(self) -> list[int]:
-        """Return the drones not at their goals, in the order of delay, of drones that they would block, of distance."""
+        """Return the drones not at their goals, ordered by delay, number of drones they would block, and distance."""
         away = sorted(self.away)
         hinders = self._blocked_by_goal[away].sum(axis=0)
         return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], -self._lengths[drone], drone))
@@ -176,14 +176,14 @@ class _DirectMoves(_MovesUnderSky):
         return any(self.to_goal(drone, (self.space.by_lane,)) for drone in self._by_precedence())
 
     def _unhindered(self) -> list[int]:
-        """Return the drones whose straight way is blocked only by drones that stay there."""
+        """Return the drones whose straight path is blocked only by drones at their goals."""
         return [drone for drone in self._by_precedence() if not self._blocked[drone, [*self.away]].any()]
 
     def _move_by_detour(self, drones: Iterable[int], *, again: bool = False) -> bool:
         """Move one of `drones` by a detour, and return whether one moved.
 
-        A drone that found no way searches `again` only when others have moved, as a search takes long. If nothing else
-        is possible all search, and move along the ground where they have to.
+        After a search without a path, a drone searches again only when others have moved, as a search takes long. With
+        `again`, when nothing else is possible, all search, and may move along the ground.
         """
         for drone in drones:
             if (again or len(self.moves) >= self._next_search[drone]) and self.goal_is_free(drone):
@@ -193,7 +193,7 @@ class _DirectMoves(_MovesUnderSky):
         return False
 
     def _move_aside(self) -> bool:
-        """Move a drone that blocks most others a little way from its place."""
+        """Move a drone that blocks many others a short distance away."""
         away = sorted(self.away)
         blocks = self._blocked[away].sum(axis=0)
         ranks = sorted(self.away - self._moved_aside, key=lambda drone: (-blocks[drone], -self.rests[drone][2], drone))
@@ -206,7 +206,7 @@ class _DirectMoves(_MovesUnderSky):
         return False
 
     def _path_aside(self, drone: int) -> Array | None:
-        """Return a path to the nearest free point of those that block fewest drones."""
+        """Return a path to the nearest free point at which the drone blocks the fewest others."""
         here, others = self.rests[drone], self.others(drone)
         spots = here + _AROUND * self.space.distance
         low = min(self.space.ground + self.space.distance, float(here[2]))
@@ -214,7 +214,7 @@ class _DirectMoves(_MovesUnderSky):
         spots = spots[~self._barred(np.broadcast_to(here, spots.shape), spots)]
         rest = [other for other in self.away if other != drone]
         taken = np.vstack((others, self.goals[rest]))
-        # A thousandth farther than needed: on the line between two places, say, rounding must not decide.
+        # Offsets are a thousandth longer than needed: rounding must not decide for points between two places.
         free = (norms(spots[:, None] - taken[None]) >= self.space.distance).all(axis=1)
         spots = spots[free]
         spots = spots[~self.space.near(np.broadcast_to(here, spots.shape), spots, others).any(axis=1)]
@@ -230,7 +230,7 @@ class _DirectMoves(_MovesUnderSky):
 
 
 class _MovesBySky(_MovesUnderSky):
-    """All drones go up, and down to their goals in the reverse of an order in which they could leave the goals."""
+    """All drones move up, and down to their goals in the reverse of an order in which they could leave the goals."""
 
     def all_moves(self) -> list[DroneMove]:
         """Return the moves. Raises `NoRouteError`."""
@@ -244,7 +244,7 @@ class _MovesBySky(_MovesUnderSky):
         return self.moves
 
     def empty(self) -> None:
-        """Move all drones up, the topmost of those that can first."""
+        """Move all drones up, the topmost possible drone first."""
         drones = sorted(range(self.count), key=lambda drone: -self.rests[drone][2])
         while drones:
             for drone in drones:
@@ -256,7 +256,7 @@ class _MovesBySky(_MovesUnderSky):
 
 
 def _spiral(distance: float, rings: float) -> Iterator[Array]:
-    """Yield offsets in the plane, ring by ring, further and further out."""
+    """Yield offsets in the plane, ring by ring, from inside to outside."""
     yield np.zeros(2)
     for ring in takewhile(lambda ring: ring <= rings, count(1)):
         for step in range(6 * ring):
@@ -265,8 +265,8 @@ def _spiral(distance: float, rings: float) -> Iterator[Array]:
 
 
 def _around() -> Array:
-    """Return offsets to make room, in distances: up, or to eight sides, level, rising or sinking; the nearest first."""
-    # A little more than a whole distance: on the line between two places rounding must not decide.
+    """Return offsets for making room, in distances: up, or to eight sides, level, rising or sinking; nearest first."""
+    # A little more than the distance: rounding must not decide for points on the line between two places.
     radii = (1.001, 1.5, 2.0, 3.0)
     sides = [(math.cos(step * math.pi / 4), math.sin(step * math.pi / 4)) for step in range(8)]
     level = [np.array((x, y, 0.0)) for x, y in sides]

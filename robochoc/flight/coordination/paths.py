@@ -1,19 +1,20 @@
-"""Paths of a drone between others that rest: polylines that keep the distance from all of them.
+"""Paths of a drone between resting drones: polylines that keep the distance from all of them.
 
 Candidates, in order of preference:
 
-1. `straight`;
-2. `by_lane`: up or down to a lane's height, across, and up or down. The lane with the shortest detour is taken, and of
-   equal ones the lowest;
-3. `around`: the same by way of a column beside the start or the goal, for drones with another one right above;
-4. over everything: from the start up to the `sky`, by way of a column beside it where that is needed, across, and
-   down in the same manner. The sky is a height that is clear of all points at rest.
+1. a straight line;
+2. `by_lane`: up or down to a lane's height, across, and up or down. The lane with the shortest detour is chosen, and of
+   equal lanes the lowest;
+3. `around`: by lane via a column beside the start or the goal, for a drone with another drone directly above;
+4. `over_all`: from the start up to the `sky`, via a column beside it if necessary, across, and down in the same manner.
+   The sky is a height that is clear of all points at rest.
 
-What a point blocks is computed, not searched for. Of a vertical line, or of all horizontal lines between two columns,
-it blocks an interval of heights. Half of the interval is sqrt(distance^2 - r^2), where r is the distance of the point
-in the plane. So `by_lane` finds a lane whenever there is one.
+Blocked heights are computed, not searched for. On a vertical line, or among all horizontal lines between two columns, a
+point blocks an interval of heights. Half of the interval is sqrt(distance^2 - r^2), where r is the distance of the
+point in the plane. So `by_lane` finds a lane whenever there is one.
 
-With a floor plan (`floor_plan.py`), "across" is not straight, but by a way around the walls, all at one height.
+With a floor plan (`maps/routes/floor_plan.py`), "across" is not straight, but by a route around the walls, at constant
+height.
 """
 
 from __future__ import annotations
@@ -42,8 +43,8 @@ _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
 class OutdoorSpace(Spacing):
     """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points.
 
-    With `rises`, drones leave the ground, and land, straight up and down where they can. No path leads through walls of
-    the `floor_plan`, however high it is.
+    With `rises`, drones leave the ground, and land, vertically where possible. No path leads through walls of the
+    `floor_plan`, at any height.
     """
 
     ground: float
@@ -53,11 +54,11 @@ class OutdoorSpace(Spacing):
 
     @property
     def off_ground(self) -> float:
-        """The height from which on a drone is off the ground."""
+        """The least height at which a drone is off the ground."""
         return self.ground + self.distance / 4
 
     def slides(self, starts: Array, goals: Array) -> Flags:
-        """Return which straight lines (K,) lead along the ground; or, with `rises`, aslant from it or to it."""
+        """Return which straight lines (K,) lead along the ground; or, with `rises`, diagonally from it or to it."""
         low = (np.minimum if self.rises else np.maximum)(starts[:, 2], goals[:, 2]) < self.off_ground
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
@@ -71,9 +72,9 @@ class OutdoorSpace(Spacing):
     def across(
         self, start: Array, goal: Array, first: Column | None = None, last: Column | None = None
     ) -> Array | None:
-        """Return the columns (K + 1, 2) by which a drone gets from `start` to `goal` in the plane; None if it cannot.
+        """Return the columns (K + 1, 2) of a route from `start` to `goal` in the plane; None if there is none.
 
-        It begins in the column `first`, and ends in `last`, where these are not the columns of `start` and `goal`.
+        It begins in the column `first`, and ends in `last`; by default, in those of `start` and `goal`.
         """
         first, last = start[:2] if first is None else first, goal[:2] if last is None else last
         if self.floor_plan is None:
@@ -97,7 +98,7 @@ class OutdoorSpace(Spacing):
         return next(self.lanes(start, goal, points), None)
 
     def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
-        """Yield the paths by several lanes, a distance or more from each other, the best first."""
+        """Yield the paths by several lanes, at least a distance from each other, the best first."""
         columns = self.across(start, goal)
         if columns is None:
             return
@@ -118,7 +119,7 @@ class OutdoorSpace(Spacing):
                     yield path
 
     def around(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Return the path by way of the best column beside the start or the goal; None if there is none."""
+        """Return the path via the best column beside the start or the goal; None if there is none."""
         best, path = math.inf, None
         reach, limits = self._reach(start, points), self._reach(goal, points)
         for column, there, here in self._ways_round(start, goal):
@@ -136,7 +137,7 @@ class OutdoorSpace(Spacing):
         return path
 
     def over_all(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Return the path by way of the sky; None if the sky is not clear between the columns."""
+        """Return the path via the sky; None if the sky is not clear between the columns."""
         up, down = self.path_up(start, points), self.path_up(goal, points)
         if up is None or down is None:
             return None
@@ -165,7 +166,7 @@ class OutdoorSpace(Spacing):
         return found
 
     def _ways_round(self, start: Array, goal: Array) -> Iterator[tuple[Column, Array, Array]]:
-        """Yield each column beside the start or the goal, with the columns on the way to it, and from it on."""
+        """Yield each column beside the start or the goal, with the columns of the route to it, and from it."""
         for column in self._beside(start):
             here = self.across(start, goal, first=column)
             if here is not None:
@@ -183,16 +184,16 @@ class OutdoorSpace(Spacing):
                 yield column
 
     def _exits(self, start: Array, columns: Array, points: Array, reach: tuple[float, float]) -> list[float]:
-        """Return the heights at which a drone can leave by `columns`: those where clear intervals begin and end.
+        """Return the heights at which a drone can leave by `columns`: the ends of clear intervals.
 
-        Heights along the ground count only if there are no others.
+        Heights along the ground are used only if there are no others.
         """
         low, high = max(reach[0], min(self.ground, float(start[2]))), min(reach[1], self.sky)
         found = _outside(self._spans(columns, points), low, high, (start[2], self.off_ground))
         return [height for height in found if height >= self.off_ground] or found
 
     def _reach(self, start: Array, points: Array) -> tuple[float, float]:
-        """Return the lowest and the highest height that can be reached straight from `start`."""
+        """Return the lowest and the highest height that can be reached vertically from `start`."""
         spans = self._spans(start[None, :2], points)
         above = spans.mean(axis=1) > start[2]
         low = spans[~above, 1].max(initial=-math.inf)
@@ -200,13 +201,13 @@ class OutdoorSpace(Spacing):
         return min(float(low), float(start[2])), max(float(high), float(start[2]))
 
     def _spans(self, columns: Array, points: Array) -> Array:
-        """Return the intervals of heights (W, 2) in which points block the way across by `columns`, or in one of them.
+        """Return the intervals of heights (W, 2) in which points block the route by `columns`, or a single column.
 
-        With several pieces there is one interval for each point: that of the piece which it is nearest to.
+        With several pieces there is one interval for each point: that of the nearest piece.
         """
         first, second = (columns[:-1], columns[1:]) if len(columns) > 1 else (columns, columns)
         radius = segment_distances(first, second, points[:, :2]).min(axis=0)
-        # A little less strict than `is_clear` is, which has the last word: rounding must not make them disagree.
+        # A little less strict than `is_clear`, which decides finally: they must not differ by rounding.
         least = self.distance - SLACK_M / 2
         close = radius < least
         half = np.sqrt(least * least - radius[close] ** 2)
@@ -215,7 +216,7 @@ class OutdoorSpace(Spacing):
 
 
 def _outside(spans: Array, low: float, high: float, wished: tuple[float, ...]) -> list[float]:
-    """Return the ends of what is left of `low` to `high` without `spans`, and those of `wished` that are left."""
+    """Return the ends of the intervals between `low` and `high` outside `spans`, and the `wished` heights in these."""
     heights = np.concatenate((spans.ravel(), [low, high], wished))
     heights = np.unique(heights[(low <= heights) & (heights <= high)])
     free = ~((spans[None, :, 0] < heights[:, None]) & (heights[:, None] < spans[None, :, 1])).any(axis=1)
@@ -234,7 +235,7 @@ def _path(start: Array, *bends: tuple[Column, float] | Array) -> Array:
 
 
 def _joined(corners: Array) -> Array:
-    """Return a path without pieces of no length, and without needless corners on a vertical line."""
+    """Return a path without pieces of length 0, and without unnecessary corners on a vertical line."""
     stays = (corners[1:] == corners[:-1]).all(axis=1)
     corners = corners[np.concatenate(([True], ~stays))]
     if len(corners) < 3:  # noqa: PLR2004 - a corner is between two pieces

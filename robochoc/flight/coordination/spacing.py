@@ -14,8 +14,8 @@ from robochoc.system.errors import RobochocError
 class TooCloseError(RobochocError, ValueError):
     """Two drones, or a drone and a standing point, would rest nearer to each other than the distance.
 
-    `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether
-    they are too close before they fly (`start`) or would be after it (`goal`).
+    `first` and `second` are drones' numbers; the numbers of standing points follow those of drones. `where` is `start`
+    if they are too close before the flight, and `goal` if they would be after it.
     """
 
     def __init__(self, first: int, second: int, distance_m: float, where: Literal["start", "goal"]) -> None:
@@ -27,7 +27,7 @@ class TooCloseError(RobochocError, ValueError):
 
 
 def check_spacing(points: Array, standing: Array, distance: float, where: Literal["start", "goal"]) -> None:
-    """Raise `TooCloseError` for the nearest two of `points` and `standing`, one of `points` at least, if too near."""
+    """Raise `TooCloseError` for the nearest two of `points` and `standing`, not both standing, if they are too near."""
     count = len(points)
     if not count:
         return
@@ -51,7 +51,7 @@ class Spacing:
         return self.distance - SLACK_M
 
     def near(self, origins: Array, ends: Array, points: Array) -> Flags:
-        """Return whether (K, P) straight lines come too near to `points` (P, 3)."""
+        """Return whether (K, P) straight lines pass too near to `points` (P, 3)."""
         return segment_distances(origins, ends, points) < self.least
 
     def is_clear(self, path: Array, points: Array) -> bool:

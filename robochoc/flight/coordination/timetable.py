@@ -1,15 +1,15 @@
-"""The timetable: when drones fly, so that no two ever come nearer to each other than a distance.
+"""The timetable of drones' moves, in which no two drones are ever nearer to each other than a distance.
 
 `moves.py` gives moves that are safe one after the other. Here they begin as early as possible, in that order of
-precedence. What is scheduled stays. The next move begins at the first time at which it keeps the distance from all
-drones at all times: before it, during it, and at rest after it, for good. There always is such a time: when all that
-are scheduled have ended, the other drones rest where the move's path was found clear of them. This is prioritized
-planning (Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths; without the order of `moves.py`
-it would be incomplete.
+precedence. Scheduled moves are not changed. The next move begins at the first time at which it keeps the distance from
+all drones at all times: before the move, during it, and at rest after it, permanently. There is always such a time:
+after all scheduled moves, the other drones rest at places of which the path is clear. This is prioritized planning
+(Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths; without the order of `moves.py` it would
+be incomplete.
 
-Time is cut into steps, at which all moves begin. In a step, motion differs from straight and even motion by at most
-acceleration * step^2 / 8, which is added to the distance; but for that, the closest approach is exact. Paths that keep
-the distance from each other, or from where a drone rests, need no time, and no more than the distance.
+Time is divided into steps, at which all moves begin. Within a step, motion differs from uniform straight motion by at
+most acceleration * step^2 / 8, which is added to the distance; apart from that, the closest approach is exact. Paths
+that keep the distance from each other, or from a resting drone, are not compared in time, and need only the distance.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ Steps = NDArray[np.int64]
 
 _STEP_S = 0.05
 _BULGE = 0.01
-"""The most that two drones together may deviate from even motion in a step, in distances. It bounds the step."""
+"""The largest deviation of two drones from uniform motion in a step, in distances. It bounds the step."""
 _CHUNK = 8
-"""Steps of a move that are compared together, by the box around them."""
+"""The number of steps of a move that are compared together, by the box around them."""
 _PORTION = 4096
 _PATIENCE_S = 1.0
-"""A drone that would wait longer tries other lanes, and takes one if it arrives that much sooner."""
+"""A drone that would wait longer tries other lanes, and uses one if it arrives earlier by this time."""
 _LANES = 4
 """The number of other lanes that a drone tries."""
 _FOREVER = 2**62
@@ -61,29 +61,29 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     downwash: float = 1.0,
     floor_plan: WallPlan | None = None,
 ) -> RoutePlan:
-    """Return how N drones fly from `starts` to `goals`, never nearer to each other than `distance`.
+    """Return the routes of N drones from `starts` to `goals`, never nearer to each other than `distance`.
 
-    With a `downwash` above 1, a drone is an ellipsoid for the others, and so many times as tall as it is wide: the
-    plan is one of balls where heights are divided by it.
+    With a `downwash` above 1, drones are ellipsoids, taller than wide by this factor: the plan is computed for spheres,
+    with heights divided by it.
 
-    The result is the same each time. Lengths are in metres.
+    The result is deterministic. Lengths are in metres.
 
     Args:
         starts: (N, 3).
-        goals: (N, 3). A drone with the same start and goal stays there, unless `moves.py` finds no other way.
-        distance: Between drones' centres.
-        standing: Points (M, 3) from which drones keep the distance, too.
-        delays: (N,): a drone does not begin before that second.
+        goals: (N, 3). A drone with the same start and goal stays there, unless `moves.py` finds no other solution.
+        distance: The distance between drones' centres.
+        standing: Points (M, 3) from which drones also keep the distance.
+        delays: (N,): the earliest begin of each drone, in seconds.
         limits: Speed and acceleration of all drones.
-        ground: No drone flies lower, except for starts and goals.
-        rises: Drones leave the ground, and land, straight up and down where they can.
-        downwash: The distance needed right above each other, in distances; 1 at least.
-        floor_plan: Walls that no drone goes over; or walls in space, with floors and ceilings.
+        ground: The lowest height of drones, except for starts and goals.
+        rises: Whether drones leave the ground, and land, vertically where possible.
+        downwash: The vertical distance, as a multiple of `distance`; at least 1.
+        floor_plan: Walls that no drone flies over; or walls in space, with floors and ceilings.
 
     Raises:
         TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
         NoRouteError: Standing points enclose a start or a goal; or drones do not get past each other between walls.
-        ValueError: An argument makes no sense.
+        ValueError: An argument is invalid.
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
     standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")
@@ -91,7 +91,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(delays).all()):
         raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, the distance positive")
     if not 1 <= downwash < math.inf:
-        raise ValueError(f"downwash is a number from 1 on, not {downwash}")
+        raise ValueError(f"downwash is {downwash}; it must be a finite number of at least 1")
     starts, goals, standing = (squashed(points, downwash) for points in (starts, goals, standing))
     ground /= downwash
     _check_counts(starts, goals, delays)
@@ -115,7 +115,7 @@ def _check_counts(starts: Array, goals: Array, delays: Array) -> None:
     """Raise `ValueError` if there is not one goal and one delay for each start."""
     if len(goals) != len(starts) or delays.shape != (len(starts),):
         raise ValueError(
-            f"{len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} do not go together"
+            f"the numbers of {len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} differ"
         )
 
 
@@ -124,13 +124,13 @@ def _points(rows: Array, name: str) -> Array:
     if not points.size:
         points = points.reshape(0, 3)
     if points.ndim != 2 or points.shape[1] != 3 or not np.isfinite(points).all():  # noqa: PLR2004 - x, y, z
-        raise ValueError(f"{name} are rows of three finite numbers, not an array of shape {points.shape}")
+        raise ValueError(f"{name} has the shape {points.shape}; it must have rows of three finite numbers")
     return points
 
 
 @dataclass(frozen=True)
 class _ScheduledMove:
-    """A move in the timetable: its positions at each step (S + 1, 3), from the step at which it begins."""
+    """A move in the timetable, with its positions at each step (S + 1, 3)."""
 
     flight: Route
     samples: Array
@@ -146,7 +146,7 @@ class _ScheduledMove:
 
     @cached_property
     def chunks(self) -> Array:
-        """The positions in chunks (C, _CHUNK + 1, 3); each begins where the one before ends; NaN beyond the end."""
+        """The positions in chunks (C, _CHUNK + 1, 3); each begins at the end of the previous one; NaN after the end."""
         count = -(-self.steps // _CHUNK)
         padded = np.full((count * _CHUNK + 1, 3), np.nan)
         padded[: len(self.samples)] = self.samples
@@ -155,7 +155,7 @@ class _ScheduledMove:
 
 
 class _Timetable:
-    """The scheduled moves, and where all drones rest in between."""
+    """The scheduled moves, and the places of all drones between them."""
 
     def __init__(
         self, starts: Array, space: OutdoorSpace | IndoorSpace, limits: MotionLimits, delays: Array, downwash: float
@@ -171,8 +171,8 @@ class _Timetable:
         self._drones = np.empty(0, dtype=np.int64)
         self._latest = 0
         self._corners = np.empty((2, 0, 3))
-        """Of the boxes around all paths: the lowest corners, and the highest."""
-        # Where drones rest: the drone, the point, from which step, to which step.
+        """The lowest and the highest corners of the boxes around all paths."""
+        # The rests of drones: the drone, the point, the first step, and the step of departure.
         self._resting = np.arange(len(starts))
         self._places = starts.copy()
         self._from = np.zeros(len(starts), dtype=np.int64)
@@ -180,7 +180,7 @@ class _Timetable:
         self._last_rest = [*range(len(starts))]
 
     def add(self, move: DroneMove) -> None:
-        """Schedule `move` at the first step at which it is safe, by another lane if that is much sooner."""
+        """Schedule `move` at the first safe step, by another lane if it then arrives much earlier."""
         earliest = max(self._first[move.drone], int(self._from[self._last_rest[move.drone]]))
         entry = self._entry(move.drone, move.path, earliest)
         patience = math.ceil(_PATIENCE_S / self._step)
@@ -223,7 +223,7 @@ class _Timetable:
         self._to = np.append(self._to, _FOREVER)
 
     def _mark_rests(self, taken: Flags, entry: _ScheduledMove) -> None:
-        """Mark the steps at which it would come too near to a drone at rest, on its way or at its end."""
+        """Mark the begins with which the move would pass, or end, too near to a drone at rest."""
         path, samples = entry.flight.path, entry.samples
         near = self._space.near(path[:-1], path[1:], self._places).any(axis=0) & (self._resting != entry.flight.drone)
         for rest in np.flatnonzero(near):
@@ -237,7 +237,7 @@ class _Timetable:
                 taken[: max(0, ends - entry.steps)] = True
 
     def _mark_goal(self, taken: Flags, entry: _ScheduledMove) -> None:
-        """Mark the steps at which it would be at its goal before another drone has passed there."""
+        """Mark the begins with which the drone would be at its goal before another drone has passed it."""
         goal = entry.flight.path[-1:]
         for other in self._near(entry.flight.drone, goal):
             path = other.flight.path
@@ -248,7 +248,7 @@ class _Timetable:
                     taken[: max(0, other.begins + int(near[-1]) + 1 - entry.steps)] = True
 
     def _mark_moves(self, taken: Flags, entry: _ScheduledMove) -> None:
-        """Mark the steps at which it would come too near to a drone that moves at the same time."""
+        """Mark the begins with which the drone would be too near to another moving drone."""
         others = self._near(entry.flight.drone, entry.flight.path)
         if not others:
             return
@@ -263,7 +263,7 @@ class _Timetable:
             taken[steps[steps >= 0]] = True
 
     def _near(self, drone: int, path: Array) -> list[_ScheduledMove]:
-        """Return the other drones' moves that the boxes around the paths do not keep apart."""
+        """Return the other drones' moves whose boxes are too near to the box of `path`."""
         box = np.array([[path.min(axis=0)], [path.max(axis=0)]])
         near = (_box_gaps(box, self._corners)[0] < self._space.least) & (self._drones != drone)
         return [self._entries[number] for number in np.flatnonzero(near)]

@@ -30,7 +30,7 @@ from robochoc.generators.maps.map_team import (
     waypoints_of,
 )
 from robochoc.maps.ground_map import GroundMap
-from robochoc.maps.reachability.line_of_sight import sight_on
+from robochoc.maps.reachability.line_of_sight import lines_of_sight
 from robochoc.maps.reachability.reachability import PLACES, Reachability
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
@@ -64,7 +64,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
     for number, own in enumerate(reachability.seconds, 1):
         if not own:
             raise ValueError(f"robot {number} can get to no cell; take smaller cells, or allow more time")
-    seen = sight_on(reachability.cells).seen(range_m)
+    seen = lines_of_sight(reachability.cells).visible_cells(range_m)
     a_cell = worth_of_a_cell(reachability, seconds)
     most = [max(len(seen[cell]) for cell in own) for own in reachability.seconds]
     gains = (

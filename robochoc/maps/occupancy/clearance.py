@@ -1,7 +1,7 @@
-"""The lattice of points on which a robot of some radius can be, between the pixels of a map that are not free.
+"""Distances from the pixels of a map that are not free, and the lattice of points at which a robot fits.
 
-Whoever makes a team on a map and whoever flies it look for ways on the same lattice. So a way that a team is told of
-can be flown. Points are the centres of pixels; where pixels are large for a robot, those of parts of pixels.
+The generators of teams and the flight search for routes on the same lattice, so that travel times of teams belong to
+routes that can be flown. Points are the centres of pixels; if pixels are large for a robot, those of parts of pixels.
 
 Lengths are in sides of a pixel. Distances are to the borders of pixels, not to their centres.
 """
@@ -13,11 +13,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.maps.occupancy.grid import Counts, Flags, before
+from robochoc.maps.occupancy.grid import Counts, Flags, summed_area
 
 POINTS_MAX = 4_000_000
 _FINE = 4
-"""Points in the radius of a robot, at least, unless they were too many."""
+"""The least number of points along the radius of a robot, unless there would be too many."""
 _PARTS_MAX = 9
 _ROUNDING = 1e-6
 _PORTION = 2_000_000
@@ -26,12 +26,12 @@ _Lengths = npt.NDArray[np.int32]
 _Places = npt.NDArray[np.float64]
 
 
-def parts_of(radius: float, pixels: int) -> int:
-    """Return into how many parts a pixel's side is cut, for robots of a radius on a map of so many pixels.
+def parts_per_pixel(radius: float, pixels: int) -> int:
+    """Return the number of parts of a pixel's side, for robots of a radius on a map of `pixels` pixels.
 
-    It is odd: then the centres of pixels are points of the lattice, however fine that is.
+    It is odd: then the centres of pixels are points of the lattice.
     """
-    # Rounding must not decide: the same radius in metres and in other units has to make the same lattice.
+    # Rounding must not decide: the same radius in metres and in other units has to give the same lattice.
     wanted = min(_FINE / max(radius, _ROUNDING) - _ROUNDING, _PARTS_MAX)
     parts = 2 * math.ceil((max(wanted, 1) - 1) / 2) + 1
     while parts > 1 and pixels * parts * parts > POINTS_MAX:
@@ -42,24 +42,24 @@ def parts_of(radius: float, pixels: int) -> int:
 def open_points(solid: Flags, keep: float, parts: int) -> Flags:
     """Return the points of a lattice at which a robot keeps a distance from solid pixels and from the outside.
 
-    It keeps it on the straight line to a neighbouring point, too: half way walls may be nearer than at both ends, by no
-    more than a single corner. A larger `keep` makes a subset.
+    It also keeps the distance on the straight line to a neighbouring point: half way, walls may be nearer than at both
+    ends by at most a single corner. A larger `keep` gives a subset.
 
     Args:
         solid: The pixels that are not free, by rows.
         keep: The distance.
-        parts: Into how many parts a pixel's side is cut: each pixel has as many rows and columns of points.
+        parts: The number of parts of a pixel's side, that is of rows and of columns of points in a pixel.
     """
     square = (keep * parts) ** 2 + solid.ndim / 4
-    flags: Flags = quarters(solid, parts, math.ceil(math.sqrt(square)) + 1) >= 4 * square
+    flags: Flags = quadruple_squares(solid, parts, math.ceil(math.sqrt(square)) + 1) >= 4 * square
     return flags
 
 
-def quarters(solid: Flags, parts: int, reach: int) -> _Lengths:
-    """Return four times the squares of the distances of points from the borders of all that is solid, or outside.
+def quadruple_squares(solid: Flags, parts: int, reach: int) -> _Lengths:
+    """Return four times the squared distances of points from the borders of solid pixels, and from the outside.
 
-    Each side is cut into `parts`, whose centres are the points; lengths are in parts. Of what is further than `reach`
-    only that is known. Squares are added up axis by axis.
+    Each side has `parts` parts, whose centres are the points; lengths are in parts. Distances are limited to `reach`.
+    Squares are added up axis by axis.
     """
     fine = np.pad(solid, 1, constant_values=True)
     for axis in range(solid.ndim):
@@ -76,14 +76,14 @@ def quarters(solid: Flags, parts: int, reach: int) -> _Lengths:
 
 
 def clearances(solid: Flags, places: _Places, most: float) -> _Places:
-    """Return the distance (K,) of each of `places` (K, 2) from the nearest solid pixel; `most` where it is further.
+    """Return the distance (K,) of each of `places` (K, 2) from the nearest solid pixel, at most `most`.
 
-    Places are an x and a y from the lower left corner on. Outside of the map the distance is 0.
+    Places are an x and a y from the lower left corner. Outside of the map the distance is 0.
     """
     found = np.full(len(places), most)
     reach = math.ceil(most) + 1
     padded = np.pad(solid, reach, constant_values=True)
-    counts: Counts = before(padded)
+    counts: Counts = summed_area(padded)
     pixels = np.floor(places).astype(np.int64)
     rows, columns = solid.shape
     inside = ((pixels >= 0) & (pixels < (columns, rows))).all(axis=1)

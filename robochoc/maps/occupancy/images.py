@@ -1,7 +1,7 @@
-"""Images of maps, as map_saver writes them: PGM, PNG and BMP.
+"""Images of maps, as written by map_saver: PGM, PNG and BMP.
 
-map_server takes the mean of a pixel's channels. Here a pixel is their sum, and white is the sum of a white pixel's: so
-nothing is rounded.
+map_server uses the mean of a pixel's channels. Here a pixel is their sum, and white the sum of the channels of a white
+pixel, so that nothing is rounded.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ class Image:
 
     Attributes:
         pixels: The sum of each pixel's channels, rows from the top.
-        white: That sum of a white pixel. 0 is black.
-        opaque: Which pixels are opaque. None: all of them.
+        white: The sum for a white pixel. 0 is black.
+        opaque: Which pixels are opaque. None: all.
     """
 
     pixels: Pixels
@@ -43,46 +43,46 @@ class Image:
 
 
 def is_image(content: bytes) -> bool:
-    """Return whether a file begins as an image does that is read."""
+    """Return whether the content of a file is an image in a supported format."""
     return content.startswith((*_PGM, *_OTHERS))
 
 
 def read_image(content: bytes, *, adds_alpha: bool) -> Image:
-    """Return the image that a file has.
+    """Return the image in a file.
 
     Args:
-        content: What the file has.
-        adds_alpha: Alpha is one channel more, as in map_server's mode trinary.
+        content: The content of the file.
+        adds_alpha: Whether alpha counts as a channel, as in map_server's mode trinary.
 
     Raises:
-        MistakeError: It is no image in one of the formats, is broken, or has more than `MAX_PIXELS`.
+        MistakeError: The image has another format, is damaged, or has more than `MAX_PIXELS`.
     """
     if content[:2] in _PGM:
         return Image(*read_pgm(content))
     for magic, name in _OTHERS.items():
         if content.startswith(magic):
             return _read_other(content, name, adds_alpha=adds_alpha)
-    raise MistakeError("is no PGM, PNG or BMP image", "convert it to one of these, which map_saver writes")
+    raise MistakeError("is not a PGM, PNG or BMP image", "convert it to one of these, as written by map_saver")
 
 
 def _read_other(content: bytes, name: str, *, adds_alpha: bool) -> Image:
-    """Return an image that Pillow decodes. Its size is looked at before its pixels."""
+    """Return an image that Pillow decodes. Its size is checked before its pixels are decoded."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Pillow's own bound on pixels is above ours
+            warnings.simplefilter("ignore")  # Pillow's limit of pixels is above ours
             with Pillow.open(io.BytesIO(content), formats=(name,)) as opened:
                 width, height = opened.size
                 if width * height > MAX_PIXELS or min(width, height) < 1:
                     raise MistakeError(
-                        f"has {width} x {height} pixels", f"at most {MAX_PIXELS:,} are read; take a coarser map"
+                        f"has {width} x {height} pixels", f"at most {MAX_PIXELS:,} are read; use a coarser map"
                     )
                 return _summed(opened, adds_alpha=adds_alpha)
     except Pillow.DecompressionBombError:
-        hint = f"at most {MAX_PIXELS:,} are read; take a coarser map"
+        hint = f"at most {MAX_PIXELS:,} are read; use a coarser map"
         raise MistakeError("has too many pixels", hint) from None
     except (*_BROKEN, zlib.error) as error:
-        told = "" if isinstance(error, UnidentifiedImageError) else f": {shortened(str(error))}"
-        raise MistakeError(f"is a broken {name} image{told}", "the image is not complete, or damaged") from None
+        reason = "" if isinstance(error, UnidentifiedImageError) else f": {shortened(str(error))}"
+        raise MistakeError(f"is a damaged {name} image{reason}", "the image is incomplete or damaged") from None
 
 
 def _summed(opened: Pillow.Image, *, adds_alpha: bool) -> Image:
@@ -102,7 +102,7 @@ def _summed(opened: Pillow.Image, *, adds_alpha: bool) -> Image:
 
 
 def _wide(opened: Pillow.Image) -> Image:
-    """Return an image whose shades of grey have two bytes."""
+    """Return an image with shades of grey of two bytes."""
     pixels = np.asarray(opened).astype(np.int64)
     if not 0 <= pixels.min() <= pixels.max() <= _WIDE:
         raise MistakeError("has shades of grey of more than two bytes", "convert it to one byte a pixel")

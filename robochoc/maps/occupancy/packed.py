@@ -1,4 +1,4 @@
-"""Flags of pixels, or voxels, as bytes: eight a byte, the first one highest, row by row without gaps."""
+"""Flags of pixels, or voxels, as bytes: eight in a byte, the first in the highest bit, row by row without gaps."""
 
 from __future__ import annotations
 
@@ -15,6 +15,6 @@ def packed(flags: Flags) -> bytes:
 
 
 def unpacked(content: bytes, *shape: int) -> Flags:
-    """Return the flags in bytes, of which there are enough, as an array of a shape."""
+    """Return the flags in `content`, which is long enough, as an array of a shape."""
     bits = np.unpackbits(np.frombuffer(content, dtype=np.uint8), count=math.prod(shape))
     return bits.reshape(shape).astype(bool)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from robochoc.formats.diagnostics import MistakeError, shortened
 
 MAX_PIXELS = 4_000_000
-"""As many as 2,000 x 2,000."""
+"""The maximum number of pixels, 2,000 x 2,000."""
 MAX_BYTES = 32 * 1024 * 1024
 """The maximum size of a file: a plain image has up to six characters for a pixel."""
 _WHITE_MAX = 65_535
@@ -32,11 +32,11 @@ def read_pgm(content: bytes) -> tuple[Pixels, int]:
     """Return the pixels of an image, rows from the top, and the value that is white; 0 is black.
 
     Raises:
-        MistakeError: It is no such image, or a larger one than `MAX_PIXELS`.
+        MistakeError: The content is not a valid PGM image, or has more than `MAX_PIXELS`.
     """
     magic = content[:2]
     if magic not in {b"P2", b"P5"}:
-        raise MistakeError("is no PGM image", "it begins with P2 or P5; other images can be converted to PGM")
+        raise MistakeError("is not a PGM image", "a PGM image begins with P2 or P5; convert other images to PGM")
     place = len(magic)
     header = content[:_HEADER_MAX]
     numbers = []
@@ -48,42 +48,42 @@ def read_pgm(content: bytes) -> tuple[Pixels, int]:
         place = found.end()
     width, height, white = numbers
     if width * height > MAX_PIXELS:
-        raise MistakeError(f"has {width} x {height} pixels", f"at most {MAX_PIXELS:,} are read; take a coarser map")
+        raise MistakeError(f"has {width} x {height} pixels", f"at most {MAX_PIXELS:,} are read; use a coarser map")
     read = _plain if magic == b"P2" else _raw
     pixels = read(content, place, width * height, white)
     if int(pixels.max()) > white:
-        raise MistakeError(f"has a pixel of {int(pixels.max())}", f"white is {white}, and no pixel is more")
+        raise MistakeError(f"has a pixel of {int(pixels.max())}", f"white, the largest value, is {white}")
     return pixels.reshape(height, width), white
 
 
 def _raw(content: bytes, place: int, count: int, white: int) -> Pixels:
-    """Return the pixels that begin behind one blank: a byte each, or two where white is more than one byte."""
+    """Return the pixels after one blank: a byte each, or two if white needs two bytes."""
     size = 1 if white <= _ONE_BYTE else 2
     end = place + 1 + count * size
     raster = content[place + 1 : end]
     if len(raster) < count * size:
-        raise MistakeError(f"ends after {len(raster) // size} of {count} pixels", "the image is not complete")
-    _refuse_more(content[end:], count)
+        raise MistakeError(f"ends after {len(raster) // size} of {count} pixels", "the image is incomplete")
+    _check_end(content[end:], count)
     return np.frombuffer(raster, dtype=np.dtype(f">u{size}")).astype(np.int64)
 
 
 def _plain(content: bytes, place: int, count: int, white: int) -> Pixels:
-    """Return the pixels that are numbers with blanks between them."""
+    """Return the pixels, given as numbers separated by blanks."""
     words = _COMMENT.sub(b"", content[place:]).split(None, count)
     if len(words) < count:
-        raise MistakeError(f"ends after {len(words)} of {count} pixels", "the image is not complete")
-    _refuse_more(b"".join(words[count:]), count)
+        raise MistakeError(f"ends after {len(words)} of {count} pixels", "the image is incomplete")
+    _check_end(b"".join(words[count:]), count)
     del words[count:]
     return np.fromiter((_number(word, "pixel", 0, white) for word in words), np.int64, count)
 
 
-def _refuse_more(content: bytes, count: int) -> None:
+def _check_end(content: bytes, count: int) -> None:
     if content.strip():
         raise MistakeError(f"has data after its {count} pixels", "one file has one image: check the width and height")
 
 
 def _number(word: bytes, what: str, least: int, most: int) -> int:
     if not word.isdigit() or len(word) > len(str(MAX_PIXELS)) or not least <= int(word) <= most:
-        told = shortened(word.decode("ascii", "replace"))
-        raise MistakeError(f"has the {what} '{told}'", f"expected a number from {least} to {most}")
+        text = shortened(word.decode("ascii", "replace"))
+        raise MistakeError(f"has the {what} '{text}'", f"expected a number from {least} to {most}")
     return int(word)

@@ -1,18 +1,18 @@
-"""The leaves of OctoMap's octrees, as its files `.bt` and `.ot` have them.
+"""Reads the leaves of OctoMap's octrees from files `.bt` and `.ot`.
 
 OctoMap: Hornung, Wurm, Bennewitz, Stachniss and Burgard, "OctoMap: an efficient probabilistic 3D mapping framework
-based on octrees", Autonomous Robots 34 (2013). An octree of 16 levels is over the cube of 65,536 voxels a side, whose
-middle is the origin of the frame. A file has a header of text, and the nodes in depth-first order:
+based on octrees", Autonomous Robots 34 (2013). An octree of 16 levels covers the cube of 65,536 voxels a side, whose
+middle is the origin of the frame. A file has a text header, and the nodes in depth-first order:
 
-- `.bt`: two bytes for each inner node, two bits for each of its eight children: 1 is a free leaf, 2 an occupied one, 3
-  an inner node, and 0 is not known.
+- `.bt`: two bytes for each inner node, with two bits for each of its eight children: 1 for a free leaf, 2 for an
+  occupied leaf, 3 for an inner node, and 0 for unknown.
 - `.ot`: for each node the logarithm of its odds as a float, in trees with colours three bytes for the colour, and a
-  byte with a bit for each child that there is. A leaf is occupied from even odds on, as OctoMap has it by default.
+  byte with a bit for each existing child. A leaf is occupied from even odds on, which is OctoMap's default.
 
-The bits 0, 1 and 2 of a child's number say whether it lies in the upper half along x, y and z.
+The bits 0, 1 and 2 of a child's number are set if it lies in the upper half along x, y and z.
 
-Nodes are not walked one by one. Where a subtree ends follows from how many children are still to come before each node
-(the Lukasiewicz path of the tree), by one sorting; then each level of the tree is read at once.
+Nodes are not visited one by one. The end of each subtree follows from the number of outstanding children before each
+node (the Lukasiewicz path of the tree), by one sort; then each level of the tree is read at once.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ DEPTH = 16
 """Levels below the root. A leaf of the last one is a voxel."""
 MAX_BYTES = 32 * 1024 * 1024
 MAX_NODES = 4_000_000
-"""The maximum of nodes that a file stores: with `.bt` these are the inner ones."""
+"""The maximum number of nodes stored in a file; in `.bt` files these are inner nodes."""
 _BINARY, _FULL = b"# Octomap OcTree binary file", b"# Octomap OcTree file"
 _HEADER_MAX = 64 * 1024
 _SIDE_MIN_M, _SIDE_MAX_M = Fraction(1, 1000), Fraction(100)
@@ -39,12 +39,12 @@ _KEYS = ("id", "size", "res")
 _NUMBER = re.compile(r"[0-9]{1,20}(?:\.[0-9]{1,30})?(?:e[+-]?[0-9]{1,2})?")
 _COUNT = re.compile(r"[0-9]{1,10}")
 _BYTES_OF_NODE = {"OcTree": 5, "1": 5, "OcTreeStamped": 5, "ColorOcTree": 8}
-"""The types of trees that say what is occupied, and the bytes of a node in `.ot`."""
+"""The supported types of trees, and the bytes of a node in `.ot`."""
 _FREE, _OCCUPIED, _INNER = 1, 2, 3
 
 Integers = npt.NDArray[np.int64]
 Corners = npt.NDArray[np.uint16]
-"""Places in the tree, which has no more than 2 ** 16 along each axis: there may be millions of them."""
+"""Places in the tree, at most 2 ** 16 along each axis; two bytes each, since there may be millions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +52,9 @@ class Leaves:
     """Leaves of one size. A side has 2 ** `exponent` voxels.
 
     Attributes:
-        exponent: The size.
-        corners: The lowest corner of each leaf, x, y and z in sides of a leaf from the lowest corner of the tree.
-        occupied: Which are occupied. The others are free.
+        exponent: The binary logarithm of the side, in voxels.
+        corners: The lowest corner of each leaf: x, y and z, in sides of a leaf from the lowest corner of the tree.
+        occupied: Which leaves are occupied. The others are free.
     """
 
     exponent: int
@@ -64,14 +64,14 @@ class Leaves:
 
 @dataclass(frozen=True, eq=False)
 class Octree:
-    """An octree: the side of a voxel in metres, and the leaves that are known, largest first."""
+    """An octree: the side of a voxel in metres, and the known leaves, largest first."""
 
     resolution: Fraction
     leaves: tuple[Leaves, ...]
 
 
 def is_octomap(begin: bytes) -> bool:
-    """Return whether a file that begins so is one of OctoMap's."""
+    """Return whether a file with this beginning is an OctoMap."""
     return begin.startswith((_BINARY, _FULL))
 
 
@@ -79,20 +79,20 @@ def read_octree(content: bytes) -> Octree:
     """Return the octree of a file.
 
     Raises:
-        MistakeError: It is no such file, is not complete, or has more than `MAX_NODES`.
+        MistakeError: The content is not a valid OctoMap, is incomplete, or has more than `MAX_NODES`.
     """
     header = _Header(content)
     if not header.size:
-        _refuse_more(content, header.end)
+        _check_end(content, header.end)
         return Octree(header.resolution, ())
     nodes = _BinaryNodes(content, header) if content.startswith(_BINARY) else _FullNodes(content, header)
     found = Octree(header.resolution, tuple(nodes.leaves()))
-    _refuse_more(content, nodes.end)
+    _check_end(content, nodes.end)
     return found
 
 
-def _refuse_more(content: bytes, end: int) -> None:
-    """Raise `MistakeError` for anything but blanks behind the last node."""
+def _check_end(content: bytes, end: int) -> None:
+    """Raise `MistakeError` for anything but blanks after the last node."""
     if content[end:].strip():
         raise MistakeError(f"has {len(content) - end:,} bytes after its last node", "the file is damaged")
 
@@ -102,14 +102,14 @@ class _Header:
 
     def __init__(self, content: bytes) -> None:
         if not is_octomap(content):
-            raise MistakeError("is no OctoMap file", f"it begins with '{_BINARY.decode()}' or '{_FULL.decode()}'")
+            raise MistakeError("is not an OctoMap file", f"it begins with '{_BINARY.decode()}' or '{_FULL.decode()}'")
         found: dict[str, tuple[int, str]] = {}
         self.end = number = 0
         while True:
             number += 1
             end = content.find(b"\n", self.end, _HEADER_MAX)
             if end < 0:
-                raise MistakeError("has a header without end", "a line 'data' ends it, and the nodes follow", number)
+                raise MistakeError("has a header without end", "the line 'data' ends it, before the nodes", number)
             line = content[self.end : end].decode("ascii", "replace").split(None, 1)
             self.end = end + 1
             if line == ["data"]:
@@ -126,7 +126,7 @@ class _Header:
                 found[line[0]] = (number, line[1].strip() if len(line) > 1 else "")
         for key in _KEYS:
             if key not in found:
-                raise MistakeError(f"has no {key} in its header", "it has the lines id, size, res and data", number)
+                raise MistakeError(f"has no {key} in its header", "it needs the lines id, size, res and data", number)
         self.type = self._type(*found["id"])
         self.size = self._size(*found["size"])
         self.resolution = self._number("res", *found["res"], _SIDE_MIN_M, _SIDE_MAX_M)
@@ -134,14 +134,14 @@ class _Header:
     @staticmethod
     def _type(line: int, name: str) -> str:
         if name not in _BYTES_OF_NODE:
-            hint = "read are OcTree, ColorOcTree and OcTreeStamped"
+            hint = "supported are OcTree, ColorOcTree and OcTreeStamped"
             raise MistakeError(f"has a tree of the type {shortened(name)}", hint, line)
         return name
 
     @staticmethod
     def _size(line: int, text: str) -> int:
         if not _COUNT.fullmatch(text):
-            raise MistakeError("has a wrong size", "expected the number of nodes", line)
+            raise MistakeError("has an invalid size", "expected the number of nodes", line)
         return int(text)
 
     @staticmethod
@@ -149,7 +149,7 @@ class _Header:
         if _NUMBER.fullmatch(text) and least <= Fraction(text) <= most:
             return Fraction(text)
         expected = f"expected a number from {float(least):g} to {float(most):g}"
-        raise MistakeError(f"has a wrong {key}", expected, line)
+        raise MistakeError(f"has an invalid {key}", expected, line)
 
 
 class _Nodes:
@@ -158,29 +158,29 @@ class _Nodes:
     Args:
         begin: The byte at which they begin.
         size: The bytes of a node.
-        children: For each node that the file could have, the number of its children that the file has, too.
+        children: For each possible node of the file, the number of its children that are also stored.
     """
 
     def __init__(self, begin: int, size: int, children: Integers) -> None:
         self._begin, self._size = begin, size
-        left = np.cumsum(children - 1) + 1  # nodes that are still to come, behind each
+        left = np.cumsum(children - 1) + 1  # outstanding nodes after each
         ends = np.flatnonzero(left == 0)
         if not ends.size:
             known = f"ends after {len(children):,} nodes"
             if len(children) >= MAX_NODES:
-                raise MistakeError(f"has more than {MAX_NODES:,} nodes", "take a coarser map")
-            raise MistakeError(f"{known}, and has more", "the file is not complete")
+                raise MistakeError(f"has more than {MAX_NODES:,} nodes", "use a coarser map")
+            raise MistakeError(f"{known}, but the tree has more", "the file is incomplete")
         self.count = int(ends[0]) + 1
         self.children = children[: self.count]
         self._end = self._ends(left)
 
     @property
     def end(self) -> int:
-        """Return the byte behind the last node."""
+        """The byte after the last node."""
         return self._begin + self.count * self._size
 
     def _ends(self, left: Integers) -> Integers:
-        """Return for each node the one behind its subtree: the first one before which fewer nodes are to come."""
+        """Return for each node the one after its subtree: the first with fewer outstanding nodes before it."""
         count = self.count
         before = np.concatenate(([1], left[:count]))
         keys = before * (count + 1) + np.arange(count + 1)
@@ -189,15 +189,15 @@ class _Nodes:
         return found
 
     def place(self, node: int) -> str:
-        """Return where a node stands in the file."""
+        """Return the position of a node in the file, as text."""
         return f"byte {self._begin + node * self._size}"
 
-    def behind(self, nodes: Integers) -> Integers:
-        """Return the nodes behind subtrees."""
+    def after_subtree(self, nodes: Integers) -> Integers:
+        """Return the nodes after the subtrees of `nodes`."""
         return self._end[nodes]
 
     def check_depth(self, exponent: int, nodes: Integers) -> None:
-        """Raise `MistakeError` where there are inner nodes below the last level."""
+        """Raise `MistakeError` if there are inner nodes below the last level."""
         if exponent < 1 and nodes.size:
             raise MistakeError(f"has a node below level {DEPTH} at {self.place(int(nodes[0]))}", "the file is damaged")
 
@@ -228,10 +228,10 @@ class _BinaryNodes(_Nodes):
             inner: list[tuple[Integers, Integers]] = []
             known: list[tuple[Corners, npt.NDArray[np.bool_]]] = []
             for child in range(8):
-                kinds, places = self._kind(words, child), _below(corners, child)
+                kinds, places = self._kind(words, child), _child_corners(corners, child)
                 deeper, leaf = kinds == _INNER, (kinds == _FREE) | (kinds == _OCCUPIED)
                 inner.append((following[deeper], places[deeper]))
-                following[deeper] = self.behind(following[deeper])
+                following[deeper] = self.after_subtree(following[deeper])
                 known.append((places[leaf].astype(np.uint16), kinds[leaf] == _OCCUPIED))
             nodes, corners = (np.concatenate(parts) for parts in zip(*inner, strict=True))
             leaves, occupied = (np.concatenate(parts) for parts in zip(*known, strict=True))
@@ -246,7 +246,7 @@ class _BinaryNodes(_Nodes):
 
 
 class _FullNodes(_Nodes):
-    """The nodes of a file `.ot`, leaves among them."""
+    """The nodes of a file `.ot`, including leaves."""
 
     def __init__(self, content: bytes, header: _Header) -> None:
         size = _BYTES_OF_NODE[header.type]
@@ -258,7 +258,7 @@ class _FullNodes(_Nodes):
         self._expected = header.size
 
     def leaves(self) -> Iterator[Leaves]:
-        """Yield the known leaves, level by level. A leaf whose odds are no number is not known."""
+        """Yield the known leaves, level by level. A leaf whose odds are nan is unknown."""
         nodes, corners = np.zeros(1, dtype=np.int64), np.zeros((1, 3), dtype=np.int64)
         exponent = DEPTH
         while nodes.size:
@@ -272,18 +272,18 @@ class _FullNodes(_Nodes):
             inner: list[tuple[Integers, Integers]] = []
             for child in range(8):
                 there = (self._bits[nodes] >> child) & 1 == 1
-                inner.append((following[there], _below(corners, child)[there]))
-                following[there] = self.behind(following[there])
+                inner.append((following[there], _child_corners(corners, child)[there]))
+                following[there] = self.after_subtree(following[there])
             nodes, corners = (np.concatenate(parts) for parts in zip(*inner, strict=True))
         if self.count != self._expected:
             raise _other_count(self.count, self._expected)
 
 
 def _other_count(found: int, expected: int) -> MistakeError:
-    return MistakeError(f"has {found:,} nodes, and its header says {expected:,}", "the file is damaged")
+    return MistakeError(f"has {found:,} nodes, but its header states {expected:,}", "the file is damaged")
 
 
-def _below(corners: Integers, child: int) -> Integers:
-    """Return the corners of children with a number, in sides of a child."""
+def _child_corners(corners: Integers, child: int) -> Integers:
+    """Return the corners of the children with a given number, in sides of a child."""
     upper: Integers = np.array([child & 1, child >> 1 & 1, child >> 2 & 1], dtype=np.int64)
     return 2 * corners + upper

@@ -1,4 +1,4 @@
-"""Voxels of three-dimensional maps: which are free, which are occupied, and which nobody knows."""
+"""Voxels of three-dimensional maps: free, occupied and unknown ones."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.formats.diagnostics import MistakeError
-from robochoc.maps.map_content import content_of, told
+from robochoc.maps.file_content import as_input_errors, read_content
 from robochoc.maps.occupancy.grid import Flags
 from robochoc.maps.octomap.octree import DEPTH, MAX_BYTES, Corners, Integers, Leaves, Octree, read_octree
 
 MAX_VOXELS = 16_000_000
-"""The maximum number of voxels around all that is free. A larger map is read coarser."""
+"""The maximum number of voxels around all free space. A larger map is read with larger voxels."""
 _FREE, _OCCUPIED = 1, 2
 
 Corner = tuple[Fraction, Fraction, Fraction]
@@ -28,14 +28,14 @@ Sums = npt.NDArray[np.int32]
 
 @dataclass(frozen=True, eq=False)
 class VoxelGrid:
-    """A three-dimensional map, as far as anything in it is free, and a voxel further. Lengths are in metres.
+    """A three-dimensional map, cut to its free space and one more voxel on each side. Lengths are in metres.
 
     Attributes:
         name: The name of its file, without the ending.
         resolution: The side of a voxel.
         origin: The x, y and z of the lowest corner.
         free: Which voxels are free: by z, then y, then x, each from the lowest on.
-        occupied: Which are occupied. A voxel that is neither is not known.
+        occupied: Which voxels are occupied. A voxel that is neither free nor occupied is unknown.
     """
 
     name: str
@@ -45,37 +45,37 @@ class VoxelGrid:
     occupied: Flags
 
     @cached_property
-    def free_before(self) -> Sums:
-        """For each corner of a voxel, how many voxels with a smaller x, y and z are free (a summed-volume table)."""
-        return _before(self.free)
+    def free_sums(self) -> Sums:
+        """For each corner of a voxel, the number of free voxels with a smaller x, y and z (a summed-volume table)."""
+        return _summed_volume(self.free)
 
     @cached_property
-    def occupied_before(self) -> Sums:
-        """The same of occupied voxels."""
-        return _before(self.occupied)
+    def occupied_sums(self) -> Sums:
+        """For each corner of a voxel, the number of occupied voxels with a smaller x, y and z."""
+        return _summed_volume(self.occupied)
 
     def in_voxels(self, place: tuple[Fraction, ...]) -> Corner:
-        """Return where a place lies, in voxels from the lowest corner."""
+        """Return a place in voxels from the lowest corner."""
         x, y, z = ((part - corner) / self.resolution for part, corner in zip(place, self.origin, strict=True))
         return x, y, z
 
 
 def read_voxels(path: Path) -> VoxelGrid:
-    """Return the map in one of OctoMap's files.
+    """Return the map in an OctoMap file.
 
-    Where that has more than `MAX_VOXELS`, its voxels are joined, eight by eight: one is free if all of it is free, and
-    occupied if any of it is.
+    If it has more than `MAX_VOXELS`, its voxels are joined, eight by eight: the result is free if all parts are free,
+    and occupied if any part is.
 
     Raises:
-        InvalidInputError: The file cannot be read, is no such file, is too large, or has nothing that is free.
+        InvalidInputError: The file cannot be read, is not valid, is too large, or has no free voxel.
     """
-    with told(path):
-        return _voxels(path.stem, read_octree(content_of(path, MAX_BYTES)))
+    with as_input_errors(path):
+        return _voxels(path.stem, read_octree(read_content(path, MAX_BYTES)))
 
 
 def _voxels(name: str, tree: Octree) -> VoxelGrid:
     if all(leaves.occupied.all() for leaves in tree.leaves):
-        raise MistakeError("has no free voxel", "free space has to be mapped, too, as OctoMap does along its rays")
+        raise MistakeError("has no free voxel", "map the free space as well, as OctoMap does along its rays")
     exponent = 0
     while True:
         low, high = _around_free(tree.leaves, exponent)
@@ -91,7 +91,7 @@ def _voxels(name: str, tree: Octree) -> VoxelGrid:
 
 
 def _around_free(leaves: Sequence[Leaves], exponent: int) -> tuple[Integers, Integers]:
-    """Return the first voxel around all that is free along x, y and z, and the one behind the last."""
+    """Return the first voxel around all free space along x, y and z, and the one after the last."""
     lows, highs = [], []
     for some in leaves:
         corners = some.corners[~some.occupied]
@@ -104,9 +104,9 @@ def _around_free(leaves: Sequence[Leaves], exponent: int) -> tuple[Integers, Int
 
 
 def _states(leaves: Sequence[Leaves], exponent: int, low: Integers, high: Integers) -> States:
-    """Return which voxels are free and which are occupied, by z, y and x.
+    """Return the states of voxels (free, occupied or unknown), by z, y and x.
 
-    It begins with the whole tree as one voxel. They are halved until they have the size that is asked for.
+    The whole tree is the first voxel; the sides of voxels are halved until they have the required size.
     """
     by_size = {some.exponent: some for some in leaves}
     states = np.zeros((1, 1, 1), dtype=np.uint8)
@@ -124,12 +124,12 @@ def _states(leaves: Sequence[Leaves], exponent: int, low: Integers, high: Intege
             inside = ((some.corners >= begin) & (some.corners < end)).all(axis=1)
             states[_places(some.corners[inside], begin)] = np.where(some.occupied[inside], _OCCUPIED, _FREE)
     if exponent:
-        _join([some for some in leaves if some.exponent < exponent], exponent, states, low, high)
+        _merge_small_leaves([some for some in leaves if some.exponent < exponent], exponent, states, low, high)
     return states
 
 
-def _join(leaves: Sequence[Leaves], exponent: int, states: States, low: Integers, high: Integers) -> None:
-    """Write into the states what leaves that are smaller than a voxel make of it."""
+def _merge_small_leaves(leaves: Sequence[Leaves], exponent: int, states: States, low: Integers, high: Integers) -> None:
+    """Set the states of voxels that consist of smaller leaves."""
     free = np.zeros(states.size, dtype=np.int64)
     """The free part of each voxel."""
     for some in leaves:
@@ -143,12 +143,12 @@ def _join(leaves: Sequence[Leaves], exponent: int, states: States, low: Integers
 
 
 def _places(corners: Corners, first: Integers) -> tuple[Sums, Sums, Sums]:
-    """Return the places of voxels in an array by z, y and x that begins with a first one."""
+    """Return the indices of voxels in an array by z, y and x whose first voxel is `first`."""
     z, y, x = (corners[:, axis].astype(np.int32) - np.int32(first[axis]) for axis in (2, 1, 0))
     return z, y, x
 
 
-def _before(flags: Flags) -> Sums:
+def _summed_volume(flags: Flags) -> Sums:
     sums = np.pad(flags, ((1, 0),) * 3).astype(np.int32)
     for axis in range(3):
         np.cumsum(sums, axis=axis, out=sums)

@@ -1,4 +1,4 @@
-"""The cells of a map for robots of a radius: with a given side, or as small as their maximum number allows."""
+"""Divides a map into cells for robots of a radius: with a given side, or the smallest side for a maximum number."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ AnyCells: TypeAlias = Cells | Cubes
 
 
 def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = None) -> AnyCells:
-    """Return the cells of a map for robots of a radius, at most so many free ones.
+    """Return the cells of a map for robots of a radius, with a maximum number of free cells.
 
     Args:
         grid: The map.
         radius: The robots' radius in metres.
         most: The maximum number of free cells.
-        side: The side of a cell. None: the smallest multiple of a pixel's side that makes no more free cells than that.
+        side: The side of a cell. None: the smallest multiple of a pixel's side with at most `most` free cells.
 
     Raises:
-        ValueError: if there is no free cell, or there are too many.
+        ValueError: There is no free cell, or there are too many.
     """
-    sized = _sized(grid, radius)
+    sized = _cell_factory(grid, radius)
     if side is not None:
-        return _checked(sized(side), most)
+        return _check_cells(sized(side), most)
     step, more = 1, 0
     while True:
         cells = sized(step * grid.resolution)
@@ -46,13 +46,13 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
             more = len(cells.free)
         step += 1
     if more and not cells.free:
-        raise ValueError(f"no cell of {float(cells.side):g} m is free, and {more:,} smaller ones are; allow more cells")
-    return _checked(cells, most)
+        raise ValueError(f"no cell of {float(cells.side):g} m is free, but {more:,} smaller ones are; allow more cells")
+    return _check_cells(cells, most)
 
 
-def _sized(grid: Map, radius: Fraction) -> Callable[[Fraction], AnyCells]:
-    """Return what makes the cells of a map, by their side. Raises `ValueError` where a robot fits nowhere."""
-    nowhere = f"is free for a robot of the radius {float(radius):g} m; take a smaller radius"
+def _cell_factory(grid: Map, radius: Fraction) -> Callable[[Fraction], AnyCells]:
+    """Return a function from the side of cells to the cells of a map. Raises `ValueError` if a robot fits nowhere."""
+    nowhere = f"is free for a robot of the radius {float(radius):g} m; use a smaller radius"
     if isinstance(grid, OccupancyGrid):
         space = free_space(grid.free, in_pixels(radius, grid.resolution))
         if not space.points.any():
@@ -64,32 +64,34 @@ def _sized(grid: Map, radius: Fraction) -> Callable[[Fraction], AnyCells]:
     return lambda side: Cubes(grid, side, fits)
 
 
-def _checked(cells: AnyCells, most: int) -> AnyCells:
+def _check_cells(cells: AnyCells, most: int) -> AnyCells:
     side = f"{float(cells.side):g} m"
     if max(cells.counts) > MAX_SIDE:
-        told = ", ".join(
+        counts = ", ".join(
             f"{count} {what}" for count, what in zip(cells.counts, ("columns", "rows", "levels"), strict=False)
         )
-        raise ValueError(f"cells of {side} make {' and '.join(told.rsplit(', ', 1))}; {MAX_SIDE} are allowed")
+        raise ValueError(f"cells of {side} make {' and '.join(counts.rsplit(', ', 1))}; at most {MAX_SIDE} are allowed")
     if len(cells.free) > most:
-        raise ValueError(f"{len(cells.free):,} cells of {side} are free, more than {most}: take larger cells, or more")
+        raise ValueError(
+            f"{len(cells.free):,} cells of {side} are free, more than {most}: use larger cells, or allow more of them"
+        )
     if not cells.free:
-        raise ValueError(f"no cell of {side} is free: take smaller cells, or a smaller radius")
+        raise ValueError(f"no cell of {side} is free: use smaller cells, or a smaller radius")
     return cells
 
 
 def in_pixels(radius: Fraction, resolution: Fraction) -> Fraction:
-    """Return a radius in sides of a pixel. Raises `ValueError` if it has more than `MAX_RADIUS`."""
+    """Return a radius in sides of a pixel. Raises `ValueError` if it is more than `MAX_RADIUS`."""
     if radius > MAX_RADIUS * resolution:
         raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
     return radius / resolution
 
 
 def passable(free: Flags, resolution: Fraction, radius: Fraction) -> Flags:
-    """Return the pixels where the centre of a robot can be: no pixel that is not free is nearer than its radius.
+    """Return the pixels at which the centre of a robot can be: all pixels within its radius are free.
 
-    Obstacles are inflated, as costmap_2d does with the inscribed radius. Distances are between centres of pixels.
-    The outside of the map is not free. Squares of distances are added up axis by axis, as far as they matter.
+    Obstacles are inflated, as by costmap_2d with the inscribed radius. Distances are between centres of pixels.
+    The outside of the map is not free. Squares of distances are added up axis by axis, up to the radius.
 
     Args:
         free: Which pixels are free, in an array of two dimensions or three.
@@ -97,7 +99,7 @@ def passable(free: Flags, resolution: Fraction, radius: Fraction) -> Flags:
         radius: The radius in metres.
 
     Raises:
-        ValueError: if the radius has more than `MAX_RADIUS` pixels.
+        ValueError: The radius has more than `MAX_RADIUS` pixels.
     """
     limit = floor(in_pixels(radius, resolution) ** 2)
     beyond = limit + 1

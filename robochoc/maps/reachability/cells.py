@@ -1,7 +1,10 @@
-"""The cells of a map: squares of many pixels, which are values of variables.
+"""The cells of a map, which are values of variables: squares of pixels (`Cells`), or cubes of voxels (`Cubes`).
 
-A cell is free if all pixels that it touches are free, and a robot fits at its centre. Cells are where robots go; how
-they get there is found on the pixels (`path_lengths.py`), so that a door narrower than a cell is still a way.
+A cell is free if all pixels that it touches are free, and a robot fits at its centre. Cells are the destinations of
+robots; paths are found on the pixels (`path_lengths.py`), so that a door narrower than a cell can be passed.
+
+The centre of a cell lies at whole multiples of its side in the map's frame. So the waypoint of a cell has integers as
+coordinates, and the side is the scale: integers x scale are exactly metres in the map's frame.
 """
 
 from __future__ import annotations
@@ -17,7 +20,7 @@ from typing import TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.maps.occupancy.grid import Counts, Flags, OccupancyGrid, before
+from robochoc.maps.occupancy.grid import Counts, Flags, OccupancyGrid, summed_area
 from robochoc.maps.octomap.voxels import VoxelGrid
 from robochoc.maps.reachability.free_space import FreeSpace
 
@@ -26,7 +29,7 @@ Place = tuple[Fraction, ...]
 
 
 _HAIR = 1e-6
-"""Pixels. What a square touches by less is due to rounding."""
+"""The largest overlap due to rounding, in pixels."""
 
 _Lengths = npt.NDArray[np.float64]
 
@@ -38,13 +41,13 @@ _Numbers = npt.NDArray[np.int64]
 
 
 _CHECKED_MAX = 10_000
-"""The maximum number of cells that are checked individually. More cells are too many for a problem."""
+"""The maximum number of cells that are checked individually: more are too many for a problem."""
 
 
 class CellGrid(ABC):
     """Cells along the axes of a map's frame.
 
-    They are numbered from 0, along x first, then along y, and along z where the map has it; the lowest ones first.
+    They are numbered from 0, along x first, then along y, and then along z on a three-dimensional map; lowest first.
     """
 
     side: Fraction
@@ -89,17 +92,17 @@ class CellGrid(ABC):
         return tuple(part * self.side for part in self.coordinates(cell))
 
     def containing(self, place: Sequence[Fraction]) -> tuple[int, ...]:
-        """Return the coordinates, in sides of a cell, of the cell in which a place lies."""
+        """Return the coordinates of the cell that contains a place, in sides of a cell."""
         return tuple(floor(part / self.side + _HALF) for part in place)
 
     def spans(self, axis: int, corner: Fraction, size: Fraction, parts: int = 1) -> tuple[_Numbers, ...]:
-        """Return for each column, row or level its first pixel, the one behind its last, and where its centre is.
+        """Return for each column, row or level its first pixel, the one after its last, and the part with its centre.
 
         Args:
             axis: 0 for columns, 1 for rows, 2 for levels.
-            corner: Where the first pixel, or voxel, begins.
+            corner: The beginning of the first pixel, or voxel.
             size: The side of a pixel.
-            parts: Into how many parts a pixel is cut, of which one has the centre.
+            parts: The number of parts of a pixel.
         """
         found = [
             (
@@ -113,9 +116,9 @@ class CellGrid(ABC):
 
 
 def sums(table: npt.NDArray[_Count], low: Sequence[_Numbers], high: Sequence[_Numbers]) -> npt.NDArray[_Count]:
-    """Return how many flags are set in each cell, between its first pixel along each axis and the one behind its last.
+    """Return the number of set flags in each cell, given by its first pixel on each axis and the one after its last.
 
-    `table` has for each corner of a pixel how many flags before it are set (a summed-area table).
+    `table` is the summed-area table of the flags.
     """
     found = table
     for axis, (begin, end) in enumerate(zip(low, high, strict=True)):
@@ -153,21 +156,21 @@ class Cells(CellGrid):
     @cached_property
     def free(self) -> tuple[int, ...]:
         """The numbers of all free cells."""
-        if not self.grid.turn.is_none:
+        if not self.grid.rotation.is_zero:
             touched, flagged = self._turned.counts(self.grid.free)
             return self._numbers(touched == flagged, self._turned.centres(self.space.parts))
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
         sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
-        found = sums(self.grid.free_before, low, high) == sizes
+        found = sums(self.grid.free_sums, low, high) == sizes
         return self._numbers(found, np.ix_(*middle))
 
     @cached_property
     def blocked(self) -> tuple[int, ...]:
         """The numbers of all cells with an occupied pixel."""
-        if not self.grid.turn.is_none:
+        if not self.grid.rotation.is_zero:
             return tuple(np.flatnonzero(self._turned.counts(self.grid.occupied)[1]).tolist())
         low, high, _ = zip(self._pixels(1), self._pixels(0), strict=True)
-        return tuple(np.flatnonzero(sums(before(self.grid.occupied), low, high)).tolist())
+        return tuple(np.flatnonzero(sums(summed_area(self.grid.occupied), low, high)).tolist())
 
     def centre(self, cell: int) -> tuple[Fraction, Fraction]:
         """Return the place of a cell's centre."""
@@ -175,7 +178,7 @@ class Cells(CellGrid):
         return x, y
 
     def pixel(self, place: tuple[Fraction, ...]) -> tuple[int, int] | None:
-        """Return the row and the column of the pixel of a place; None: it is not on the map."""
+        """Return the row and the column of the pixel of a place; None outside the map."""
         x, y = map(floor, self.grid.in_pixels((place[0], place[1])))
         rows, columns = self.grid.free.shape
         return (y, x) if 0 <= y < rows and 0 <= x < columns else None
@@ -185,13 +188,13 @@ class Cells(CellGrid):
         return self.space.fits(self.grid.in_pixels((place[0], place[1])))
 
     @cached_property
-    def _turned(self) -> TurnedSquares:
-        return TurnedSquares(self.grid, self.side, (self.first[0], self.first[1]), (self.rows, self.columns))
+    def _turned(self) -> RotatedSquares:
+        return RotatedSquares(self.grid, self.side, (self.first[0], self.first[1]), (self.rows, self.columns))
 
     def _numbers(self, found: Flags, centres: tuple[npt.NDArray[np.int64], ...]) -> tuple[int, ...]:
-        """Return the numbers of the cells that are found, where a robot fits at the centre.
+        """Return the numbers of the cells in `found` at whose centre a robot fits.
 
-        Centres are given by the points of the room's lattice at which they are.
+        Centres are given by their points on the lattice of the free space.
         """
         height, width = self.space.points.shape
         fits = self.space.points[centres[0].clip(0, height - 1), centres[1].clip(0, width - 1)]
@@ -203,12 +206,16 @@ class Cells(CellGrid):
         return tuple(cells)
 
     def _pixels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
-        """Return for each column (`axis` 0) or row its first pixel, the one behind its last, and its centre's point."""
+        """Return for each column (`axis` 0) or row its first pixel, the one after its last, and its centre's point."""
         return self.spans(axis, self.grid.origin[axis], self.grid.resolution, self.space.parts)
 
 
-class TurnedSquares:
-    """Squares of a turned map, in columns and rows.
+class RotatedSquares:
+    """Squares along the axes of the map's frame, in columns and rows, on a map with rotated pixels.
+
+    The pixels that a square touches are found row by row of the pixels: a convex figure touches an interval of each
+    row. All squares of a map are computed together, in floating point; if a centre lies on the border of two pixels
+    within the precision, it is computed again, in fractions.
 
     Args:
         grid: The map.
@@ -221,18 +228,18 @@ class TurnedSquares:
         self._grid, self._side, self._first = grid, side, first
         ratio = side / grid.resolution
         self._half = float(ratio / 2) - _HAIR
-        self._cosine, self._sine = float(grid.turn.cosine), float(grid.turn.sine)
+        self._cosine, self._sine = float(grid.rotation.cosine), float(grid.rotation.sine)
         x, y = (float(part) for part in grid.in_pixels((first[0] * side, first[1] * side)))
         rows, columns = np.indices(shape)
-        along, up = float(grid.turn.cosine * ratio), float(grid.turn.sine * ratio)
+        along, up = float(grid.rotation.cosine * ratio), float(grid.rotation.sine * ratio)
         self._x: _Lengths = x + columns * along + rows * up
         self._y: _Lengths = y + rows * along - columns * up
 
     def centres(self, parts: int = 1) -> tuple[Counts, Counts]:
-        """Return the row and the column of the pixel at each square's centre, or of the part of a pixel there.
+        """Return the row and the column of the pixel, or the part of a pixel, at each square's centre.
 
         Args:
-            parts: Into how many parts a pixel's side is cut.
+            parts: The number of parts of a pixel's side.
         """
         at_x, at_y = parts * self._x, parts * self._y
         x, y = np.floor(at_x).astype(np.int64), np.floor(at_y).astype(np.int64)
@@ -243,11 +250,11 @@ class TurnedSquares:
         return y, x
 
     def counts(self, flags: Flags) -> tuple[Counts, Counts]:
-        """Return the number of pixels that each square touches, also outside the map, and how many are flagged."""
+        """Return the number of pixels touched by each square, also outside the map, and the number of flagged ones."""
         height, width = flags.shape
         sums = np.zeros((height + 2, width + 1), dtype=np.int64)
         np.cumsum(flags, axis=1, out=sums[1:-1, 1:])
-        top = self._half * (self._cosine + abs(self._sine))  # how far a square's highest corner is above its centre
+        top = self._half * (self._cosine + abs(self._sine))  # the height of a square's highest corner above its centre
         lowest = np.floor(self._y - top).astype(np.int64)
         touched, flagged = np.zeros_like(lowest), np.zeros_like(lowest)
         for number in range(ceil(2 * top) + 1):
@@ -262,7 +269,7 @@ class TurnedSquares:
         return touched, flagged
 
     def _furthest_left(self, low: _Lengths, high: _Lengths) -> _Lengths:
-        """Return where a square reaches furthest to the left between two heights; all is counted from its centre."""
+        """Return the leftmost x of a square between two heights; coordinates are relative to its centre."""
         cosine, sine, half = self._cosine, self._sine, self._half
         corner = half * (cosine - abs(sine))  # the height of the left corner, or of the right one
         at = np.clip(-corner if sine > 0 else corner, low, high)
@@ -297,7 +304,7 @@ class Cubes(CellGrid):
         """The numbers of all free cells."""
         (x, xs, column), (y, ys, row), (z, zs, level) = (self._voxels(axis) for axis in range(3))
         sizes = (zs - z)[:, None, None] * (ys - y)[None, :, None] * (xs - x)[None, None, :]
-        found = sums(self.grid.free_before, (z, y, x), (zs, ys, xs)) == sizes
+        found = sums(self.grid.free_sums, (z, y, x), (zs, ys, xs)) == sizes
         ends = zip((level, row, column), self.passable.shape, strict=True)
         centres = np.ix_(*(middle.clip(0, size - 1) for middle, size in ends))
         return tuple(np.flatnonzero(found & self.passable[centres]).tolist())
@@ -305,16 +312,16 @@ class Cubes(CellGrid):
     @cached_property
     def blocked(self) -> tuple[int, ...]:
         """The numbers of all cells with an occupied voxel."""
-        return tuple(np.flatnonzero(self._counted(self.grid.occupied_before)).tolist())
+        return tuple(np.flatnonzero(self._counted(self.grid.occupied_sums)).tolist())
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """For each blocked cell the sides beyond which a cell has free voxels, and none that is occupied.
+        """For each blocked cell the sides towards cells with free and without occupied voxels.
 
-        Bits: 1 towards a lower x and 2 towards a higher one, 4 and 8 for y, 16 and 32 for z.
+        Bits: 1 towards a lower x and 2 towards a higher x, 4 and 8 for y, 16 and 32 for z.
         """
-        occupied = self._counted(self.grid.occupied_before)
-        opened = np.pad((occupied == 0) & (self._counted(self.grid.free_before) > 0), 1)
+        occupied = self._counted(self.grid.occupied_sums)
+        opened = np.pad((occupied == 0) & (self._counted(self.grid.free_sums) > 0), 1)
         found = np.zeros(occupied.shape, dtype=np.int64)
         for bit, (axis, step) in enumerate((axis, step) for axis in (2, 1, 0) for step in (-1, 1)):
             beside = np.roll(opened, -step, axis=axis)[1:-1, 1:-1, 1:-1]
@@ -322,16 +329,16 @@ class Cubes(CellGrid):
         return tuple(found[occupied > 0].tolist())
 
     def _counted(self, table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-        """Return how many voxels of each cell have a flag."""
+        """Return the number of flagged voxels of each cell."""
         (x, xs, _), (y, ys, _), (z, zs, _) = (self._voxels(axis) for axis in range(3))
         return sums(table, (z, y, x), (zs, ys, xs))
 
     def pixel(self, place: Place) -> tuple[int, ...] | None:
-        """Return the voxel of a place by z, y and x; None: it is not on the map."""
+        """Return the voxel of a place by z, y and x; None outside the map."""
         x, y, z = (floor(part) for part in self.grid.in_voxels(place))
         inside = all(0 <= at < size for at, size in zip((z, y, x), self.grid.free.shape, strict=True))
         return (z, y, x) if inside else None
 
     def _voxels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
-        """Return for each column, row or level its first voxel, the one behind its last, and that of its centre."""
+        """Return for each column, row or level its first voxel, the one after its last, and that of its centre."""
         return self.spans(axis, self.grid.origin[axis], self.grid.resolution)

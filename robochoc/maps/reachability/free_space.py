@@ -1,8 +1,7 @@
-"""Room for robots on a map of the ground: where one of a radius fits, and from which pixel it gets to which.
+"""The free space of a robot on a map of the ground: the points at which it fits, and the connections between pixels.
 
-Distances are measured to the borders of pixels, so that no way leads through a door that is narrower than a robot. What
-fits is found on the lattice on which flights look for their ways (`maps/occupancy/clearance.py`): where two pixels are
-joined, a flight gets from one to the other.
+Distances are measured to the borders of pixels, so that no path leads through a door that is narrower than the robot.
+The lattice of points is that of flights (`maps/occupancy/clearance.py`): a drone can fly between connected pixels.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from math import floor
 
 import numpy as np
 
-from robochoc.maps.occupancy.clearance import clearances, open_points, parts_of
+from robochoc.maps.occupancy.clearance import clearances, open_points, parts_per_pixel
 from robochoc.maps.occupancy.grid import Counts, Flags
 
 _ROUNDING = 1e-9
@@ -22,14 +21,13 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
-    """Room for a robot. Lengths are in sides of a pixel.
+    """The free space of a robot. Lengths are in sides of a pixel.
 
     Attributes:
         solid: The pixels that are not free.
         radius: The robot's radius.
-        parts: Into how many parts a pixel's side is cut, for the points of a lattice.
-        points: The points at which the robot can be, and that are joined within their pixel: where a pixel has several
-            groups of such points, these are the largest group.
+        parts: The number of lattice points along a pixel's side.
+        points: The points at which the robot can be, in each pixel only the largest connected group.
     """
 
     solid: Flags
@@ -44,38 +42,38 @@ class FreeSpace:
 
     @cached_property
     def joined(self) -> tuple[Flags, Flags]:
-        """From which pixel the robot gets straight to the next row, and from which to the next column."""
+        """The pixels from which the robot can move directly to the next row, and those for the next column."""
         points, up, right = self._by_pixel, np.zeros_like(self.solid), np.zeros_like(self.solid)
         up[:-1] = (points[:-1, -1] & points[1:, 0]).any(axis=2)
         right[:, :-1] = (points[:, :, :-1, -1] & points[:, :, 1:, 0]).any(axis=1)
         return up, right
 
     def fits(self, place: tuple[Fraction, Fraction]) -> bool:
-        """Return whether the robot fits at a place on the map, an x and a y, and gets away from there."""
+        """Return whether the robot fits at a place on the map, an x and a y, and can move from there."""
         column, row = (floor(part * self.parts) for part in place)
         return bool(self.points[row, column]) and bool(self.is_clear([place])[0])
 
     def is_clear(self, places: list[tuple[Fraction, Fraction]]) -> Flags:
-        """Return at which places (K,) nothing is nearer than the radius."""
+        """Return for each place (K,) whether no solid pixel is nearer than the radius."""
         found = np.array(places, dtype=np.float64).reshape(-1, 2)
         flags: Flags = clearances(self.solid, found, self.radius) >= self.radius - _ROUNDING
         return flags
 
     @cached_property
     def _by_pixel(self) -> Flags:
-        """The points by row of pixels, row in the pixel, column of pixels and column in it."""
+        """The points by row of pixels, row in the pixel, column of pixels and column in the pixel."""
         rows, columns = self.solid.shape
         return self.points.reshape(rows, self.parts, columns, self.parts)
 
 
 def free_space(free: Flags, radius: Fraction) -> FreeSpace:
-    """Return the room for a robot of a radius in pixels on a map of which some pixels are `free`."""
-    solid, parts = ~free, parts_of(float(radius), free.size)
+    """Return the free space of a robot with a radius in pixels, on a map with `free` pixels."""
+    solid, parts = ~free, parts_per_pixel(float(radius), free.size)
     return FreeSpace(solid, float(radius), parts, _largest_groups(open_points(solid, float(radius), parts), parts))
 
 
 def _largest_groups(points: Flags, parts: int) -> Flags:
-    """Return of the points of each pixel the largest group that is joined within the pixel."""
+    """Return the largest connected group of the points of each pixel."""
     rows, columns = (size // parts for size in points.shape)
     blocks = points.reshape(rows, parts, columns, parts).transpose(0, 2, 1, 3)
     counts = blocks.sum(axis=(2, 3))
@@ -84,14 +82,14 @@ def _largest_groups(points: Flags, parts: int) -> Flags:
     most = parts * parts + 1
     numbers = groups + most * np.arange(len(groups))[:, None, None]
     sizes = np.bincount(numbers.ravel(), minlength=most * len(groups)).reshape(-1, most)
-    sizes[:, 0] = 0  # what is no point
+    sizes[:, 0] = 0  # not a group: places without a point
     kept = blocks.copy()
     kept[some] = groups == sizes.argmax(axis=1)[:, None, None]
     return kept.transpose(0, 2, 1, 3).reshape(points.shape)
 
 
 def _grouped(blocks: Flags) -> Counts:
-    """Return the number of the group in which each point of a block (K, N, N) is, from 1 on; 0 is no point."""
+    """Return the number of the group of each point of a block (K, N, N), from 1 on; 0 without a point."""
     side = blocks.shape[1]
     groups: Counts = np.where(blocks, np.arange(1, side * side + 1).reshape(side, side), 0)
     while True:

@@ -1,6 +1,6 @@
-"""Which cells can be seen from which, along straight lines that touch nothing but free pixels, or voxels.
+"""Lines of sight between cells: straight lines that touch only free pixels, or voxels.
 
-All is exact: places are integers in a unit of which a pixel has a whole number. So what sees is seen, and a line that
+Computations are exact: places are integers in a unit that divides a pixel. So visibility is symmetric, and a line that
 just touches the corner of a wall is blocked on every machine.
 """
 
@@ -25,7 +25,7 @@ MAX_PAIRS = 100_000
 Point = tuple[int, ...]
 
 
-class Sight(ABC):
+class LinesOfSight(ABC):
     """Lines of sight between the free cells of a map."""
 
     def __init__(self, cells: AnyCells) -> None:
@@ -46,8 +46,8 @@ class Sight(ABC):
     def _in_pixels(self, cell: int) -> Place:
         """Return the place of a cell's centre, in pixels from the lower left corner of the map."""
 
-    def seen(self, sensing: Fraction) -> dict[int, frozenset[int]]:
-        """Return the cells that are seen from each free cell: those within a range in metres, itself among them.
+    def visible_cells(self, sensing: Fraction) -> dict[int, frozenset[int]]:
+        """Return the cells that are visible from each free cell within a range in metres, including the cell itself.
 
         Raises:
             ValueError: More than `MAX_PAIRS` pairs of cells are that near.
@@ -61,7 +61,7 @@ class Sight(ABC):
         if len(near) > MAX_PAIRS:
             raise ValueError(
                 f"{len(near):,} pairs of cells are within the sensing range, more than {MAX_PAIRS:,};"
-                " take larger cells, or less of sensing"
+                " use larger cells, or a smaller sensing range"
             )
         found = {cell: {cell} for cell in self._points}
         for one, other in near:
@@ -71,7 +71,7 @@ class Sight(ABC):
         return {cell: frozenset(others) for cell, others in found.items()}
 
 
-class _SightOnGround(Sight):
+class _SightOnGround(LinesOfSight):
     """Lines of sight on a map of the ground."""
 
     def __init__(self, cells: Cells) -> None:
@@ -105,7 +105,7 @@ class _SightOnGround(Sight):
         return self._grid.in_pixels((x, y))
 
 
-class _SightInSpace(Sight):
+class _SightInSpace(LinesOfSight):
     """Lines of sight on a three-dimensional map: through layers of voxels along x, and in each through rows along y."""
 
     def __init__(self, cells: Cubes) -> None:
@@ -116,7 +116,7 @@ class _SightInSpace(Sight):
         (x, y, z), (right, back, top) = sorted((self._points[one], self._points[other]))
         across, along, up = right - x, back - y, top - z
         whole = (across or 1) * (abs(along) or 1)
-        """The length from end to end: a number that the borders of all layers and rows divide into integers."""
+        """The length from end to end, chosen so that all borders of layers and rows are at integers."""
         size, solid = self._unit * whole, self._solid
         for column, begin, end in _crossed(x, across, (0, whole), whole, self._unit):
             for row, first, last in _crossed(y, along, (begin, end), whole, self._unit):
@@ -134,19 +134,19 @@ class _SightInSpace(Sight):
         return self._grid.in_voxels(self._cells.centre(cell))
 
 
-def sight_on(cells: AnyCells) -> Sight:
+def lines_of_sight(cells: AnyCells) -> LinesOfSight:
     """Return the lines of sight on a map."""
     return _SightInSpace(cells) if isinstance(cells, Cubes) else _SightOnGround(cells)
 
 
 def _crossed(place: int, moved: int, part: tuple[int, int], whole: int, unit: int) -> Iterator[tuple[int, int, int]]:
-    """Yield the layers that a part of a line touches along an axis, and how far along the line it enters and leaves.
+    """Yield the layers that a part of a line touches along an axis, each with the positions of entry and exit.
 
     Args:
-        place: Where the line begins on the axis.
-        moved: How far it leads along it.
-        part: The part of the line that is looked at, of `whole`.
-        whole: The length of the line. What is moved divides it.
+        place: The beginning of the line on the axis.
+        moved: The extent of the line along the axis.
+        part: The part of the line, within 0 and `whole`.
+        whole: The length of the line, a multiple of `moved`.
         unit: The height of a layer.
     """
     ends = sorted(place * whole + moved * at for at in part)
@@ -159,5 +159,5 @@ def _crossed(place: int, moved: int, part: tuple[int, int], whole: int, unit: in
 
 
 def _first_touched(place: int, size: int) -> int:
-    """Return the first pixel that touches a place, where pixels have that size: on a border it is the one before."""
+    """Return the first pixel of a size that touches a place: on a border, the pixel before it."""
     return -(-place // size) - 1

@@ -1,13 +1,13 @@
-"""Lengths of the shortest ways from a pixel, or a voxel, to all others, around obstacles.
+"""Lengths of the shortest paths from a pixel, or a voxel, to all others, around obstacles.
 
 Dijkstra's algorithm (1959) on the pixels with eight neighbours, or on the voxels with 26, in integers: a step across a
 face counts 15, across an edge 21 and across a corner 26. In the plane these are the 5 and 7 of the chamfer distance in
 Borgefors, "Distance transformations in digital images", CVGIP 34 (1986), 1 % less than the root of 2; the third is less
-than 0.1 % more than the root of 3. A diagonal step cuts no corner: all beside it have to be passable. Where a robot
-does not fit through between two neighbours, no step leads from one to the other, nor does a diagonal one pass by.
+than 0.1 % more than the root of 3. A diagonal step cuts no corner: all pixels beside it have to be passable. If a robot
+does not fit between two neighbours, neither a step between them nor a diagonal step past their border is possible.
 
-Lengths are integers, and no step is shorter than 15. So all pixels whose lengths differ by less are looked at together:
-none of them lies behind another one (Dial, CACM 12, 1969).
+Lengths are integers, and no step is shorter than 15. So all pixels whose lengths differ by less are processed together:
+none of them depends on another (Dial, CACM 12, 1969).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _LONGEST = np.iinfo(np.int32).max - SPACE_DIAGONAL
 
 
 class _Step(NamedTuple):
-    """A step in a flat array: where it leads, what is beside it, between which pixels it leads, and its length."""
+    """A step in a flat array: its offset, the pixels beside it, the crossed borders by axis, and its length."""
 
     to: int
     beside: tuple[int, ...]
@@ -42,13 +42,13 @@ class _Step(NamedTuple):
 def lengths_from(
     start: tuple[int, ...], passable: Flags, longest: int | None = None, joined: Sequence[Flags] = ()
 ) -> Lengths:
-    """Return the lengths of the shortest ways to all pixels: `STRAIGHT` a pixel, or `UNREACHED`.
+    """Return the lengths of the shortest paths to all pixels: `STRAIGHT` per pixel, or `UNREACHED`.
 
     Args:
-        start: The indices of the pixel where all ways begin. It is passable.
-        passable: The pixels on which ways lead, in an array of two dimensions or three.
-        longest: Longer ways are not looked for.
-        joined: For each axis, from which pixels a robot fits through to the next one. Empty: from all.
+        start: The indices of the pixel at which all paths begin. It is passable.
+        passable: The pixels of paths, in an array of two or three dimensions.
+        longest: The length up to which paths are searched.
+        joined: For each axis, the pixels from which a robot can move to the next pixel. Empty: all.
     """
     free = np.pad(passable, 1)
     flat = free.ravel()
@@ -99,7 +99,7 @@ def _steps(shape: tuple[int, ...]) -> list[_Step]:
 
 
 def _crossed(parts: Sequence[int]) -> tuple[tuple[int, ...], ...]:
-    """Return for each axis the pixels from which to the next one a step leads, or past which: all edges of its box."""
+    """Return for each axis the pixels whose border to the next pixel a step crosses or passes: all edges of its box."""
     found = []
     for axis, part in enumerate(parts):
         others = product(*((0, other) for other in (*parts[:axis], *parts[axis + 1 :]) if other))

@@ -120,7 +120,7 @@ class Reachability:
             float(self.speed),
             packed(grid.free),
             packed(grid.occupied),
-            atan2(grid.turn.sine, grid.turn.cosine),
+            atan2(grid.rotation.sine, grid.rotation.cosine),
         )
 
     def _walls_in_space(self, cells: Cubes) -> WallVoxels:

@@ -16,7 +16,7 @@ SLACK_M = 1e-10
 
 
 def squashed(points: Array, downwash: float) -> Array:
-    """Return `points` (..., 3) with their heights divided by `downwash`: balls around them are tall ellipsoids here."""
+    """Return `points` (..., 3) with their heights divided by `downwash`: spheres there are tall ellipsoids here."""
     return np.asarray(points / np.array([1.0, 1.0, downwash]))
 
 
@@ -33,7 +33,7 @@ def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
 
 
 def line_distances(first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
-    """Return the distances of straight lines from others: each pair is of origins and ends (..., 3), which broadcast.
+    """Return the distances between straight lines: each pair has origins and ends (..., 3), which broadcast.
 
     Source: C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.9.
     """
@@ -57,15 +57,15 @@ def _dot(first: Array, second: Array) -> Array:
 
 
 def norms(vectors: Array) -> Array:
-    """Return the lengths of vectors, which are the last axis."""
+    """Return the lengths of vectors along the last axis."""
     lengths: Array = np.sqrt(np.einsum("...c,...c->...", vectors, vectors))
     return lengths
 
 
 def closest_approach(apart: Array, later: Array) -> Array:
-    """Return the smallest distance of two that are `apart` first and `later` then, in even motion.
+    """Return the smallest distance of two points in uniform motion, from their differences at the begin and the end.
 
-    Vectors are the last axis.
+    Vectors are along the last axis.
     """
     change = later - apart
     squared = np.einsum("...c,...c->...", change, change)

@@ -1,9 +1,9 @@
-"""The floor plan of a building: walls that no drone can go over, and ways around them in the plane.
+"""The floor plan of a building: walls that no drone can fly over, and routes around them in the plane.
 
-Walls are the pixels of a map that are not free, and all that lies beside the map. A drone keeps `keep` metres between
-its centre and the nearest border of such a pixel, measured exactly: not between centres of pixels.
+Walls are the pixels of a map that are not free, and the outside of the map. A drone keeps `keep` metres between its
+centre and the nearest border of such a pixel, measured exactly: not between centres of pixels.
 
-A way is found on a lattice (`lattice.py`), and then pulled taut (`string_pulling.py`).
+A route is found on a lattice (`lattice.py`), and then shortened (`string_pulling.py`).
 """
 
 from __future__ import annotations
@@ -15,18 +15,18 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.maps.occupancy.clearance import clearances, parts_of
+from robochoc.maps.occupancy.clearance import clearances, parts_per_pixel
 from robochoc.maps.routes.distances import Array, Flags
 from robochoc.maps.routes.lattice import Lattice
 from robochoc.maps.routes.string_pulling import taut
 from robochoc.maps.walls import PixelFrame
 
 SPARE_M = 0.1
-"""Ways keep so much more than they have to, if that is no detour of more than a quarter."""
+"""The additional distance of routes from walls, if the detour is at most a quarter."""
 CORNER_M = 0.25
-"""The length for which a corner counts: drones come to rest there."""
+"""The length that a corner is worth, since drones come to rest there."""
 _ROUNDING = 1e-9
-"""In pixels. A wall that is nearer than it may be by no more than that is not too near."""
+"""The tolerance of distances from walls for rounding, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,9 +35,9 @@ class FloorPlan:
 
     Attributes:
         solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first.
-        frame: Where the pixels lie.
+        frame: The place of the pixels.
         keep: The distance of a drone's centre from walls.
-        parts: Into how many parts a pixel's side is cut, for the lattice of ways. 0: as many as suit `keep`.
+        parts: The number of lattice points along a pixel's side. 0: suitable for `keep`.
     """
 
     solid: Flags
@@ -47,11 +47,11 @@ class FloorPlan:
     _ways: dict[bytes, Array | None] = field(default_factory=dict)
 
     def keeping(self, keep: float) -> FloorPlan:
-        """Return the same walls and the same lattice, with another distance."""
+        """Return the same walls and the same lattice for another distance."""
         return self if keep == self.keep else replace(self, keep=keep, parts=self._parts, _ways={})
 
     def clearances(self, points: Array, most: float) -> Array:
-        """Return the distance (K,) of each of `points` (K, 2) from the nearest wall; `most` where it is further."""
+        """Return the distance (K,) of each of `points` (K, 2) from the nearest wall, at most `most`."""
         size = self.frame.size
         return size * clearances(self.solid, self.frame.in_pixels(points), most / size)
 
@@ -61,7 +61,7 @@ class FloorPlan:
         return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
 
     def way(self, first: Array, second: Array) -> Array | None:
-        """Return a short way (K + 1, 2) between two points of the plane; None if there is none."""
+        """Return a short route (K + 1, 2) between two points of the plane; None if there is none."""
         key = np.concatenate((first[:2], second[:2])).tobytes()
         if key not in self._ways:
             self._ways[key] = self._way(first[:2], second[:2])
@@ -88,7 +88,7 @@ class FloorPlan:
 
     @property
     def _parts(self) -> int:
-        return self.parts or parts_of(self.keep / self.frame.size, self.solid.size)
+        return self.parts or parts_per_pixel(self.keep / self.frame.size, self.solid.size)
 
     @cached_property
     def _before(self) -> npt.NDArray[np.int32]:
@@ -98,7 +98,7 @@ class FloorPlan:
     def _sees(self, first: Array, second: Array, keep: float) -> bool:
         """Return whether no wall is nearer than `keep`, in metres, to a straight line, whose ends are in pixels.
 
-        Of each row of pixels the line, made as thick as that, covers an interval: no pixel there is solid.
+        The thickened line covers an interval of each row of pixels, in which no pixel may be solid.
         """
         radius = keep / self.frame.size
         (x, y), (to_x, to_y) = (first, second) if first[1] <= second[1] else (second, first)
@@ -117,11 +117,11 @@ class FloorPlan:
 def _covered(
     row: npt.NDArray[np.int64], origin: tuple[float, float], along: tuple[float, float], radius: float
 ) -> tuple[Array, Array]:
-    """Return which x a line of this radius covers in each of the rows that it touches, from where to where.
+    """Return the least and the greatest x that a line of this radius covers in each of the rows that it touches.
 
-    That is the least and the greatest x of all discs around its points, cut to the row. Along the line x is a concave
-    function (the least one: convex), so it is greatest at an end, where the line enters or leaves the row, or where the
-    slope of the disc's border at the row's edge is that of the line.
+    These are the extreme x of all discs around its points, cut to the row. Along the line the greatest x is a concave
+    function (the least x a convex one), so its extremum is at an end, where the line enters or leaves the row, or where
+    the slope of the disc's border at the row's edge is that of the line.
     """
     (x, y), (right, up) = origin, along
     shares: list[Array] = [np.zeros(len(row)), np.ones(len(row))]

@@ -1,12 +1,12 @@
-"""Shortest ways on a lattice of points that are far enough from all walls, in the plane or in space.
+"""Shortest routes on a lattice of points that are far enough from all walls, in the plane or in space.
 
 A* (Hart, Nilsson, Raphael 1968) on the points with eight neighbours, or 26, in integers: steps of 15, 21 and 26 as in
-the travel times of generated teams (`reachability/path_lengths.py`), four times as long where walls are far, five times
-where they are near. Points whose estimates differ by less than a step are looked at together, and again if a shorter
-way to them is found.
+the travel times of generated teams (`reachability/path_lengths.py`), multiplied by four far from walls, and by five
+near them. Points whose estimates differ by less than a step are expanded together, and again if a shorter route to them
+is found.
 
-Points are the centres of pixels, or of voxels; where these are large for a drone, those of their parts, and where they
-are small, those of every second one, say.
+Points are the centres of pixels, or of voxels; if these are large for a drone, those of their parts, and if they are
+small, those of every second pixel, for example.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from itertools import product
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.maps.occupancy.clearance import quarters
+from robochoc.maps.occupancy.clearance import quadruple_squares
 from robochoc.maps.routes.distances import Array, Flags, norms
 
 _LENGTHS = (15, 21, 26)
 """The lengths of steps along one axis, two and three."""
 _WIDE, _NARROW = 4, 5
-"""By what steps are multiplied to a point where walls are far, and where they are near."""
+"""The factors of steps to a point far from walls, and near walls."""
 _TOGETHER = _WIDE * _LENGTHS[0]
 _LIMIT = 2**30
-"""The length of a way that there is not."""
+"""The length of points without a route."""
 _GATES = 4
-"""Points of the lattice that are tried as the first, or the last, of a way."""
+"""The number of lattice points that are tried as the first, or the last, point of a route."""
 
 Numbers = npt.NDArray[np.int64]
 Lengths = npt.NDArray[np.int32]
@@ -42,10 +42,10 @@ class Lattice:
 
     Args:
         solid: The pixels or voxels that are not free.
-        keep: The distance from these, and from the outside, that all lines between neighbours keep.
-        spare: Where walls are further away than that, too, they are far.
-        parts: The number of points along the side of one.
-        every: Only each so-many-th of these is a point.
+        keep: The distance of all lines between neighbours from these, and from the outside.
+        spare: The additional distance from which on a point is far from walls.
+        parts: The number of points along the side of a pixel.
+        every: The step with which points are selected: 2 uses every second one.
     """
 
     def __init__(self, solid: Flags, keep: float, spare: float, parts: int, every: int = 1) -> None:
@@ -53,10 +53,10 @@ class Lattice:
         self._begin = min(every // 2, min(solid.shape) * parts - 1)
         self._side = every / parts
         self._offset = (self._begin + 0.5) / parts
-        # Half way between two neighbours walls may be nearer than at both: by no more than that of a single corner.
+        # Half way between two neighbours, walls may be nearer than at both ends by at most a single corner.
         bulge = solid.ndim * every * every / 4
         squares = [((keep + more) * parts) ** 2 + bulge for more in (0.0, spare)]
-        apart = quarters(solid, parts, math.ceil(math.sqrt(squares[1])) + 1)
+        apart = quadruple_squares(solid, parts, math.ceil(math.sqrt(squares[1])) + 1)
         apart = apart[(slice(self._begin, None, every),) * solid.ndim]
         self._free = np.pad(apart >= 4 * squares[0], 1)
         wide = np.pad(apart >= 4 * squares[1], 1)
@@ -65,24 +65,24 @@ class Lattice:
     def path(
         self, start: Array, goal: Array, sees: Callable[[Array, Array], bool], without: Numbers | None = None
     ) -> tuple[Array, Flags] | None:
-        """Return the points of a shortest way from near `start` to near `goal`, and at which of them walls are far.
+        """Return the points of a shortest route from near `start` to near `goal`, and whether each is far from walls.
 
-        The first point and `start` see each other, as do the last and `goal`. None: there is no way. The points
-        `without` are left out.
+        The first point is visible from `start`, and the last from `goal`. None: there is no route. The points `without`
+        are excluded.
         """
         free = self._without(without)
         firsts, lasts = [*self._gates(start, sees, free)], [*self._gates(goal, sees, free)]
         if not (firsts and lasts):
             return None
         lengths = self._search(free, firsts, lasts[0])
-        reached = [last for last in lasts if lengths[last] < _LIMIT]  # there may be no way to the first one
+        reached = [last for last in lasts if lengths[last] < _LIMIT]  # there may be no route to the first one
         if not reached:
             return None
         numbers = self._traced(lengths, free, reached[0])
         return self._places(numbers), self._weights[numbers] == _WIDE
 
     def reached(self, start: Array, sees: Callable[[Array, Array], bool], without: Numbers, most: float) -> Array:
-        """Return the points (K, D) to which a way of no more than `most` leads, the nearest first."""
+        """Return the points (K, D) that can be reached by a route of at most `most`, the nearest first."""
         free = self._without(without)
         firsts = [*self._gates(start, sees, free)]
         if not firsts:
@@ -93,9 +93,9 @@ class Lattice:
         return self._places(found[np.argsort(lengths[found], kind="stable")])
 
     def around(self, place: Array, radii: Array) -> Numbers:
-        """Return the points in the ellipsoid around a place that has these radii along the axes, and a little more.
+        """Return the points in an ellipsoid around a place, a little larger than the radii along the axes.
 
-        A line between neighbours that are not among them does not lead through the ellipsoid.
+        A line between two other neighbours does not pass through the ellipsoid with these radii.
         """
         least = float(radii.min())
         radii = radii * math.sqrt(1 + self._free.ndim * self._side**2 / (4 * least * least))
@@ -122,7 +122,7 @@ class Lattice:
         return np.asarray((at - 1) * self._side + self._offset)
 
     def _gates(self, place: Array, sees: Callable[[Array, Array], bool], free: Flags) -> Iterator[int]:
-        """Yield the nearest points of the lattice that see a place."""
+        """Yield the nearest points of the lattice that are visible from a place."""
         reach = math.ceil(self._keep / self._side) + 3
         at = np.floor((place[::-1] - self._offset) / self._side + 0.5).astype(int) + 1
         low = np.maximum(at - reach, 0)
@@ -139,10 +139,10 @@ class Lattice:
                     return
 
     def _search(self, free: Flags, firsts: list[int], last: int | None, most: int = _LIMIT) -> Lengths:
-        """Return the lengths of shortest ways from one of `firsts`; `_LIMIT` where none is known.
+        """Return the lengths of shortest routes from any of `firsts`; `_LIMIT` where none is known.
 
-        The search ends when the way to `last` is known. If no way leads there, or it is None, all points have been
-        looked at to which one leads that is no longer than `most`.
+        The search ends when the route to `last` is known. If `last` is None, or cannot be reached, all points with a
+        route of at most `most` are found.
         """
         lengths = np.full(free.size, _LIMIT, dtype=np.int32)
         waiting: dict[int, list[Numbers]] = {}
@@ -180,7 +180,7 @@ class Lattice:
         return lengths
 
     def _least(self, points: Numbers, last: int | None) -> Lengths:
-        """Return the length of the way to `last` that there would be without walls."""
+        """Return the length of the route to `last` without walls."""
         if last is None:
             return np.zeros(len(points), dtype=np.int32)
         ends = np.unravel_index(last, self._free.shape)
@@ -208,7 +208,7 @@ class Lattice:
 
     @cached_property
     def _steps(self) -> list[tuple[int, tuple[int, ...], int]]:
-        """All steps in the flat array, each with the steps to what is beside it, and its length; the shortest first."""
+        """All steps in the flat array, with the offsets of the points beside each, and its length; shortest first."""
         shape = self._free.shape
         strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
         found = []

@@ -1,6 +1,6 @@
-"""Ways pulled taut: few straight pieces, each of which is clear of walls, in the place of many points.
+"""String pulling: replaces the many points of a route by few straight pieces that are clear of walls.
 
-A corner counts as a length, since drones come to rest there.
+A corner is worth a length, since drones come to rest there.
 """
 
 from __future__ import annotations
@@ -13,24 +13,24 @@ import numpy as np
 from robochoc.maps.routes.distances import Array, norms
 
 Sees = Callable[[Array, Array, float], bool]
-"""Returns whether a straight line between two points keeps a distance from all walls."""
+"""A function that returns whether a straight line between two points keeps a distance from all walls."""
 _Numbered = Callable[[int, int], bool]
 
 _AROUND = (-16, -8, -4, -2, -1, 0, 1, 2, 4, 8, 16)
-"""Points of a way beside each of its corners that may become a corner."""
+"""Offsets of the points of a route beside each corner that may replace it."""
 _LOOK_BACK = 60
 _ROUNDS = 2
 _HALVINGS = 6
 
 
 def taut(points: Array, keeps: Array, sees: Sees, corner: float) -> Array:
-    """Return the corners of a short way along `points` (K, D), from the first to the last one.
+    """Return the corners of a short route along `points` (K, D), from the first to the last one.
 
     Args:
-        points: From each to the next a line keeps the least of `keeps`.
-        keeps: The distance from walls (K,) that is to be kept at each point. A piece keeps the least one on its way.
+        points: The points; the lines between consecutive points keep the least of `keeps`.
+        keeps: The distance from walls at each point (K,). A piece keeps the least distance of its points.
         sees: Whether a line keeps a distance.
-        corner: The length for which a corner counts.
+        corner: The length that a corner is worth.
     """
     least = float(keeps.min())
 
@@ -49,7 +49,7 @@ def taut(points: Array, keeps: Array, sees: Sees, corner: float) -> Array:
 
 
 def _nearer(before: Array, bend: Array, after: Array, keep: float, sees: Sees) -> Array:
-    """Return `bend`, moved as near to the straight line between its neighbours as walls allow."""
+    """Return `bend`, moved towards the straight line between its neighbours as far as walls allow."""
     along = after - before
     squared = float(along @ along)
     share = min(max(float((bend - before) @ along) / squared, 0.0), 1.0) if squared else 0.0
@@ -64,7 +64,7 @@ def _nearer(before: Array, bend: Array, after: Array, keep: float, sees: Sees) -
 
 
 def _far_sighted(last: int, sees: _Numbered) -> list[int]:
-    """Return points from 0 to `last` that see each other one after the other, each about as far away as it can be."""
+    """Return points from 0 to `last`, each visible from the one before, and about as far away as possible."""
     chain = [0]
     while (here := chain[-1]) < last:
         good, bad = here + 1, last + 1
@@ -81,7 +81,7 @@ def _far_sighted(last: int, sees: _Numbered) -> list[int]:
 
 
 def _shortest(points: Array, chain: Sequence[int], sees: _Numbered, corner: float) -> list[int]:
-    """Return the corners of the shortest way over points of `chain`, and around them; a corner counts as a length."""
+    """Return the corners of the shortest route over points of `chain` and near them; a corner is worth a length."""
     last = chain[-1]
     links = set(pairwise(chain))
     numbers = sorted({*chain, *(at + by for at in chain[1:-1] for by in _AROUND if 0 < at + by < last)})
@@ -101,7 +101,7 @@ def _shortest(points: Array, chain: Sequence[int], sees: _Numbered, corner: floa
 
 
 def _earlier(numbers: Sequence[int], place: int, chain: Sequence[int]) -> Iterator[int]:
-    """Yield the points before a place that are looked at: the last ones, and those of the chain."""
+    """Yield the points before a place that are considered: the last ones, and those of the chain."""
     first = max(0, place - _LOOK_BACK)
     yield from numbers[first:place]
     yield from (one for one in chain if one < numbers[first])

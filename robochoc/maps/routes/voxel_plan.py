@@ -1,8 +1,8 @@
-"""The walls of a three-dimensional map, floors and ceilings among them, and ways around them in space.
+"""The walls of a three-dimensional map, with floors and ceilings, and routes around them in space.
 
-Walls are the voxels of a map that are not free, and all that lies outside of the map. A drone keeps `keep` metres
-between its centre and the nearest border of such a voxel. A way is found on a lattice (`lattice.py`), on a finer one
-where the first has none, and then pulled taut (`string_pulling.py`). It may also keep from other drones.
+Walls are the voxels of a map that are not free, and the outside of the map. A drone keeps `keep` metres between its
+centre and the nearest border of such a voxel. A route is found on a lattice (`lattice.py`), on a finer one if the first
+has no route, and then shortened (`string_pulling.py`). It may also keep a distance from other drones.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from robochoc.maps.routes.voxel_surface import VoxelSurface
 from robochoc.maps.walls import VoxelFrame
 
 _FINE = (2, 4)
-"""Points of the lattices in the distance that drones keep from walls."""
+"""The numbers of points of the lattices along the distance of drones from walls."""
 _FINE_M = 0.04
-"""Points are never closer to each other, whatever drones keep."""
+"""The least distance between points."""
 _POINTS_MAX = 4_000_000
 
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """Drones at rest, from which ways keep a distance. Heights are divided by `downwash` in it.
+    """Drones at rest, from which routes keep a distance.
 
     Attributes:
-        points: Where they are (K, 3), in metres.
-        distance: The distance.
-        downwash: The number by which heights are divided.
+        points: Their places (K, 3), in metres.
+        distance: The distance to keep.
+        downwash: The number by which heights are divided for the distance.
     """
 
     points: Array
@@ -42,11 +42,11 @@ class Resting:
 
     @property
     def radii(self) -> Array:
-        """The radii along the axes of the ellipsoid around each of them that is closed to others."""
+        """The radii along the axes of the closed ellipsoid around each drone."""
         return self.distance * np.array([1.0, 1.0, self.downwash])
 
     def clear(self, origins: Array, ends: Array) -> Flags:
-        """Return which straight lines (K,) keep from all of them."""
+        """Return which straight lines (K,) keep the distance from all of the drones."""
         flat = (squashed(points, self.downwash) for points in (origins, ends, self.points))
         apart = segment_distances(*flat).min(axis=1, initial=math.inf)
         return np.asarray(apart >= self.distance - SLACK_M / 2)
@@ -58,7 +58,7 @@ class VoxelPlan:
 
     Attributes:
         solid: The voxels that are not free: by z, then y, then x, each from the lowest on.
-        frame: Where the voxels lie.
+        frame: The place of the voxels.
         keep: The distance of a drone's centre from walls.
     """
 
@@ -70,13 +70,13 @@ class VoxelPlan:
     _lattices: dict[int, Lattice] = field(default_factory=dict)
 
     def keeping(self, keep: float) -> VoxelPlan:
-        """Return the same walls, with another distance."""
+        """Return the same walls for another distance."""
         return (
             self if keep == self.keep else replace(self, keep=keep, _surfaces=[self._surface], _ways={}, _lattices={})
         )
 
     def clearances(self, points: Array, most: float) -> Array:
-        """Return the distance (K,) of each of `points` (K, 3) from the nearest wall; `most` where it is further."""
+        """Return the distance (K,) of each of `points` (K, 3) from the nearest wall, at most `most`."""
         found = self._surface.distances(self.frame.in_voxels(points), most / self.frame.size)
         return np.asarray(np.minimum(self.frame.size * found, most))
 
@@ -86,7 +86,7 @@ class VoxelPlan:
         return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
 
     def floor(self, place: Array) -> float | None:
-        """Return the height of the floor below a place; None in a wall, or beside the map."""
+        """Return the height of the floor below a place; None in a wall, or outside the map."""
         voxel = np.floor(self.frame.in_voxels(place[None])[0]).astype(np.int64)
         if (voxel < 0).any() or (voxel >= self.solid.shape[::-1]).any():
             return None
@@ -97,12 +97,12 @@ class VoxelPlan:
         return self.frame.corner[2] + self.frame.size * (int(below[-1]) + 1 if len(below) else 0)
 
     def way(self, first: Array, second: Array) -> Array | None:
-        """Return a short way (K + 1, 3) between two points; None if there is none."""
+        """Return a short route (K + 1, 3) between two points; None if there is none."""
         found = self._known(first, second)
         return found and found[1]
 
     def way_among(self, first: Array, second: Array, others: Resting) -> Array | None:
-        """Return a short way (K + 1, 3) between two points that keeps from drones at rest, too; None: none is found."""
+        """Return a short route (K + 1, 3) between two points that avoids drones at rest, too; None if none is found."""
         known = self._known(first, second)
         if known is None:
             return None
@@ -113,9 +113,9 @@ class VoxelPlan:
         return found and found[1]
 
     def reached(self, start: Array, others: Resting, most: float) -> Array:
-        """Return points (K, 3) to which ways lead from `start`, the nearest first.
+        """Return points (K, 3) that can be reached from `start`, the nearest first.
 
-        The ways keep from drones at rest, and are no longer than `most`.
+        Routes to them avoid drones at rest, and are at most `most` long.
         """
         end = self.frame.in_voxels(start[None])[0]
         places = self._lattice(0).reached(
@@ -132,7 +132,7 @@ class VoxelPlan:
     def _way(
         self, first: Array, second: Array, others: Resting | None = None, last: int = len(_FINE) - 1
     ) -> tuple[int, Array] | None:
-        """Return a way, and the number of the lattice, up to `last`, on which it was found."""
+        """Return a route, and the number of the lattice, up to `last`, on which it was found."""
         ends = self.frame.in_voxels(np.array([first, second]))
         wish = self.keep + SPARE_M
         if (first == second).all() or self._clear(ends[0], ends[1], wish, others):

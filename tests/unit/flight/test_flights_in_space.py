@@ -155,7 +155,7 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
         )
     pipe = {(x, 0, 0): FREE for x in range(8)}
     team, ground = floors(tmp_path, pipe, "2,0.25,0.25", at="0.25,0.25,0.25 3.75,0.25,0.25", cell=0.25)
-    with pytest.raises(ValueError, match="Robot1, Robot2 get past each other between the walls: ask for a smaller"):
+    with pytest.raises(ValueError, match="Robot1, Robot2 get past each other between the walls: use a smaller"):
         fly(sent(team, ground, (3.75, 0.25, 0.25), (0.25, 0.25, 0.25)))
 
 
@@ -185,7 +185,7 @@ def test_voxels_in_a_map_are_read_and_wrong_ones_told(tmp_path: Path) -> None:
         return read_ground_map(json.dumps({**whole, "volume": volume, **also}).encode())
 
     for wrong, why in (
-        ({"free": "AAAA"}, "its walls have 420 voxels, and free has flags for 24"),
+        ({"free": "AAAA"}, "its walls have 420 voxels, but free has flags for 24"),
         ({"occupied": ""}, "occupied has flags for 0"),
         ({"columns": 10**7, "rows": 10**7}, "its walls have 700,000,000,000,000 voxels, more than 16,000,000"),
         ({"levels": 0}, "levels"),
@@ -198,7 +198,7 @@ def test_voxels_in_a_map_are_read_and_wrong_ones_told(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match=why):
             read(wrong)
     pixels = {"columns": 1, "rows": 1, "resolution": 1, "corner": [0, 0], "radius": 0, "speed": 1}
-    with pytest.raises(ValueError, match="walls in the plane, and a volume"):
+    with pytest.raises(ValueError, match="both walls in the plane and a volume"):
         read({}, walls={**pixels, "free": "AA==", "occupied": "AA=="})
     with pytest.raises(ValueError, match="no scale"):
         read({}, scale=None)

@@ -196,7 +196,7 @@ def test_walls_in_a_map_are_read_and_wrong_ones_told(tmp_path: Path) -> None:
     whole = json.loads(ground_map_json(ground))
     assert read_ground_map(json.dumps(whole).encode()) == ground
     for wrong, why in (
-        ({"free": "AAAA"}, "its walls have 63 pixels, and free has flags for 24"),
+        ({"free": "AAAA"}, "its walls have 63 pixels, but free has flags for 24"),
         ({"occupied": ""}, "occupied has flags for 0"),
         ({"columns": 10**6, "rows": 10**6}, "its walls have 1,000,000,000,000 pixels, more than 4,000,000"),
         ({"resolution": 0}, "resolution"),

@@ -112,12 +112,12 @@ def test_a_volume_is_read_and_a_wrong_one_told() -> None:
         ({"levels": 0}, "levels"),
         ({"levels": 1001}, "levels"),
         ({"starts": {"A": 7}}, "A is at level 7, above the map's 6"),
-        ({"blocked": [[6, 5, 1]]}, r"a blocked cell is at \(6, 5, 1\), beside the map of 6 x 4 x 6 cells"),
+        ({"blocked": [[6, 5, 1]]}, r"a blocked cell is at \(6, 5, 1\), outside the map of 6 x 4 x 6 cells"),
         ({"blocked": [[1, 1]]}, "length"),
         ({"blocked": [[1, 1, 1]] * 10_001}, "length"),
         ({"last": 3}, "last"),
         ({"sides": [64]}, "sides"),
-        ({"sides": [1, 2]}, "it has sides of 2 blocked cells, and 1 of these"),
+        ({"sides": [1, 2]}, "it has 2 sides, but 1 blocked cells"),
     ):
         with pytest.raises(ValueError, match=why):
             read_ground_map(json.dumps({**whole, "volume": {**volume, **wrong}}).encode())

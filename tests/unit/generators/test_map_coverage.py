@@ -17,7 +17,7 @@ from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.maps.occupancy.grid import read_occupancy_grid
 from robochoc.maps.reachability.cells import Cells
 from robochoc.maps.reachability.free_space import free_space
-from robochoc.maps.reachability.line_of_sight import sight_on
+from robochoc.maps.reachability.line_of_sight import lines_of_sight
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.cases import looped
@@ -64,7 +64,7 @@ def test_walls_are_in_the_way(columns: int, rows: int, seed: int, corner: str, s
     with TemporaryDirectory() as folder:
         grid = read_occupancy_grid(write_map(Path(folder), drawn, origin=f"[{corner}, -0.25, 0]"))
     cells = Cells(grid, Fraction(side), free_space(grid.free, Fraction(0)))
-    assert sight_on(cells).seen(Fraction(sensing)) == seen_on(drawn, cells, Fraction(sensing))
+    assert lines_of_sight(cells).visible_cells(Fraction(sensing)) == seen_on(drawn, cells, Fraction(sensing))
 
 
 def least(choice: MapChoice, seed: int, sensing: Fraction, worth: Fraction) -> tuple[Fraction, Fraction]:

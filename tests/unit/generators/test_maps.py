@@ -18,7 +18,7 @@ from robochoc.formats import check_team, read_team, write_team
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.map_team import MapChoice, reachability_of
 from robochoc.maps.ground_map import ground_map_json, read_ground_map
-from robochoc.maps.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
+from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid, summed_area
 from robochoc.maps.occupancy.packed import unpacked
 from robochoc.maps.reachability.cell_size import cells_of, passable
 from robochoc.maps.reachability.cells import Cells
@@ -148,9 +148,9 @@ def test_pixels_are_summed_once_for_all_sides_of_cells(monkeypatch: pytest.Monke
 
     def counted(flags: np.ndarray) -> np.ndarray:
         sizes.append(flags.shape)
-        return before(flags)
+        return summed_area(flags)
 
-    monkeypatch.setattr("robochoc.maps.occupancy.grid.before", counted)
+    monkeypatch.setattr("robochoc.maps.occupancy.grid.summed_area", counted)
     assert cells_of(grid, Fraction(0), 4).side == 6  # of twelve pixels
     assert sizes == [(40, 40)]
 

@@ -23,7 +23,7 @@ from robochoc.generators.maps.patrol import patrol
 from robochoc.maps.octomap.voxels import VoxelGrid, read_voxels
 from robochoc.maps.reachability.cell_size import cells_of, passable
 from robochoc.maps.reachability.cells import Cubes
-from robochoc.maps.reachability.line_of_sight import sight_on
+from robochoc.maps.reachability.line_of_sight import lines_of_sight
 from robochoc.maps.reachability.path_lengths import UNREACHED, lengths_from
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
@@ -145,7 +145,7 @@ def test_cells_are_as_small_as_their_number_allows() -> None:
         assert cells.side == Fraction(side)
         assert 0 < len(cells.free) <= most
     thin = grid_of(dict.fromkeys(itertools.product(range(-9, 9), range(-9, 9), range(2)), FREE), "0.1")
-    with pytest.raises(ValueError, match=r"no cell of 0.2 m is free, and 289 smaller ones are; allow more cells"):
+    with pytest.raises(ValueError, match=r"no cell of 0.2 m is free, but 289 smaller ones are; allow more cells"):
         cells_of(thin, Fraction(0), 288)
     with pytest.raises(ValueError, match=r"1,331 cells of 0.2 m are free, more than 9"):
         cells_of(grid, Fraction(0), 9, Fraction("0.2"))
@@ -220,7 +220,7 @@ def test_what_is_seen_is_seen_through_free_voxels(sides: Voxel, first: Voxel, se
     free = {at for at, kind in voxels.items() if kind == FREE}
     box = [range(low - 1, low + count + 1) for low, count in zip(first, sides, strict=True)]
     solid = {(x, y, z) for x, y, z in itertools.product(*box)} - free
-    sight, among = sight_on(cells), Random(seed).sample(cells.free, min(8, len(cells.free)))
+    sight, among = lines_of_sight(cells), Random(seed).sample(cells.free, min(8, len(cells.free)))
     for one, other in itertools.combinations(among, 2):
         ends = [tuple(part / grid.resolution for part in cells.centre(cell)) for cell in (one, other)]
         assert sight.is_clear(one, other) is not any(touches(ends[0], ends[1], at) for at in solid)
@@ -229,7 +229,7 @@ def test_what_is_seen_is_seen_through_free_voxels(sides: Voxel, first: Voxel, se
 def test_what_is_seen_is_within_the_range() -> None:
     grid = grid_of(dict.fromkeys(itertools.product(range(8), range(8), range(8)), FREE))
     cells = Cubes(grid, Fraction(1), grid.free)
-    seen = sight_on(cells).seen(Fraction("1.5"))
+    seen = lines_of_sight(cells).visible_cells(Fraction("1.5"))
     assert len(seen) == 27
     assert sorted(map(len, seen.values())) == sorted(
         sum(

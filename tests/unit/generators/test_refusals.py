@@ -192,7 +192,7 @@ def test_formations_on_a_map(tmp_path: Path) -> None:
             ({"radius": 51}, {}, "radius is 51 m, more than 100 pixels"),
             ({"speed": 0}, {}, "speed is 0"),
             ({"cell": 5}, {}, "no cell of 5 m is free"),
-            ({"cell": 0.001}, {}, "4501 columns and 3501 rows; 1000 are allowed"),
+            ({"cell": 0.001}, {}, "4501 columns and 3501 rows; at most 1000 are allowed"),
             ({"cell": 0.5, "cells": 3}, {}, "free, more than 3"),
             ({"agents": 40, "cell": 0.5}, {}, "40 robots do not fit on"),
             ({}, {"shape": "ring"}, "shape 'ring' is not one of line, column"),

@@ -21,7 +21,7 @@ from robochoc.generators.maps.patrol import patrol
 from robochoc.maps.occupancy.grid import OccupancyGrid, read_occupancy_grid
 from robochoc.maps.reachability.cells import Cells
 from robochoc.maps.reachability.free_space import free_space
-from robochoc.maps.reachability.line_of_sight import sight_on
+from robochoc.maps.reachability.line_of_sight import lines_of_sight
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -101,9 +101,9 @@ def test_cells_of_turned_maps_are_squares_of_the_frame(
 def test_quarter_turns_are_those_of_the_image(tmp_path: Path, yaw: str) -> None:
     """The same map, drawn as it lies in its frame, makes the same problem."""
     rows = drawn_rows(Random(5), 7, 4, 0.2)
-    quarters = round(float(yaw) / (math.pi / 2)) % 4
+    quadruple_squares = round(float(yaw) / (math.pi / 2)) % 4
     turned, corner = rows, (0, 0)
-    for _ in range(quarters):
+    for _ in range(quadruple_squares):
         corner = (-corner[1] - len(turned), corner[0])
         turned = ["".join(row[-1 - number] for row in turned) for number in range(len(turned[0]))]
     plain = [f"{1 + corner[0] * 0.5}", f"{2 + corner[1] * 0.5}"]
@@ -118,7 +118,7 @@ def test_quarter_turns_are_those_of_the_image(tmp_path: Path, yaw: str) -> None:
         for name in ("turned", "drawn")
     )
     assert isinstance(one.cells, Cells)
-    assert one.cells.grid.turn.is_none
+    assert one.cells.grid.rotation.is_zero
     assert one.seconds == other.seconds
     assert one.seconds[0]
     assert one.starts == other.starts
@@ -140,10 +140,10 @@ def test_the_frame_is_the_one_of_ros() -> None:
 
 def test_a_hair_of_a_turn_is_none() -> None:
     rows = ["..."] * 3
-    assert grid_of(rows, origin="[0, 0, 0.000001]").turn.is_none
-    assert grid_of(rows, origin="[0, 0, 1.5707]").turn.is_none
-    assert not grid_of(rows, origin="[0, 0, 0.01]").turn.is_none
-    assert not grid_of(["." * 2000] * 2, origin="[0, 0, 0.00001]").turn.is_none
+    assert grid_of(rows, origin="[0, 0, 0.000001]").rotation.is_zero
+    assert grid_of(rows, origin="[0, 0, 1.5707]").rotation.is_zero
+    assert not grid_of(rows, origin="[0, 0, 0.01]").rotation.is_zero
+    assert not grid_of(["." * 2000] * 2, origin="[0, 0, 0.00001]").rotation.is_zero
 
 
 @given(st.integers(2, 9), st.integers(2, 9), st.integers(0, 2**32), YAWS, st.sampled_from([0.0, 0.3, 0.6]))
@@ -186,8 +186,8 @@ def test_lines_of_sight_on_a_turned_map_are_those_of_the_image() -> None:
     yaw = 0.4
     grid = grid_of(rows, origin=f"[0, 0, {yaw}]")
     cells = Cells(grid, Fraction(1, 2), free_space(grid.free, Fraction(0)))
-    sight = sight_on(cells)
-    found = sight.seen(Fraction(4))
+    sight = lines_of_sight(cells)
+    found = sight.visible_cells(Fraction(4))
     through = 0
     for one in cells.free:
         for other in cells.free:

@@ -130,7 +130,7 @@ def test_a_map_is_read_and_a_wrong_one_told() -> None:
     for wrong, why in (
         ({"columns": 0}, "columns"),
         ({"columns": 10**9}, "columns"),
-        ({"starts": {"A": [7, 1]}}, r"A is at \(7, 1\), beside the map"),
+        ({"starts": {"A": [7, 1]}}, r"A is at \(7, 1\), outside the map"),
         ({"blocked": [{"x": 1, "y": 5}]}, "a blocked cell is at"),
         ({"blocked": [{"x": 1, "y": 1}] * 10_001}, "length"),
         ({"starts": {"A": [1]}}, "length"),

@@ -106,17 +106,17 @@ def png(width: int, height: int, content: bytes, colour: int = 0) -> bytes:
 @looped(
     ("content", "said"),
     [
-        (b"", "is no PGM, PNG or BMP image"),
-        (b"GIF89a", "is no PGM, PNG or BMP image"),
+        (b"", "is not a PGM, PNG or BMP image"),
+        (b"GIF89a", "is not a PGM, PNG or BMP image"),
         (png(2001, 2001, b""), "has 2001 x 2001 pixels"),
         (png(2**31 - 1, 2**31 - 1, b""), "has .* pixels"),
         (png(20_000, 20_000, b""), "has .* pixels"),
-        (png(0, 2, b""), "is a broken PNG|has 0 x 2 pixels"),
-        (png(2, 2, b"nonsense"), "is a broken PNG"),
-        (png(2, 2, zlib.compress(bytes(6)))[:-30], "is a broken PNG"),
-        (png(1, 1, zlib.compress(bytes(2)), _PALETTE), "is a broken PNG image: its palette is missing"),
-        (b"\x89PNG\r\n\x1a\n", "is a broken PNG"),
-        (b"BM" + bytes(100), "is a broken BMP"),
+        (png(0, 2, b""), "is a damaged PNG|has 0 x 2 pixels"),
+        (png(2, 2, b"nonsense"), "is a damaged PNG"),
+        (png(2, 2, zlib.compress(bytes(6)))[:-30], "is a damaged PNG"),
+        (png(1, 1, zlib.compress(bytes(2)), _PALETTE), "is a damaged PNG image: its palette is missing"),
+        (b"\x89PNG\r\n\x1a\n", "is a damaged PNG"),
+        (b"BM" + bytes(100), "is a damaged BMP"),
     ],
 )
 def test_broken_images_and_bombs_are_refused(content: bytes, said: str) -> None:

@@ -37,9 +37,9 @@ def test_plain_and_raw_images_are_read_with_their_comments() -> None:
 @looped(
     ("content", "said"),
     [
-        (b"", "is no PGM image"),
-        (b"\x89PNG\r\n", "is no PGM image"),
-        (b"P6 1 1 255 abc", "is no PGM image"),
+        (b"", "is not a PGM image"),
+        (b"\x89PNG\r\n", "is not a PGM image"),
+        (b"P6 1 1 255 abc", "is not a PGM image"),
         (b"P2 2 1 255\n1 2 3", "has data after its 2 pixels"),
         (b"P5 2 1 255\n12\n3", "has data after its 2 pixels"),
         (b"P5", "has no width"),
@@ -123,21 +123,21 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
     ("old", "new", "said"),
     [
         ("image: plan.pgm\n", "", "plan.yaml:1: the map has no image"),
-        ("plan.pgm", "[plan]", "plan.yaml:1: has an image that is no path"),
+        ("plan.pgm", "[plan]", "plan.yaml:1: has an image that is not a path"),
         ("plan.pgm", "other.pgm", "plan.yaml:1: names the image other.pgm, which does not exist .*folder of this file"),
         (YAML, f"P2 1 1 255 1{' ' * MAX_YAML}", "plan.yaml: is an image .*name the YAML file"),
-        ("0.5", "0", "plan.yaml:2: has a wrong resolution .*from 0.001 to 100"),
-        ("0.5", "much", "plan.yaml:2: has a wrong resolution"),
-        ("0.5", "true", "plan.yaml:2: has a wrong resolution"),
-        ("0.5", ".inf", "plan.yaml:2: has a wrong resolution"),
-        ("[1, -2.5, 0]", "[1, 2]", "plan.yaml:3: has an origin that is no pose"),
-        ("[1, -2.5, 0]", "[1, 2, 1001]", "plan.yaml:3: has a wrong yaw .*from -1000 to 1000"),
-        ("[1, -2.5, 0]", "[1e12, 2, 0]", "plan.yaml:3: has a wrong origin"),
+        ("0.5", "0", "plan.yaml:2: has an invalid resolution .*from 0.001 to 100"),
+        ("0.5", "much", "plan.yaml:2: has an invalid resolution"),
+        ("0.5", "true", "plan.yaml:2: has an invalid resolution"),
+        ("0.5", ".inf", "plan.yaml:2: has an invalid resolution"),
+        ("[1, -2.5, 0]", "[1, 2]", "plan.yaml:3: has an origin that is not a pose"),
+        ("[1, -2.5, 0]", "[1, 2, 1001]", "plan.yaml:3: has an invalid yaw .*from -1000 to 1000"),
+        ("[1, -2.5, 0]", "[1e12, 2, 0]", "plan.yaml:3: has an invalid origin"),
         ("negate: 0", "negate: 2", "plan.yaml:4: has a negate"),
-        ("0.65", "1.5", "plan.yaml:5: has a wrong occupied_thresh"),
-        ("0.25", "0.7", "plan.yaml:6: has a wrong free_thresh .*from 0 to 0.65"),
+        ("0.65", "1.5", "plan.yaml:5: has an invalid occupied_thresh"),
+        ("0.25", "0.7", "plan.yaml:6: has an invalid free_thresh .*from 0 to 0.65"),
         ("negate: 0", "negate: 0\nmode: [raw]", "plan.yaml:5: has a list or mapping as its mode .*are read"),
-        ("negate: 0", "negate: 0\nmode: rare", "plan.yaml:5: has the mode rare .*trinary, scale, raw are read"),
+        ("negate: 0", "negate: 0\nmode: rare", "plan.yaml:5: has the mode rare .*supported are trinary, scale, raw"),
         ("negate: 0", "negate: 0\nnegate: 1", "plan.yaml:5: duplicate key 'negate'"),
         ("negate: 0", "negate: !!python/object:os.system 0", "plan.yaml:4: the tag"),
         ("negate: 0", "negate: 0\nmood: raw", "plan.yaml:5: unknown key 'mood' .*did you mean 'mode'"),
@@ -161,7 +161,7 @@ def test_what_is_no_file_is_not_waited_for(tmp_path: Path) -> None:
     path = write_map(tmp_path, [".#"])
     (tmp_path / "plan.pgm").unlink()
     os.mkfifo(tmp_path / "plan.pgm")
-    with pytest.raises(InvalidInputError, match=r"plan.pgm: is no file"):
+    with pytest.raises(InvalidInputError, match=r"plan.pgm: is not a file"):
         read_occupancy_grid(path)
-    with pytest.raises(InvalidInputError, match="is no file"):
+    with pytest.raises(InvalidInputError, match="is not a file"):
         read_occupancy_grid(tmp_path)

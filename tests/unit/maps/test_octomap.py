@@ -152,34 +152,34 @@ CHAIN = b"\x03\x00"
 @looped(
     ("content", "said"),
     [
-        (b"", "is no OctoMap file"),
-        (b"\x03\x00\x00\x00 an old binary file", "is no OctoMap file"),
+        (b"", "is not an OctoMap file"),
+        (b"\x03\x00\x00\x00 an old binary file", "is not an OctoMap file"),
         (BT, "has a header without end"),
         (BT + b"# id OcTree\n" * 10_000, "has a header without end"),
         (BT + b"id OcTree\n" * 2, "has the line 'id' twice in its header"),
         (BT + HEAD.replace(b"data", b"resolution 1\ndata"), "has the unknown line 'resolution' in its header"),
         (BT + HEAD.replace(b"2", b"0") + CHAIN, "has 2 bytes after its last node"),
-        (BT + HEAD.replace(b"2", b"9") + b"\x01\x00 \n\xff\xff", "has 2 nodes, and its header says 9"),
+        (BT + HEAD.replace(b"2", b"9") + b"\x01\x00 \n\xff\xff", "has 2 nodes, but its header states 9"),
         (BT + HEAD + b"\x01\x00 \n\xff\xff", "has 4 bytes after its last node"),
         (BT + b"id OcTree\nsize 1\ndata\n", "has no res in its header"),
         (BT + b"size 1\nres 1\ndata\n", "has no id in its header"),
         (BT + b"id OcTree\nres 1\ndata\n", "has no size in its header"),
         (BT + HEAD.replace(b"OcTree", b"CountingOcTree"), "has a tree of the type CountingOcTree"),
-        (BT + HEAD.replace(b"0.5", b"0"), "has a wrong res"),
-        (BT + HEAD.replace(b"0.5", b"nan"), "has a wrong res"),
-        (BT + HEAD.replace(b"0.5", b"1e99"), "has a wrong res"),
-        (BT + HEAD.replace(b"0.5", b""), "has a wrong res"),
-        (BT + HEAD.replace(b"size 2", b"size -2"), "has a wrong size"),
-        (BT + HEAD.replace(b"size 2", b"size 2.5"), "has a wrong size"),
+        (BT + HEAD.replace(b"0.5", b"0"), "has an invalid res"),
+        (BT + HEAD.replace(b"0.5", b"nan"), "has an invalid res"),
+        (BT + HEAD.replace(b"0.5", b"1e99"), "has an invalid res"),
+        (BT + HEAD.replace(b"0.5", b""), "has an invalid res"),
+        (BT + HEAD.replace(b"size 2", b"size -2"), "has an invalid size"),
+        (BT + HEAD.replace(b"size 2", b"size 2.5"), "has an invalid size"),
         (BT + HEAD, "ends after 0 nodes"),
         (BT + HEAD + b"\x03", "ends after 0 nodes"),
         (BT + HEAD + CHAIN * 5, "ends after 5 nodes"),
         (BT + HEAD + b"\x00\x00", "has a node without children at byte 71"),
         (BT + HEAD + CHAIN + b"\x00\x00", "has a node without children at byte 73"),
         (BT + HEAD + CHAIN * 16 + b"\x01\x00", "has a node below level 16 at byte 103"),
-        (BT + HEAD + b"\x05\x00", "has 3 nodes, and its header says 2"),
+        (BT + HEAD + b"\x05\x00", "has 3 nodes, but its header states 2"),
         (OT + HEAD + struct.pack("<fB", 1, 1), "ends after 1 nodes"),
-        (OT + HEAD + struct.pack("<fB", 1, 0), "has 1 nodes, and its header says 2"),
+        (OT + HEAD + struct.pack("<fB", 1, 0), "has 1 nodes, but its header states 2"),
         (OT + HEAD + struct.pack("<fBfB", 1, 1, 1, 0) + b"x", "has 1 bytes after its last node"),
         (OT + HEAD + struct.pack("<fB", 1, 1) * 17 + struct.pack("<fB", 1, 0), "has a node below level 16 at byte"),
     ],
@@ -193,7 +193,7 @@ def test_other_files_are_refused(content: bytes, said: str) -> None:
 def test_a_file_is_named_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "plan.bt"
     path.write_bytes(BT + HEAD.replace(b"0.5", b"much"))
-    with pytest.raises(InvalidInputError, match=r"plan.bt:5: has a wrong res .*from 0.001 to 100"):
+    with pytest.raises(InvalidInputError, match=r"plan.bt:5: has an invalid res .*from 0.001 to 100"):
         read_map(path)
     path.write_bytes(BT + HEAD.replace(b"size 2", b"size 0"))
     with pytest.raises(InvalidInputError, match=r"plan.bt: has no free voxel"):

@@ -32,7 +32,7 @@ def test_they_are_the_centres_of_cells(tmp_path: Path, origin: str) -> None:
     for robot in team.robots:
         for variable in robot.variables:
             for value in variable.domain:
-                (place,) = places.of({variable.name: value}).values()
+                (place,) = places.places_of({variable.name: value}).values()
                 assert place == tuple(map(float, cells.centre(value)))
 
 
@@ -41,14 +41,14 @@ def test_so_they_are_of_later_visits_and_in_three_dimensions(tmp_path: Path) -> 
     team, ground = patrol(choice, 1, points=4, rounds=2)
     cells = reachability_of(choice, Random(1)).cells
     values = {name: variable.domain.ranges[0][0] for name, variable in team.variables.items()}
-    assert MapPlaces(team, ground).of(values) == {
+    assert MapPlaces(team, ground).places_of(values) == {
         name: tuple(map(float, cells.centre(value))) for name, value in values.items()
     }
     house = MapChoice(map=str(ROOT / "docs/examples/house/house.bt"), agents=2, cell=1)
     team, ground = coverage(house, 1)
     values = {name: variable.domain.ranges[0][0] for name, variable in team.variables.items()}
-    assert {len(place) for place in MapPlaces(team, ground).of(values).values()} == {3}
-    assert all(part == Fraction(part) for place in MapPlaces(team, ground).of(values).values() for part in place)
+    assert {len(place) for place in MapPlaces(team, ground).places_of(values).values()} == {3}
+    assert all(part == Fraction(part) for place in MapPlaces(team, ground).places_of(values).values() for part in place)
 
 
 def robot(x: Expression, *more: Variable) -> Team:
@@ -59,14 +59,14 @@ def robot(x: Expression, *more: Variable) -> Team:
 def test_what_is_no_place_is_not_told() -> None:
     ground = GroundMap(9, 9, scale=0.5)
     plain = robot(Name("V"))
-    assert MapPlaces(plain, ground).of({"V": 3}) == {"V": (1.5, 1.0)}
-    assert MapPlaces(plain, None).of({"V": 3}) == {}
-    assert MapPlaces(plain, msgspec.structs.replace(ground, scale=None)).of({"V": 3}) == {}
-    assert MapPlaces(robot(Apply("div", (Constant(8), Name("V")))), ground).of({"V": 0}) == {}
-    assert MapPlaces(robot(Apply("pow", (Constant(10), Constant(400)))), ground).of({"V": 1}) == {}
+    assert MapPlaces(plain, ground).places_of({"V": 3}) == {"V": (1.5, 1.0)}
+    assert MapPlaces(plain, None).places_of({"V": 3}) == {}
+    assert MapPlaces(plain, msgspec.structs.replace(ground, scale=None)).places_of({"V": 3}) == {}
+    assert MapPlaces(robot(Apply("div", (Constant(8), Name("V")))), ground).places_of({"V": 0}) == {}
+    assert MapPlaces(robot(Apply("pow", (Constant(10), Constant(400)))), ground).places_of({"V": 1}) == {}
     huge = Apply("add", (Apply("pow", (Constant(10), Constant(400))), Name("V")))
-    assert MapPlaces(robot(huge), ground).of({"V": 1}) == {}
+    assert MapPlaces(robot(huge), ground).places_of({"V": 1}) == {}
     speed = Variable("S", Domain("E", (range(90, 95),)))
-    assert MapPlaces(robot(Name("V"), speed), ground).of({"V": 3, "S": 91}) == {"V": (1.5, 1.0)}
+    assert MapPlaces(robot(Name("V"), speed), ground).places_of({"V": 3, "S": 91}) == {"V": (1.5, 1.0)}
     both = robot(Apply("add", (Name("V"), Name("S"))), speed)
-    assert MapPlaces(both, ground).of({"V": 3, "S": 91}) == {}
+    assert MapPlaces(both, ground).places_of({"V": 3, "S": 91}) == {}

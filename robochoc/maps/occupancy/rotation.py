@@ -1,6 +1,6 @@
-"""Turned maps: the yaw of a map's origin, as a number of quarter turns and the sine and cosine of what is left.
+"""Rotated maps: the yaw of a map's origin, as a number of quarter turns and the sine and cosine of the rest.
 
-Sines are computed in integers, to 40 decimal places: so cells of turned maps are the same on every machine.
+Sines are computed in integers, to 40 decimal places, so that cells of rotated maps are the same on every machine.
 """
 
 from __future__ import annotations
@@ -19,43 +19,43 @@ Place = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True)
-class Turn:
-    """A counterclockwise turn around the origin by less than an eighth of a circle."""
+class Rotation:
+    """A counterclockwise rotation around the origin by less than an eighth of a circle."""
 
     cosine: Fraction = Fraction(1)
     sine: Fraction = Fraction(0)
 
     @property
-    def is_none(self) -> bool:
-        """Return whether nothing is turned."""
+    def is_zero(self) -> bool:
+        """Whether the angle is 0."""
         return not self.sine
 
-    def turned(self, place: Place) -> Place:
-        """Return where a place gets to."""
+    def rotated(self, place: Place) -> Place:
+        """Return the rotated place."""
         x, y = place
         return (self.cosine * x - self.sine * y, self.sine * x + self.cosine * y) if self.sine else place
 
-    def back(self, place: Place) -> Place:
-        """Return where a place has come from."""
+    def rotated_back(self, place: Place) -> Place:
+        """Return the place rotated by the opposite angle."""
         x, y = place
         return (self.cosine * x + self.sine * y, self.cosine * y - self.sine * x) if self.sine else place
 
 
-UNTURNED = Turn()
+NO_ROTATION = Rotation()
 
 
-def turn_of(yaw: Fraction, reach: Fraction) -> tuple[int, Turn]:
-    """Return the quarter turns of a yaw, 0 to 3, and the turn that is left, between eighths of a circle.
+def split_yaw(yaw: Fraction, reach: Fraction) -> tuple[int, Rotation]:
+    """Return the quarter turns of a yaw, 0 to 3, and the remaining rotation by at most an eighth of a circle.
 
     Args:
-        yaw: The angle in radians. A quarter turn is written with some decimal places only.
-        reach: What is left of the angle is nothing if it moves nothing within this radius by more than 1/100.
+        yaw: The angle in radians. Quarter turns are given with few decimal places.
+        reach: A remaining rotation that moves no point within this radius by more than 1/100 is omitted.
     """
-    quarters = round(yaw / _HALF_PI)
-    rest = yaw - quarters * _HALF_PI
+    quadruple_squares = round(yaw / _HALF_PI)
+    rest = yaw - quadruple_squares * _HALF_PI
     if abs(rest) * reach * 100 <= 1:
-        return quarters % 4, UNTURNED
-    return quarters % 4, Turn(*_cosine_and_sine(rest))
+        return quadruple_squares % 4, NO_ROTATION
+    return quadruple_squares % 4, Rotation(*_cosine_and_sine(rest))
 
 
 def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:

@@ -1,4 +1,4 @@
-"""Reads the content of map files: bounded, and told with the file's name where it cannot be read."""
+"""Reads the content of map files, up to a maximum size, and adds the file's name to errors."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from robochoc.formats.diagnostics import MistakeError, invalid_input
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
-    """Raise `InvalidInputError`, with the file's name, for what is wrong in it."""
+def as_input_errors(path: Path) -> Iterator[None]:
+    """Convert errors of reading a file to `InvalidInputError`, with the file's name."""
     try:
         yield
     except OSError as error:
@@ -21,22 +21,22 @@ def told(path: Path) -> Iterator[None]:
         raise invalid_input(path, mistake.message, mistake.hint, mistake.line) from None
 
 
-def content_of(path: Path, most: int) -> bytes:
-    """Return what a file holds.
+def read_content(path: Path, most: int) -> bytes:
+    """Return the content of a file.
 
     Raises:
         OSError: It cannot be read.
-        MistakeError: It is no regular file, or has more than `most` bytes.
+        MistakeError: It is not a regular file, or has more than `most` bytes.
     """
-    content = beginning_of(path, most + 1)
+    content = read_beginning(path, most + 1)
     if len(content) > most:
         raise MistakeError("is too large", f"it may have {most:,} bytes")
     return content
 
 
-def beginning_of(path: Path, most: int) -> bytes:
-    """Return the first bytes of a file. Raises as `content_of`; a longer file is none of its mistakes."""
+def read_beginning(path: Path, most: int) -> bytes:
+    """Return at most the first `most` bytes of a file, which may be longer. Raises as `read_content`."""
     if path.exists() and not stat.S_ISREG(path.stat().st_mode):
-        raise MistakeError("is no file", "name a file")
+        raise MistakeError("is not a file", "name a file")
     with path.open("rb") as file:
         return file.read(most)
