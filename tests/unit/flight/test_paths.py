@@ -238,11 +238,11 @@ def test_arguments_without_sense_are_refused(wrong: dict[str, float]) -> None:
 
 
 def test_points_and_limits_without_sense_are_refused() -> None:
-    with pytest.raises(ValueError, match="goals has the shape .*; it must have rows of three finite numbers"):
+    with pytest.raises(ValueError, match=r"goals has the shape .*; it must have rows of three finite numbers"):
         plan_routes(GRID[:1], GRID[:1] * np.nan, distance=1)
     with pytest.raises(ValueError, match="it must have rows of three finite numbers"):
         plan_routes(GRID[0], GRID[0], distance=1)
-    with pytest.raises(ValueError, match="limits are positive numbers"):
+    with pytest.raises(ValueError, match="limits must be positive numbers"):
         MotionLimits(speed=0)
 
 

@@ -136,7 +136,7 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
         ("negate: 0", "negate: 2", "plan.yaml:4: has a negate"),
         ("0.65", "1.5", "plan.yaml:5: has an invalid occupied_thresh"),
         ("0.25", "0.7", "plan.yaml:6: has an invalid free_thresh .*from 0 to 0.65"),
-        ("negate: 0", "negate: 0\nmode: [raw]", "plan.yaml:5: has a list or mapping as its mode .*are read"),
+        ("negate: 0", "negate: 0\nmode: [raw]", "plan.yaml:5: has a list or mapping as its mode .*supported are"),
         ("negate: 0", "negate: 0\nmode: rare", "plan.yaml:5: has the mode rare .*supported are trinary, scale, raw"),
         ("negate: 0", "negate: 0\nnegate: 1", "plan.yaml:5: duplicate key 'negate'"),
         ("negate: 0", "negate: !!python/object:os.system 0", "plan.yaml:4: the tag"),
