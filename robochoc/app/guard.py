@@ -1,4 +1,4 @@
-"""Protection of the application's server: who may use it, and limits of requests and connections."""
+"""Protection of the application's server: access control, and limits of requests and connections."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ class AccessGuard:
     """Passes requests to `served` if they have the secret path and come from this machine and the application's pages.
 
     Other users of this machine do not know the path. Other sites in the same browser do not know the path either, and
-    have another Origin; after DNS rebinding their Host header is another one.
+    have another Origin; after DNS rebinding, their Host header differs.
     """
 
     def __init__(self, served: Served, secret: str, port: int) -> None:

@@ -138,7 +138,7 @@ class Project(PartsOwner):
         asyncio.ensure_future(asyncio.get_running_loop().run_in_executor(None, self._write)).add_done_callback(done)
 
     def _write(self) -> None:
-        with self._writing:  # one at a time, each with the present state: the last one is the newest
+        with self._writing:  # one thread at a time, each with the present state, so that the last file is the newest
             if self.removed:
                 return
             try:

@@ -76,7 +76,7 @@ class TeamStore:
             try:
                 fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:
-                why = "use its page, or end it, or name another folder with --folder"
+                why = "use its page, end it, or choose another folder with --folder"
                 raise InUseError(f"{self.folder} is open in another 'robochoc app': {why}") from None
             self._sweep(_NEW)
             yield

@@ -32,7 +32,7 @@ JSON = ("json", "utf-8")
 PACKED = ("msgpack", "base64")
 """Language and encoding."""
 CLOCK = "x-clock"
-"""The user-defined parameter that holds the sender's NCCC clock."""
+"""The user-defined parameter with the sender's NCCC clock."""
 MAX_JSON = 1 << 22
 """The maximum number of characters. Small lists need many times as much memory as their text."""
 
@@ -236,7 +236,7 @@ def _shown(found: object) -> str:
 
 
 _MARKS = {"base64", "float", "map"}
-"""Keys of objects that stand for values without a JSON form."""
+"""Keys of objects that represent values without a JSON form."""
 PLATFORM = "localhost/robochoc"
 """The name in place of the machine's, which journals do not record."""
 
@@ -343,7 +343,7 @@ def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON
 def _packings(kind: type[Message], content: Mapping[str, Any]) -> Iterator[bytes]:
     """Yield possible msgpack bytes of a message: of its fields as recorded, and converted to their types.
 
-    JSON journals hold bytes in base64, and do not distinguish 1 from 1.0.
+    JSON journals have bytes in base64, and do not distinguish 1 from 1.0.
     """
     try:
         said = [kind.__struct_config__.tag, *(content[name] for name in kind.__struct_fields__)]

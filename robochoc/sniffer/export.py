@@ -27,7 +27,7 @@ _LEVEL = 6
 
 
 def embedded_answers(data: PageData, journal: Journal | None = None, *, most_states: int = 20_000) -> dict[str, bytes]:
-    """Return the answers about the whole trace of `data`; with its `journal` also robots' states.
+    """Return the answers about the complete trace of `data`; with its `journal` also robots' states.
 
     States are computed by replay, for robots in the order of their names, until they have `most_states` steps together.
     """

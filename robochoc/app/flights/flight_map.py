@@ -20,7 +20,7 @@ _MOST_TOLD = 100_000
 
 
 class RunChange(msgspec.Struct):
-    """The content of `change.json`: the team after the events, and why it decided `anew` in another run, if so."""
+    """The content of `change.json`: the team after the events, and the reason if it decided from scratch (`anew`)."""
 
     after: Sketch
     happened: list[str] = []

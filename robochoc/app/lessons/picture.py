@@ -48,7 +48,7 @@ def _framed(words: str, parts: list[str]) -> str:
 
 def _link(team: TeamSpec, one: str, other: str) -> str:
     (x1, y1), (x2, y2) = team.place(one), team.place(other)
-    part = 0.5 if x1 == x2 or y1 == y2 else _SIGN  # where links cross, their signs stand apart
+    part = 0.5 if x1 == x2 or y1 == y2 else _SIGN  # so that the signs of crossing links do not overlap
     x, y = x1 + part * (x2 - x1), y1 + part * (y2 - y1)
     return (
         f'<line class="link" x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}"/>'

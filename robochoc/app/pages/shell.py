@@ -40,7 +40,7 @@ def shell(title: str, project: Project | None = None, area: str = "") -> Iterato
     ui.page_title(f"{title} - {say('app.title')}" if title else say("app.title"))
     ui.colors(primary="var(--accent)")
     if around := ui.context.client.content.parent_slot:
-        around.parent.props("role=none")  # NiceGUI's page is a <main> around ours, and around the bar
+        around.parent.props("role=none")  # NiceGUI's page is a <main> that contains our <main> and the bar
     ui.link(say("app.skip"), "#content").classes("skip")
     with ui.element("header").classes("bar"):
         _brand()
@@ -119,7 +119,7 @@ def _undo_and_redo(project: Project) -> None:
         if event.action.keydown and (event.modifiers.ctrl or event.modifiers.meta) and event.key.name.lower() == "z":
             (project.redo if event.modifiers.shift else project.undo)()
 
-    ui.keyboard(pressed, ignore=["input", "select", "textarea"])  # where somebody types, the browser undoes
+    ui.keyboard(pressed, ignore=["input", "select", "textarea"])  # in these elements, the browser undoes
     on_leave(project.on_change(follow))
     follow()
 

@@ -1,4 +1,4 @@
-// Light or dark: what the browser asks for, until somebody says otherwise. That is kept in the browser, for all pages.
+// Light or dark: the browser's preference, unless the user chooses otherwise. The choice is stored in the browser.
 const KEY = "robochoc-theme";
 
 export default {
@@ -19,7 +19,7 @@ export default {
       let kept = null;
       try {
         kept = localStorage.getItem(KEY);
-      } catch { /* the browser keeps nothing */ }
+      } catch { /* the browser does not store it */ }
       if (kept === "dark" || kept === "light") this.show(kept === "dark");
     },
     heard(event) {
@@ -34,7 +34,7 @@ export default {
       this.show(dark);
       try {
         localStorage.setItem(KEY, dark ? "dark" : "light");
-      } catch { /* then it is for this page alone */ }
+      } catch { /* then the choice is only for this page */ }
     },
   },
 };

@@ -35,7 +35,7 @@ class Card(Protocol):
     element: Element
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
 
 
 class Cards:

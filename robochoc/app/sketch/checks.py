@@ -66,7 +66,7 @@ def _left(facts: SketchFacts, own: Own, robot: str, decision: str) -> Values:
 
 
 def _pair_conflicts(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
-    """Yield the last one of rules that two robots cannot satisfy together."""
+    """Yield the last rule of each group of rules that two robots cannot satisfy together."""
     links: dict[_Link, list[tuple[int, bool]]] = {}
     for place, rule in enumerate(rules):
         entry = PALETTE[rule.kind]

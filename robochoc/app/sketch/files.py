@@ -61,7 +61,7 @@ def save(sketch: Sketch, folder: Path, *, replace: bool = False) -> None:
     """
     team = _checked_team(sketch)
     if not replace and folder.exists():
-        raise invalid_input(folder, "the folder exists already", "choose another folder, or replace this one")
+        raise invalid_input(folder, "the folder already exists", "choose another folder, or replace this one")
     write_team(team, folder, replace=replace, extra_files={SKETCH_FILE: sketch_file(sketch, team_files(team))})
 
 
@@ -92,11 +92,11 @@ def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...
     if not path.exists():
         return ()
     if not path.is_file() or path.stat().st_size > MAX_SKETCH:
-        raise _damaged(path, "it is not a file, or too large")
+        raise _damaged(path, f"it is not a regular file, or has more than {MAX_SKETCH >> 20} MiB")
     try:
         content = path.read_bytes()
         if msgspec.json.decode(content, type=_Version).version > VERSION:
-            raise invalid_input(path, "a newer version of robochoc wrote it", "install that version")
+            raise invalid_input(path, "it was written by a newer version of robochoc", "update robochoc")
         found = msgspec.json.decode(content, type=_SketchFile)
         sketch = msgspec.json.decode(found.sketch, type=Sketch)
     except (msgspec.DecodeError, RecursionError, UnicodeError) as damaged:

@@ -200,7 +200,9 @@ def _unpack(path: Path, folder: Path) -> None:
             target.parent.mkdir(exist_ok=True)
             target.write_bytes(content)
     if not taken:
-        raise invalid_input(path, "the archive has no team: no XML file", "choose an archive of one team's folder")
+        raise invalid_input(
+            path, "the archive contains no XML files of a team", "choose an archive of one team's folder"
+        )
 
 
 def _too_large(path: Path) -> InvalidInputError:
@@ -209,7 +211,7 @@ def _too_large(path: Path) -> InvalidInputError:
 
 
 def _two_teams(path: Path, name: str) -> InvalidInputError:
-    return invalid_input(path, f"the archive has {name} twice", "choose an archive of one team's folder")
+    return invalid_input(path, f"the archive contains {name} more than once", "choose an archive of one team's folder")
 
 
 def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:

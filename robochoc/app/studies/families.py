@@ -13,7 +13,7 @@ from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
 
 Option = int | float | str | list[int] | list[float]
 _MOST_SAMPLED = 60
-"""The maximum number of values whose pairs are all checked; of more values, this number is sampled evenly."""
+"""The maximum number of values whose pairs are all checked; of more values, this number of values is sampled evenly."""
 _COLOURINGS = frozenset({"different", "neighbours-different"})
 _STEP = 0.1
 _LEAST, _MOST = 0.02, 0.9

@@ -95,7 +95,7 @@ def test_every_example_is_decided_by_the_commands_as_in_this_process(tmp_path: P
 
 
 def test_a_team_that_is_there_is_replaced_only_when_asked(folder: Path) -> None:
-    with pytest.raises(InvalidInputError, match="exists already"):
+    with pytest.raises(InvalidInputError, match="already exists"):
         save(TEAM, folder)
     other = msgspec.structs.replace(TEAM, rules=())
     save(other, folder, replace=True)

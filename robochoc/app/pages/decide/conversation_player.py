@@ -80,7 +80,7 @@ class ConversationPlayer:
         self._list.set_content(messages_html(messages[:_LISTED]))
 
     def set_run(self, run: Run | None) -> None:
-        """Offer the playback of an ended run; None: there is no run."""
+        """Set the ended run for the playback; None: there is no run."""
         if run is self._run:
             return
         self._reset()

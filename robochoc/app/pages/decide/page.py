@@ -37,7 +37,7 @@ _SINGLE_CLICKS = (0, 1)
 SHORT_S = 3.0
 """Searches shorter than this are replayed, since they ended before anyone could watch."""
 FEW_MESSAGES = 100
-"""Searches with at most so many messages are also replayed: they may take longer on a busy machine."""
+"""Searches with at most this number of messages are also replayed, since they may be slower on a busy machine."""
 
 
 def build_decide(project: Project) -> None:

@@ -1,11 +1,11 @@
-// The flight and the conversation, each as its own page in a frame, and one line of time for both: they talk, then they
-// fly, epoch by epoch. It asks the pages where they are, and tells them where to go; moving one moves the other.
-const TALK = { least: 3, most: 10, perStep: 0.15 }; // seconds in which a conversation is played
+// The flight and the conversation, each as a page in a frame, with a common time line: for each epoch, the conversation
+// and then the flight. The times of the pages are read and set here, so that moving one page moves the other.
+const TALK = { least: 3, most: 10, perStep: 0.15 }; // the playing time of a conversation, in seconds
 const LOOK_MS = 120;
 const SPEEDS = [0.5, 1, 2, 4];
 
-// What is shown when: parts of time, one after the other. `steps` are the conversation's (from, upto), `times` the
-// flight's. Without a flight, or without a conversation, there are only parts of the other.
+// The parts of the time line, in order. `steps`: the range of steps of the conversation (from, upto); `times`: that of the
+// flight. Without a flight, or without a conversation, there are only parts of the other one.
 export function partsOf(runs, stepCount, chapters, duration) {
   const starts = [];
   for (const run of runs) {
@@ -13,8 +13,8 @@ export function partsOf(runs, stepCount, chapters, duration) {
     if (!starts.length || starts.at(-1).epoch !== epoch) starts.push({ epoch, step: run.step });
   }
   if (starts.length) starts[0].step = 0;
-  const begins = chapters.map((chapter, number) => (number ? chapter.at : 0)); // they stand for a while before the first
-  // Where the pages do not have the same epochs, all is said first, and then all is flown.
+  const begins = chapters.map((chapter, number) => (number ? chapter.at : 0)); // the drones stand for a while before the first chapter
+  // If the epochs of the pages differ, the complete conversation is first, followed by the complete flight.
   const fits = stepCount && starts.length === begins.length;
   const talks = !stepCount ? [] : fits ? starts.map((one) => one.step) : [0];
   const flights = !duration ? [] : fits ? begins : [0];
@@ -65,7 +65,7 @@ export default {
           <iframe v-if="talk" ref="talk" :src="talk" :title="words.conversation" @load="meet"></iframe><div v-else class="stage-empty"></div></figure>
       </div>
     </div>`,
-  // The pages' addresses, once they are there, and which are to come.
+  // The addresses of existing pages, and whether pages are expected.
   props: { flight: String, talk: String, flies: Boolean, talks: Boolean, words: Object },
   data() {
     return { parts: [], time: 0, playing: false, speed: 1, speeds: SPEEDS, ready: false };
@@ -94,12 +94,12 @@ export default {
     cancelAnimationFrame(this.frame);
   },
   methods: {
-    // The pages' own objects. They are of this origin, and there only once their scripts have run.
+    // Objects of the pages, which have the same origin. They exist when the scripts of the pages have run.
     scene() {
       try {
         return this.$refs.flight?.contentWindow?.Playback;
       } catch {
-        return undefined; // a page that the browser shows instead, as the server is gone
+        return undefined; // an error page of the browser, since the server has ended
       }
     },
     sniffer() {
@@ -110,7 +110,7 @@ export default {
         return undefined;
       }
     },
-    // Gets to know the pages as they come; each brings its part of the time line.
+    // Connects newly loaded pages; each adds its part of the time line.
     meet() {
       const [scene, page] = [this.scene(), this.sniffer()];
       if (scene === this.known?.scene && page === this.known?.page) return;
@@ -128,13 +128,13 @@ export default {
       this.ready = Boolean((scene || !this.flies) && (page || !this.talks));
       this.go(this.again(flown) ?? Math.min(this.asked, this.duration));
     },
-    // The moment of the flight that somebody has gone to.
+    // A moment of the flight, chosen by the user.
     flown() {
       const { part, time } = this;
       const began = Math.min(this.asked, this.duration);
       return part?.kind === "fly" && time !== began ? part.from + time - part.begins : undefined;
     },
-    // Where that moment stands on the line, which has become another one as the conversation came.
+    // The position of this moment on the time line, which has changed when the conversation was loaded.
     again(flown) {
       const part = flown !== undefined && this.parts.findLast((one) => one.kind === "fly" && one.from <= flown);
       return part ? part.begins + flown - part.from : undefined;
@@ -149,7 +149,7 @@ export default {
         if (!this.moving) this.fromFlight(time);
       };
     },
-    // The key that plays a page by itself plays both.
+    // The key that plays a single page plays both pages.
     take(frame, key) {
       frame.contentWindow.addEventListener("keydown", (event) => {
         if (event.key !== key || event.ctrlKey || event.altKey || event.metaKey || event.target.closest?.("input, select, textarea, button, summary")) return;
@@ -162,7 +162,7 @@ export default {
       const share = (this.time - part.begins) / (part.ends - part.begins);
       return Math.min(part.from + Math.floor(share * (part.upto - part.from + 1)), part.upto);
     },
-    // Goes to a time, and takes both pages there.
+    // Sets the time, also of both pages.
     go(time) {
       this.time = Math.min(Math.max(time, 0), this.duration);
       const { part } = this;
@@ -189,7 +189,7 @@ export default {
     },
     fromTalk(page) {
       const { moment } = page.view;
-      if (moment === this.step) return; // it was told to go there
+      if (moment === this.step) return; // the step was set by this script
       const part = this.parts.find((one) => one.kind === "talk" && one.from <= moment && moment <= one.upto);
       if (!part) return;
       this.rest();
@@ -229,7 +229,7 @@ export default {
       else return;
       event.preventDefault();
     },
-    // A step of the conversation, or a tenth of a second of flight.
+    // Moves by a step of the conversation, or by a tenth of a second of the flight.
     next(by) {
       const { part } = this;
       return this.time + by * (part.kind === "fly" ? 0.1 : (part.ends - part.begins) / (part.upto - part.from + 1));
@@ -239,7 +239,7 @@ export default {
       const epochs = this.parts.some((one) => one.epoch > 0);
       return epochs ? `${name}, ${this.words.epoch.replace("{number}", part.epoch)}` : name;
     },
-    // Puts an address of this moment into the clipboard.
+    // Returns the address of the present moment.
     link(address) {
       const url = new URL(address, location.href);
       url.hash = `t=${this.time.toFixed(2)}`;

@@ -123,7 +123,7 @@ class _RobotViewer:
         select.props("dense outlined").classes("imported-choice")
         select.on_value_change(lambda event: self._choose(event.value))
         self._box = ui.element("div").classes("imported-part").props("aria-live=polite")
-        last = (facts.there or facts.robots)[-1].name  # its file has what it shares with those before it
+        last = (facts.there or facts.robots)[-1].name  # its file has the constraints with earlier robots
         ui.timer(0, lambda: select.set_value(last), once=True)
 
     async def _choose(self, name: object) -> None:
@@ -136,7 +136,9 @@ class _RobotViewer:
             found = await run.io_bound(read_robot_file, self._folder, robot.name)
         except (InvalidInputError, OSError) as damaged:
             found = str(damaged)
-        if found is None or self._chosen != robot.name or self._box.is_deleted:  # the server ends; another one is asked
+        if (
+            found is None or self._chosen != robot.name or self._box.is_deleted
+        ):  # the server is shutting down, or another robot was chosen
             return
         self._box.clear()
         with self._box:

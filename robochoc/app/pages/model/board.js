@@ -1,15 +1,15 @@
-// The map of a team: cells, robots that are dragged, and rules as links between them. North is up, row 0 is the
-// southernmost. It decides nothing: it says what was clicked, dragged and typed, and draws what it is given. Names are
-// text nodes, so nothing in them is ever markup.
+// The map of a team: cells, robots that can be dragged, and rules as links between them. North is up, and row 0 is the
+// southernmost. The board only draws its props, and emits events for clicks, drags and keys. Names are text nodes, so
+// they are never markup.
 const MARGIN = 26;
 const TALLEST = 660;
-const AROUND = 300; // pixels of the window that are not the map
-const MENU = 230; // pixels of what is offered at a robot
-const DRAG = 4; // pixels before a press becomes a drag
+const AROUND = 300; // pixels of the window outside the map
+const MENU = 230; // pixels of the menu of a robot
+const DRAG = 4; // the minimum distance of a drag, in pixels
 const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
 
-// The corners of the smallest convex shape around points (Andrew's monotone chain).
+// The corners of the convex hull of points (Andrew's monotone chain).
 function hull(points) {
   const sorted = [...points].sort((a, b) => a.x - b.x || a.y - b.y);
   const half = (list) => {
@@ -99,7 +99,7 @@ export default {
   },
   watch: {
     robots() {
-      // What is drawn may be older than what was moved since: moves that the page has not heard of yet stay.
+      // The props may be older than the last moves: moves that the page has not confirmed yet are retained.
       this.local = Object.fromEntries(Object.entries(this.local).filter(([, cell]) => cell.sent > this.heard));
       if (this.next !== null) this.$nextTick(this.focusNext);
     },
@@ -149,7 +149,7 @@ export default {
     chosen() {
       return new Set(this.selected);
     },
-    // Robots of one cell stand around its middle.
+    // Robots in one cell are drawn around its centre.
     placed() {
       const there = new Map();
       const at = this.robots.map((robot) => {
@@ -157,7 +157,7 @@ export default {
         there.set(key, [...(there.get(key) || []), robot.name]);
         return { cell, key };
       });
-      const most = this.cell < 30 ? 40 : Math.floor((this.cell * 1.5) / 6.5); // of crowded robots, one name is shown at a time
+      const most = this.cell < 30 ? 40 : Math.floor((this.cell * 1.5) / 6.5); // of crowded robots, only one name is shown at a time
       return this.robots.map((robot, index) => {
         const { cell, key } = at[index], mates = there.get(key);
         let { px, py } = this.middle(cell);
@@ -173,7 +173,8 @@ export default {
     },
     drawn() {
       const between = new Map(), beside = new Map(), n = this.placed.length;
-      // Hulls are behind lines, and one around the same robots as another is larger, so that each can be pointed at.
+      // Hulls are behind lines; of several hulls around the same robots, each is larger than the one before, so that each can
+      // be clicked.
       const links = this.links.filter((link) => link.of.every((i) => i < n));
       const hulls = links.filter((link) => link.shape === "hull"), rest = links.filter((link) => link.shape !== "hull");
       return [...hulls, ...rest].map((link, nth) => {
@@ -198,7 +199,7 @@ export default {
     middle({ x, y }) {
       return { px: MARGIN + (x + 0.5) * this.cell, py: MARGIN + (this.rows - 0.5 - y) * this.cell };
     },
-    // The shapes of links: a line bends where others are between the same two.
+    // The shapes of links. Several lines between the same two robots are bent.
     line(points, between, _beside, n) {
       let d = "", tips = "", middle = null;
       const add = (one, other, directed) => {
@@ -262,7 +263,7 @@ export default {
       this.$emit("cell", cell);
       this.offer("cell", cell, this.words.cell.replace("{column}", cell.x + 1).replace("{row}", cell.y + 1), here, event.currentTarget);
     },
-    // What can happen to a robot or a cell is offered where it is.
+    // Opens the menu of a robot or a cell at its position.
     offer(kind, target, says, { px, py }, back) {
       const acts = this.acts?.[kind];
       if (!acts?.length) return;

@@ -51,7 +51,7 @@ class DecisionsPanel:
                     name_it(button, say("model.add-kind", kind=say(f"kind.{kind}")))
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         decisions = self._desk.sketch.decisions
         self._hint.set_visibility(not decisions)
         self._cards.follow([(place, decision.kind) for place, decision in enumerate(decisions)])
@@ -92,7 +92,7 @@ class _DecisionCard:
             self._lines = TroubleLines()
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         decision = self._decision
         if decision is not None:
             self._following = True  # changes of fields are not the user's now

@@ -1,6 +1,6 @@
-// A table of values by values. Each cell is a button that is pressed or not; arrow keys go from one to the next, and on
-// to the headings, which stand for a whole row or column. With Shift, all from the last one to this one become the same.
-// Of a large table, a part is shown, which moves.
+// A table of pairs of values. Each cell is a toggle button. Arrow keys move between cells, and to the headings, which set
+// a complete row or column. With Shift, all cells from the last one to this one are set. Of a large table, only a part is
+// shown, which can be moved.
 const WHOLE = 40, PART = 16;
 const STEPS = { ArrowUp: [-1, 0], ArrowDown: [1, 0], ArrowLeft: [0, -1], ArrowRight: [0, 1], PageUp: [-PART, 0], PageDown: [PART, 0] };
 const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
@@ -43,7 +43,7 @@ export default {
     part() {
       return this.count <= WHOLE ? this.count : PART;
     },
-    // The one button that Tab goes to: where somebody was, or the first one that is shown.
+    // The button in the tab order: the last one with the focus, or else the first one shown.
     stop() {
       return this.at.map((place, axis) => clamp(place, this.from[axis], this.from[axis] + this.part - 1));
     },
@@ -60,7 +60,7 @@ export default {
     shift(axis, by) {
       this.from[axis] = clamp(this.from[axis] + by, 0, this.count - this.part);
     },
-    // What the last button became is known here before the server has said so: somebody types faster than that.
+    // The state of the last button is stored here, since users type faster than the server answers.
     pressed(i, j, event) {
       const [a, b, on] = event.shiftKey && this.last ? this.last : [i, j, !this.fits.has(i * this.count + j)];
       this.last = [i, j, on];

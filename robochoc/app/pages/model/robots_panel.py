@@ -29,7 +29,7 @@ class RobotsPanel:
                 self._cards = Cards(box, partial(_SelectedCard, desk))
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         sketch, selected = self._desk.sketch, self._desk.selected
         names = [robot.name for robot in sketch.robots]
         if self._choice.options != names or self._choice.value != selected:
@@ -66,7 +66,7 @@ class _SelectedCard:
         return tuple(self._desk.selected)
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         robots = [robot for robot in self._desk.sketch.robots if robot.name in self._names]
         if not robots:
             return

@@ -119,7 +119,7 @@ class RuleForm:
                 ui.button(say("model.done"), icon="check", on_click=lambda: desk.open(None)).props("flat dense no-caps")
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         rule = self._desk.sketch.rule(self._id)
         decision = None if rule is None else self._desk.sketch.decision(rule.decision)
         if rule is not None and decision is not None:

@@ -150,7 +150,7 @@ class RulesPanel:
             self._add = ui.button(say("model.add-rule"), icon="add", on_click=menu.open).props("no-caps unelevated")
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         sketch = self._desk.sketch
         self._add.set_enabled(bool(sketch.decisions))
         self._hint.set_text(say("model.rules-hint" if sketch.decisions else "model.rules-wait"))
@@ -194,7 +194,7 @@ class _RuleCard:
         self.element.on("mouseleave", lambda: self._point(None))
 
     def follow(self) -> None:
-        """Show the sketch as it stands."""
+        """Update to the present sketch."""
         sketch, rule = self._desk.sketch, self._desk.sketch.rule(self._id)
         if rule is None:
             return

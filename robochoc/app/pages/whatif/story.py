@@ -85,7 +85,7 @@ MOST_CHANGES = 50
 class SavedChange(msgspec.Struct):
     """The change of a run: the team after it, its events in words, and why the team decides from scratch, if so.
 
-    `beside` is the id of the second run.
+    `beside`: the id of the second run.
     """
 
     after: Sketch
