@@ -163,7 +163,7 @@ def test_another_master_ends_the_run_the_same_one_does_not() -> None:
 
 def test_behind_another_router_a_robot_registers_until_it_is_welcomed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever it says at first may get lost there, and so may the answer."""
-    monkeypatch.setattr("robochoc.communication.network.registration.REGISTER_AGAIN_S", 0.01)
+    monkeypatch.setattr("robochoc.communication.network.robot.REGISTER_AGAIN_S", 0.01)
 
     def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word, len(transport.heard_of(Register)):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from robochoc.communication.processes import queues
-from robochoc.communication.processes.queue_robot import QueueRobot
+from robochoc.communication.processes.robot_process import QueueRobot
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Predicate, Team

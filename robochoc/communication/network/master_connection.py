@@ -27,7 +27,7 @@ Reach = Mapping[str, tuple[str, ...]]
 
 
 class ConnectionPolicy:
-    """The router at `endpoint`, with rules that follow `admission`. Its opener closes it.
+    """The router at `endpoint`, which admits the members of the Authority's `admission`. Its opener closes it.
 
     `ways` are the team's receivers, if they are known in advance: then the router need not be restarted for them.
     """

@@ -7,6 +7,7 @@ robot ends when the master orders it, and by itself if the master is absent for 
 
 from __future__ import annotations
 
+import secrets
 import time
 import traceback
 from collections.abc import Callable
@@ -49,7 +50,6 @@ from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item,
 from robochoc.communication.network.profile import profile_of, ranges_of, restrict_to_team
 from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.network.refusals import Refusals
-from robochoc.communication.network.registration import Registration, RunOverError
 from robochoc.communication.network.robot_settings import DEFAULT_SETTINGS, RobotSettings
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.network.secure_channel import SecureChannel
@@ -59,7 +59,90 @@ from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.errors import TooLargeError, UnsupportedError
+from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
+
+REGISTER_AGAIN_S = 1.0
+_INCARNATION_BYTES = 8
+
+
+class RunOverError(RobochocError):
+    """The run is over for this robot; `failed`: it could not be completed."""
+
+    def __init__(self, why: str, *, failed: bool) -> None:
+        super().__init__(why)
+        self.why = why
+        self.failed = failed
+
+
+class Registration:
+    """The registration of the robot `name`; it is repeated until the master answers, and after each outage.
+
+    Attributes:
+        incarnation: The name of this process of the robot; a restarted robot has another one.
+        welcome: The master's answer; None before it arrives.
+
+    Args:
+        name: The robot's name.
+        transport: Its connection to the router.
+        patience_s: Seconds for which the master may be absent or silent.
+        register: Sends a registration for an incarnation.
+    """
+
+    def __init__(self, name: str, transport: Transport, patience_s: float, register: Callable[[str], None]) -> None:
+        self.incarnation = secrets.token_hex(_INCARNATION_BYTES)
+        self.welcome: Welcome | None = None
+        self._name = name
+        self._transport = transport
+        self._patience_s = patience_s
+        self._register = register
+        self._registered_at = 0.0
+        self._unanswered_since: float | None = None
+        self._connected_at = time.monotonic()
+        self._router = transport.router
+
+    def send(self) -> None:
+        """Register with the master, for the first time or again."""
+        self._registered_at = time.monotonic()
+        if self._unanswered_since is None:
+            self._unanswered_since = self._registered_at
+        self._register(self.incarnation)
+
+    def accept(self, welcome: Welcome) -> bool:
+        """Note the master's answer; return whether it is the first one.
+
+        Raises `RunOverError` if the answer comes from another run.
+        """
+        self._unanswered_since = None
+        if self.welcome is None:
+            self.welcome = welcome
+            return True
+        if welcome.run != self.welcome.run:
+            raise RunOverError("the master was restarted: restart this robot as well", failed=True)
+        return False
+
+    def check_link(self) -> None:
+        """Register again if necessary: after a restart of the router, and while no answer arrives.
+
+        Raises `RunOverError` if the master is absent or silent for longer than the patience.
+        """
+        now = time.monotonic()
+        router = self._transport.router
+        if router:
+            self._connected_at = now
+            if router != self._router:
+                self._router = router
+                self.send()
+        elif now - self._connected_at > self._patience_s:
+            raise RunOverError(f"the master is gone: no link to it for {self._patience_s:g} s", failed=True)
+        if self._unanswered_since is None:
+            return
+        if now - self._unanswered_since > max(self._patience_s, 2 * REGISTER_AGAIN_S):
+            why = f"the master does not answer {self._name}: is it enrolled there, and not revoked?"
+            raise RunOverError(why, failed=True)
+        if now - self._registered_at >= REGISTER_AGAIN_S:
+            self.send()
+
 
 CHECK_S = 0.25
 """The interval at which a waiting robot checks the link, in seconds."""

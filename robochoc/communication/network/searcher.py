@@ -56,7 +56,9 @@ def check_constraints(
     values: Mapping[str, int],
     learnt: Mapping[str, Sequence[Constraint]],
 ) -> CheckResult:
-    """Return the costs of the constraints that `robot` knows.
+    """Return the costs of the constraints that `robot` knows for the team's decision.
+
+    They are computed from the problem itself, not from the compiled constraints of the protocol.
 
     Args:
         epoch: The epoch of the search.

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 import pytest
 
-from robochoc.communication.processes.queue_robot import Action, DescriptorWatch
+from robochoc.communication.processes.robot_process import Action, DescriptorWatch
 from robochoc.protocols.message import Envelope
 
 Pipe = tuple[int, int]
