@@ -32,7 +32,7 @@ _CHUNK = 1 << 20
 
 @dataclass(frozen=True)
 class Factors:
-    """Function nodes of one shape (`protocols/inference/maxsum_factor.py`): sums of the constraints over the same robots.
+    """Function nodes of one shape (`protocols/inference/maxsum_factor.py`): each is a sum of constraints.
 
     `rows` are their robots, a column for each place, the holder last; `numbers` are their places among all functions of
     the holder; `which` is the number of each one's table.
