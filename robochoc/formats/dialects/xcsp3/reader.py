@@ -71,7 +71,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
         InvalidInputError: with all mistakes and unsupported parts, each with its line.
     """
     if len(paths) != 1:
-        what = f"and {len(paths) - 1} more: an XCSP3 instance is one file"
+        what = f"is one of {len(paths)} files, but an XCSP3 instance is one file"
         raise invalid_input(paths[0], what, "import one file at a time")
     (path,) = paths
     with open_xml(path, MAX_FILE, long_texts=True) as root:
