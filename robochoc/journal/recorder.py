@@ -255,7 +255,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
         if cost < best and now is not None:
             best = cost
             values = {name: value for robot in sorted(now, key=natural_key) for name, value in now[robot].items()}
-            yield Improved(t=event.t, cost=objective.told(best), assignment=values)
+            yield Improved(t=event.t, cost=objective.in_user_units(best), assignment=values)
 
 
 def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:

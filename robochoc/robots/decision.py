@@ -122,7 +122,7 @@ class _Feedback:
             "decided": sum(map(bool, self._own.values())),
         }
         if self._objective is not None and self._best < INFINITE:
-            best = {"cost": str(self._objective.told(self._best)), "assignment": self._assignment}
+            best = {"cost": str(self._objective.in_user_units(self._best)), "assignment": self._assignment}
             if len(msgspec.json.encode(best)) <= FEEDBACK_CHARACTERS_MAX:
                 report |= best
         self._send_text(msgspec.json.encode(report).decode())

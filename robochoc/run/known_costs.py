@@ -45,7 +45,7 @@ class KnownCosts:
                 self._improve(event.cost)
             case Bounded() if event.robot in self._objective.interfaces and 0 <= event.bound <= EXACT:
                 self._bounds[event.robot] = max(event.bound, self._bounds.get(event.robot, 0))
-                self.bound = self._objective.told(sum(self._bounds.values()))
+                self.bound = self._objective.in_user_units(sum(self._bounds.values()))
             case _:
                 pass
 
@@ -59,4 +59,4 @@ class KnownCosts:
     def _improve(self, cost: float) -> None:
         if 0 <= cost < self._least and cost <= EXACT:
             self._least = cost
-            self.best = self._objective.told(cost)
+            self.best = self._objective.in_user_units(cost)

@@ -32,7 +32,7 @@ from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.time_limit import TimeLimitError, computed_by
-from robochoc.verification.checker import check_told_cost
+from robochoc.verification.checker import check_user_cost
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -149,12 +149,12 @@ def _check_costs(team: Team, outcome: Outcome) -> None:
         RefutedError: if a cost is wrong.
     """
     if not outcome.epochs:
-        check_told_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
+        check_user_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
         return
     for events, epoch in enumerate(outcome.epochs):
         if epoch.lost:
             return
-        check_told_cost(team_after_events(team, events), epoch.assignment, epoch.cost)
+        check_user_cost(team_after_events(team, events), epoch.assignment, epoch.cost)
 
 
 def _solve_centrally(team: Team, context: RunContext) -> Outcome:

@@ -1,4 +1,4 @@
-"""Agents' descriptions in the Directory Facilitator, and when one matches a template (FIPA00023)."""
+"""Descriptions of agents in the Directory Facilitator, and their comparison with templates (FIPA00023)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from robochoc.system.errors import RobochocError
 
 MAX_SERVICES = 64
 MAX_NAMES = 256
-"""Protocols, ontologies, languages or addresses in one description."""
+"""The most protocols, ontologies, languages or addresses in one description."""
 MAX_PROPERTIES = 1024
 MAX_CHARACTERS = 1024
-"""Of any one name or value."""
+"""The most characters of a name or value."""
 MAX_SIZE = 1 << 16
 """The largest total number of characters in one description."""
 MAX_LEASE_S = 99 * 86_400.0
@@ -25,7 +25,7 @@ MAX_LEASE_S = 99 * 86_400.0
 
 
 class Reason(StrEnum):
-    """The reason for which an agent's request fails: a proposition of FIPA00023, by its name there."""
+    """The reason for the failure of a request: a proposition of FIPA00023, with its name."""
 
     UNAUTHORISED = "unauthorised"
     UNSUPPORTED_FUNCTION = "unsupported-function"
@@ -40,11 +40,11 @@ class Reason(StrEnum):
 
 
 FAILURES = frozenset({Reason.ALREADY_REGISTERED, Reason.NOT_REGISTERED, Reason.INTERNAL_ERROR})
-"""Reasons that are found only during a request. Any other reason refuses it beforehand."""
+"""Reasons found during a request, which are answered by FAILURE. Requests with other reasons are refused."""
 
 
 class RequestRefusedError(RobochocError):
-    """The Directory does not do what it was asked: for `reason`, and what that is about."""
+    """The Directory refuses a request for `reason`, with the arguments `about` of this proposition."""
 
     def __init__(self, reason: Reason, *about: str) -> None:
         super().__init__(" ".join((reason, *about)))
@@ -62,13 +62,13 @@ class ServiceDescription(msgspec.Struct, frozen=True):
     ontologies: tuple[str, ...] = ()
     languages: tuple[str, ...] = ()
     properties: tuple[tuple[str, str], ...] = ()
-    """Name and value of each."""
+    """Pairs of a name and a value."""
 
 
 class AgentDescription(msgspec.Struct, frozen=True):
     """An agent, by the name of its AID, and its services. Empty fields of a template match everything.
 
-    `lease_s` is for how many seconds it is to be known, None: until it leaves.
+    `lease_s` is the duration of its registration in seconds; None: until it leaves.
     """
 
     name: str = ""
@@ -81,20 +81,22 @@ class AgentDescription(msgspec.Struct, frozen=True):
 
 
 def matches(template: AgentDescription, description: AgentDescription) -> bool:
-    """Return whether `description` has all that `template` gives (FIPA00023, the search function).
+    """Return whether `description` matches `template` (FIPA00023, the search function).
 
-    Equal names, or equal parts before `@` where the template has no more; of sets all that the template has; for each
-    service of the template one that matches it in turn. The lease is nothing to look for.
+    Names must be equal, or equal before `@` if the template's name has no `@`. Sets must contain those of the template,
+    and each service of the template must match one of the agent. The lease is ignored.
     """
     return (
         template.name in {"", description.name, description.name.partition("@")[0]}
         and _has_all(template, description, ("protocols", "ontologies", "languages", "addresses"))
-        and all(any(_fits(asked, offered) for offered in description.services) for asked in template.services)
+        and all(
+            any(_service_matches(asked, offered) for offered in description.services) for asked in template.services
+        )
     )
 
 
 def check_description(description: AgentDescription) -> None:
-    """Raises `RequestRefusedError` where a registration lacks a name, or anything is more than the Directory takes."""
+    """Raise `RequestRefusedError` if a registration lacks a name, or exceeds a limit of the Directory."""
     what = "df-agent-description"
     if not description.name:
         raise RequestRefusedError(Reason.MISSING_PARAMETER, what, "name")
@@ -109,7 +111,7 @@ def check_description(description: AgentDescription) -> None:
 
 
 def check_bounds(description: AgentDescription) -> None:
-    """Raises `RequestRefusedError` where a description or a template is larger than the Directory takes."""
+    """Raise `RequestRefusedError` if a description or a template exceeds a limit of the Directory."""
     _bound("df-agent-description", "services", description.services, MAX_SERVICES)
     _bound_strings("df-agent-description", description, ("protocols", "ontologies", "languages", "addresses"))
     _bound_text("df-agent-description", "name", (description.name,))
@@ -126,7 +128,7 @@ def check_bounds(description: AgentDescription) -> None:
             _bound_text("service-description", parameter, (getattr(service, parameter),))
 
 
-def _fits(asked: ServiceDescription, offered: ServiceDescription) -> bool:
+def _service_matches(asked: ServiceDescription, offered: ServiceDescription) -> bool:
     return (
         asked.name in {"", offered.name}
         and asked.type in {"", offered.type}

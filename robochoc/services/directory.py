@@ -1,7 +1,7 @@
 """The Directory Facilitator of FIPA00023: the registered agents and their services.
 
-Pure: times are given, in seconds on any clock that does not go back. Every agent speaks for itself only; who asks
-(`requester`) is for the host to prove. Beside FIPA's functions a registration can be renewed without being told again.
+Pure: times are arguments, in seconds on any monotonic clock. Agents can change only their own registration; the caller
+has authenticated the `requester`. Besides FIPA's functions, a registration can be renewed without its description.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ MAX_SUBSCRIPTIONS = 1024
 
 
 class Notice(NamedTuple):
-    """A notice to `subscriber` about the agent called `name`: its description, or None if the agent has gone.
+    """A notice to `subscriber` about the agent `name`: its description, or None if the agent has left.
 
-    An agent that no longer matches the subscription counts as gone, even if it is still registered.
+    An agent that no longer matches the subscription counts as having left, even if it is still registered.
     """
 
     subscriber: str
@@ -40,44 +40,44 @@ class _Registration(NamedTuple):
 
 
 class Directory:
-    """The registrations of a platform. What it cannot do raises `RequestRefusedError`, and then has changed nothing."""
+    """The registrations of a platform. Invalid requests raise `RequestRefusedError`, and change nothing."""
 
     def __init__(self) -> None:
         self._registered: dict[str, _Registration] = {}
         self._subscriptions: list[tuple[str, AgentDescription]] = []
         self._notices: dict[tuple[str, str], Notice] = {}
-        self._lapsed: dict[str, None] = {}
+        self._expired: dict[str, None] = {}
         self._next_end = math.inf
 
     def __len__(self) -> int:
-        """Return how many are registered, those included whose lease has ended since a time was last given."""
+        """Return the number of registrations, including those that have expired since the last given time."""
         return len(self._registered)
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
         """Register the description of `requester` until its lease ends."""
         check_description(description)
         _authorise(description.name, requester)
-        self._lapse(now)
+        self._remove_expired(now)
         if description.name in self._registered:
             raise RequestRefusedError(Reason.ALREADY_REGISTERED)
         if len(self._registered) >= MAX_REGISTRATIONS:
             raise RequestRefusedError(Reason.INTERNAL_ERROR, f"the directory is full: {MAX_REGISTRATIONS} agents")
-        self._lapsed.pop(description.name, None)
-        self._put(description, now)
+        self._expired.pop(description.name, None)
+        self._store(description, now)
 
     def modify(self, description: AgentDescription, now: float, *, requester: str) -> None:
-        """Replace the description of `requester` by `description`; its lease begins again."""
+        """Replace the description of `requester` by `description`, and restart its lease."""
         check_description(description)
         _authorise(description.name, requester)
-        self._lapse(now)
-        self._known(description.name)
-        self._put(description, now)
+        self._remove_expired(now)
+        self._registration(description.name)
+        self._store(description, now)
 
     def renew(self, name: str, now: float, *, requester: str) -> None:
-        """Begin the lease of `name` again."""
+        """Restart the lease of `name`."""
         _authorise(name, requester)
-        self._lapse(now)
-        description = self._known(name).description
+        self._remove_expired(now)
+        description = self._registration(name).description
         self._registered[name] = _Registration(description, _end(description, now))
 
     def deregister(self, name: str, *, requester: str) -> None:
@@ -85,7 +85,7 @@ class Directory:
         if not name:
             raise RequestRefusedError(Reason.MISSING_PARAMETER, "df-agent-description", "name")
         _authorise(name, requester)
-        self._known(name)
+        self._registration(name)
         self._remove(name)
 
     def search(
@@ -93,7 +93,7 @@ class Directory:
     ) -> tuple[AgentDescription, ...]:
         """Return the agents that match `template`, by name; at most `max_results` (None or negative: all)."""
         check_bounds(template)
-        self._lapse(now)
+        self._remove_expired(now)
         known = self._registered
         names = [template.name] if template.name in known else sorted(known)
         found = tuple(known[name].description for name in names if matches(template, known[name].description))
@@ -101,9 +101,9 @@ class Directory:
 
     def expire(self, now: float) -> tuple[str, ...]:
         """Remove agents whose lease has ended. Return the names of all removed since the last call of `expire`."""
-        self._lapse(now)
-        names = tuple(self._lapsed)
-        self._lapsed.clear()
+        self._remove_expired(now)
+        names = tuple(self._expired)
+        self._expired.clear()
         return names
 
     def subscribe(self, subscriber: str, template: AgentDescription, now: float) -> None:
@@ -116,7 +116,7 @@ class Directory:
                 )
             self._subscriptions.append((subscriber, template))
         for description in self.search(template, now):
-            self._note(subscriber, description.name, description)
+            self._add_notice(subscriber, description.name, description)
 
     def unsubscribe(self, subscriber: str, template: AgentDescription | None = None) -> None:
         """End the subscription to `template`; None: all subscriptions, with notices that were not sent yet."""
@@ -130,17 +130,17 @@ class Directory:
             self._notices = {key: notice for key, notice in self._notices.items() if key[0] != subscriber}
 
     def notices(self) -> Sequence[Notice]:
-        """Return notices for subscribers, once each, oldest first; of each agent only the newest."""
+        """Return new notices for subscribers, oldest first, with only the newest notice on each agent."""
         notices = tuple(self._notices.values())
         self._notices.clear()
         return notices
 
-    def _known(self, name: str) -> _Registration:
+    def _registration(self, name: str) -> _Registration:
         if name not in self._registered:
             raise RequestRefusedError(Reason.NOT_REGISTERED)
         return self._registered[name]
 
-    def _put(self, description: AgentDescription, now: float) -> None:
+    def _store(self, description: AgentDescription, now: float) -> None:
         before = self._registered.get(description.name)
         ends = _end(description, now)
         self._registered[description.name] = _Registration(description, ends)
@@ -150,17 +150,17 @@ class Directory:
     def _remove(self, name: str) -> None:
         self._notify(name, self._registered.pop(name).description, None)
 
-    def _lapse(self, now: float) -> None:
-        """Remove those whose lease has ended by `now`. `_next_end` is never later than the first end to come."""
+    def _remove_expired(self, now: float) -> None:
+        """Remove agents whose lease has ended at `now`. `_next_end` is never later than the next end of a lease."""
         if now < self._next_end:
             return
         for name in [name for name, known in self._registered.items() if known.ends <= now]:
             self._remove(name)
-            self._lapsed[name] = None
+            self._expired[name] = None
         self._next_end = min((known.ends for known in self._registered.values()), default=math.inf)
 
     def _notify(self, name: str, before: AgentDescription | None, after: AgentDescription | None) -> None:
-        """Note for each subscriber that `name` was described as `before`, and is as `after`."""
+        """Add notices to all subscribers on the change of the description of `name`."""
         concerned: dict[str, bool] = {}
         for subscriber, template in self._subscriptions:
             if after is not None and matches(template, after):
@@ -168,9 +168,9 @@ class Directory:
             elif before is not None and matches(template, before):
                 concerned.setdefault(subscriber, False)
         for subscriber, there in concerned.items():
-            self._note(subscriber, name, after if there else None)
+            self._add_notice(subscriber, name, after if there else None)
 
-    def _note(self, subscriber: str, name: str, description: AgentDescription | None) -> None:
+    def _add_notice(self, subscriber: str, name: str, description: AgentDescription | None) -> None:
         self._notices.pop((subscriber, name), None)
         self._notices[subscriber, name] = Notice(subscriber, name, description)
 

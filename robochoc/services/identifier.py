@@ -1,4 +1,4 @@
-"""Agent identifiers (AID) of FIPA00023: the name of an agent in the whole world, and where it can be reached."""
+"""Agent identifiers (AID) of FIPA00023: the globally unique name of an agent, and its addresses."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ WHAT = "an agent-identifier"
 
 
 class AgentIdentifier(msgspec.Struct, frozen=True):
-    """`name` is the agent's, `@`, and its platform's: `Robot3.1@192.168.1.14:7447/robochoc`.
+    """`name` is the agent's name, `@`, and its platform's name: `Robot3.1@192.168.1.14:7447/robochoc`.
 
-    `addresses` say how to reach it, the best one first; `resolvers` are agents who may know where it is.
+    `addresses` are its addresses, the preferred one first; `resolvers` are agents that may know further addresses.
     """
 
     name: str
@@ -31,20 +31,20 @@ class AgentIdentifier(msgspec.Struct, frozen=True):
 
     @property
     def local(self) -> str:
-        """The agent's name on its platform; the whole name where no platform is named."""
+        """The agent's name on its platform; the whole name if it contains no platform."""
         return self.name.rpartition("@")[0] or self.name
 
     @property
     def platform(self) -> str:
-        """The platform that has given the name; empty where none is named."""
+        """The platform in the name; empty if it contains none."""
         local, _, platform = self.name.rpartition("@")
         return platform if local else ""
 
 
 def identifier_on(platform: str, local: str, addresses: tuple[str, ...] = ()) -> AgentIdentifier:
-    """Return the agent called `local` on `platform`.
+    """Return the identifier of the agent `local` on `platform`.
 
-    Raises `ValueError` where the two could not be told apart again.
+    Raises `ValueError` if the two could not be separated again.
     """
     if not local or not platform or "@" in platform:
         raise ValueError(f"{local!r} on platform {platform!r}: both need a name, and the platform's has no '@'")
@@ -52,7 +52,7 @@ def identifier_on(platform: str, local: str, addresses: tuple[str, ...] = ()) ->
 
 
 def expression_of(identifier: AgentIdentifier) -> List:
-    """`(agent-identifier :name ... :addresses (sequence ...) :resolvers (sequence ...))`, without what is empty."""
+    """Return `(agent-identifier :name ... :addresses (sequence ...) :resolvers (sequence ...))` without empty parts."""
     items: list[Expression] = [Word(":name"), name(identifier.name)]
     if identifier.addresses:
         items += [Word(":addresses"), list_of("sequence", *map(name, identifier.addresses))]
@@ -62,9 +62,9 @@ def expression_of(identifier: AgentIdentifier) -> List:
 
 
 def identifier_of(expression: Expression) -> AgentIdentifier:
-    """Return the identifier that `expression` is; parameters of others' own (`:X-...`) are passed over.
+    """Return the identifier in `expression`, ignoring user-defined parameters (`:X-...`).
 
-    Raises `SymbolicExpressionError`. Recurses into resolvers, as deep as the reader of the expression allowed.
+    Raises `SymbolicExpressionError`. Recurses into resolvers, up to the depth allowed by the reader of the expression.
     """
     found = parameters(items_of(expression, ("agent-identifier",), WHAT), WHAT)
     for key, value in found.items():

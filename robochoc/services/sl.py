@@ -1,7 +1,8 @@
 """The content of messages to and from the Directory Facilitator, in FIPA-SL0 (FIPA00008), with the terms of FIPA00023.
 
 >>> from robochoc.services.descriptions import AgentDescription
->>> print(request(df_on("host:7447/robochoc"), Function.SEARCH, AgentDescription(protocols=("abt",)), max_results=2))
+>>> template = AgentDescription(protocols=("abt",))
+>>> print(request(df_on("host:7447/robochoc"), DirectoryFunction.SEARCH, template, max_results=2))
 ((action (agent-identifier :name df@host:7447/robochoc) (search (df-agent-description :protocols (set abt)) \
 (search-constraints :max-results 2))))
 """
@@ -27,8 +28,8 @@ from robochoc.services.symbolic import (
     name,
     parameters,
     read,
+    text_form,
     text_of,
-    written,
 )
 
 REQUEST_CAPS = Caps(characters=1 << 18, expressions=20_000, depth=16)
@@ -42,7 +43,7 @@ _LEASE = re.compile(r"\+000000([0-9]{2})T([0-9]{2})([0-9]{2})([0-9]{2})([0-9]{3}
 _COUNT = re.compile(r"[+-]?[0-9]{1,9}")
 
 
-class Function(StrEnum):
+class DirectoryFunction(StrEnum):
     """A function of the Directory that agents can request."""
 
     REGISTER = "register"
@@ -51,10 +52,10 @@ class Function(StrEnum):
     SEARCH = "search"
 
 
-class Action(NamedTuple):
-    """A requested action: `whole` is the `(action ...)`, `function` its name, `arguments` what follows it."""
+class DirectoryAction(NamedTuple):
+    """A requested action: its `(action ...)` expression, its actor, the name of its function, and its arguments."""
 
-    whole: Expression
+    expression: Expression
     actor: AgentIdentifier
     function: str
     arguments: tuple[Expression, ...]
@@ -66,32 +67,32 @@ def df_on(platform: str) -> AgentIdentifier:
 
 
 def request(
-    df: AgentIdentifier, function: Function, description: AgentDescription, max_results: int | None = None
+    df: AgentIdentifier, function: DirectoryFunction, description: AgentDescription, max_results: int | None = None
 ) -> str:
     """Return the content of a REQUEST for `function` to `df`; for a search, `description` is a template."""
     arguments: list[Expression] = [described(description)]
-    if function == Function.SEARCH:
+    if function == DirectoryFunction.SEARCH:
         constraints = () if max_results is None else (Word(":max-results"), Word(str(max_results)))
         arguments.append(list_of("search-constraints", *constraints))
     return content_of(list_of("action", expression_of(df), list_of(function, *arguments)))
 
 
-def action_in(content: str) -> Action:
-    """Return the one action that the content of a REQUEST is about. Raises `SymbolicExpressionError`."""
+def action_in(content: str) -> DirectoryAction:
+    """Return the action in the content of a REQUEST. Raises `SymbolicExpressionError`."""
     (whole,) = _content(content, REQUEST_CAPS)
     what = "an action"
     actor_and_act = items_of(whole, ("action",), what)
     if len(actor_and_act) != 2:  # noqa: PLR2004 - who, and what
         raise SymbolicExpressionError("an action is (action <agent-identifier> (<function> ...))", whole.at)
     actor, act = actor_and_act
-    function = head_of(act, "what is to be done")
-    return Action(whole, identifier_of(actor), function, items_of(act, (function,), what))
+    function = head_of(act, "the act of an action")
+    return DirectoryAction(whole, identifier_of(actor), function, items_of(act, (function,), what))
 
 
 def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
-    """Return the result of a search: the content of the INFORM that answers it, `((result <action> (set ...)))`.
+    """Return the descriptions in the answer to a search, the INFORM `((result <action> (set ...)))`.
 
-    Raises `SymbolicExpressionError`, and `RequestRefusedError` where a description has what no description has.
+    Raises `SymbolicExpressionError`, and `RequestRefusedError` for unknown parameters of a description.
     """
     (whole,) = _content(content, ANSWER_CAPS)
     parts = items_of(whole, ("result",), "the answer to a search")
@@ -108,16 +109,16 @@ def searched_in(content: str) -> AgentDescription:
     (whole,) = _content(content, ANSWER_CAPS)
     action = items_of(whole, ("result",), "the answer to a search")[0]
     _, act = items_of(action, ("action",), "an action")
-    return description_of(items_of(act, (Function.SEARCH,), "a search")[0])
+    return description_of(items_of(act, (DirectoryFunction.SEARCH,), "a search")[0])
 
 
 def content_of(*expressions: Expression) -> str:
-    """Return the content of a message: SL puts its expressions between parentheses."""
-    return written(List(expressions))
+    """Return the content of a message: its expressions in parentheses."""
+    return text_form(List(expressions))
 
 
 def described(description: AgentDescription) -> List:
-    """`(df-agent-description ...)` without what is empty."""
+    """Return `(df-agent-description ...)` without empty parts."""
     items: list[Expression] = []
     if description.name:
         items += [Word(":name"), expression_of(AgentIdentifier(description.name, description.addresses))]
@@ -129,10 +130,9 @@ def described(description: AgentDescription) -> List:
 
 
 def description_of(expression: Expression) -> AgentDescription:
-    """Return the agent that `(df-agent-description ...)` describes.
+    """Return the description in `(df-agent-description ...)`.
 
-    Raises `SymbolicExpressionError` where it is no such thing, and `RequestRefusedError` for parameters and values that
-    it may not have.
+    Raises `SymbolicExpressionError` for other expressions, and `RequestRefusedError` for invalid parameters and values.
     """
     slots = _slots(expression, _AGENT, {"name", "services", *_NAMES, "lease-time"})
     identifier = identifier_of(slots["name"]) if "name" in slots else AgentIdentifier("")
@@ -148,9 +148,9 @@ def description_of(expression: Expression) -> AgentDescription:
 
 
 def max_results_of(expression: Expression) -> int | None:
-    """Return how many results `(search-constraints ...)` wants; None: all. Its other parameters are for federations.
+    """Return the maximum number of results in `(search-constraints ...)`; None for all.
 
-    Raises as `description_of` does.
+    Its other parameters are for federations, and ignored. Raises the exceptions of `description_of`.
     """
     slots = _slots(expression, "search-constraints", {"max-results", "max-depth", "search-id"})
     if "max-results" not in slots:
@@ -162,12 +162,10 @@ def max_results_of(expression: Expression) -> int | None:
 
 
 def _content(content: str, caps: Caps) -> tuple[Expression]:
-    """Return the only expression between the outer parentheses."""
+    """Return the only expression in the outer parentheses."""
     outer = read(content, caps)
     if not isinstance(outer, List) or len(outer.items) != 1:
-        raise SymbolicExpressionError(
-            "the content is to be one expression between parentheses: ((action ...))", outer.at
-        )
+        raise SymbolicExpressionError("the content must be one expression in parentheses: ((action ...))", outer.at)
     return (outer.items[0],)
 
 
@@ -209,9 +207,9 @@ def _property_of(expression: Expression) -> tuple[str, str]:
 
 
 def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expression]:
-    """Return the parameters of `(what ...)`.
+    """Return the parameters of `(what ...)`, including user-defined ones (`:X-...`).
 
-    Others' own ones (`:X-...`) are passed over; `RequestRefusedError` for what is unknown.
+    Raises `RequestRefusedError` for other unknown parameters.
     """
     slots = parameters(items_of(expression, (what,), f"a {what}"), f"a {what}")
     for key in slots:
@@ -221,7 +219,7 @@ def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expr
 
 
 def _members(expression: Expression | None, what: str) -> tuple[Expression, ...]:
-    """Return the elements of a set, or of a sequence, as JADE writes one where FIPA00023 has a set."""
+    """Return the elements of a set, or of a sequence, which JADE writes in place of FIPA00023's sets."""
     return () if expression is None else items_of(expression, ("set", "sequence"), what)
 
 
@@ -238,13 +236,13 @@ def _names_text(description: AgentDescription | ServiceDescription) -> list[Expr
 
 
 def _set(key: str, members: Iterable[Expression]) -> list[Expression]:
-    """`:key (set ...)`; nothing for an empty one."""
+    """Return `:key (set ...)`; empty for an empty set."""
     items = tuple(members)
     return [Word(f":{key}"), list_of("set", *items)] if items else []
 
 
 def _lease_text(lease_s: float) -> str:
-    """Return a relative DateTime of FIPA00008, in whole milliseconds and at least one."""
+    """Return a relative DateTime of FIPA00008, in whole milliseconds, of which there is at least one."""
     seconds, milliseconds = divmod(max(1, round(lease_s * 1000)), 1000)
     minutes, second = divmod(seconds, 60)
     hours, minute = divmod(minutes, 60)
@@ -253,7 +251,7 @@ def _lease_text(lease_s: float) -> str:
 
 
 def _lease_of(expression: Expression) -> float:
-    """Seconds. A time of day is refused: the Directory need not know what time it is."""
+    """Return a lease in seconds. Absolute times are refused: the Directory has no wall clock."""
     found = _LEASE.fullmatch(text_of(expression, ":lease-time"))
     if not found:
         raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, _AGENT, "lease-time")

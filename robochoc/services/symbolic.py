@@ -1,10 +1,10 @@
-r"""Symbolic expressions, as FIPA writes messages (FIPA00070) and their contents in SL (FIPA00008).
+r"""Symbolic expressions, the syntax of FIPA's messages (FIPA00070) and of their contents in SL (FIPA00008).
 
 `(df-agent-description :name (agent-identifier :name "Robot3.1@host:7447/robochoc"))` is a list of words, strings and
-lists. Reading takes time in proportion to the text, does not recurse, and stops at the `Caps`.
+lists. Reading takes linear time, does not recurse, and stops at the `Caps`.
 
-FIPA00070 knows one escape in strings, `\"`. With it alone no string could end in a backslash, so `\\` is one too, as in
-every Lisp; a backslash before anything else stands for itself.
+FIPA00070 has one escape in strings, `\"`. With it alone, no string could end in a backslash, so `\\` is an escape, too,
+as in Lisp; any other backslash is literal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.system.errors import RobochocError
 
 
 class SymbolicExpressionError(RobochocError, ValueError):
-    """A text that is not an expression, or not the expected one; `at` is the index of the character, from 0."""
+    """The text is not an expression, or not the expected one. `at` is the index of the character, from 0."""
 
     def __init__(self, message: str, at: int) -> None:
         super().__init__(message)
@@ -34,7 +34,7 @@ class Caps(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Word:
-    """A name, a keyword such as `:name`, or a number; `at` is where it begins in the text that it was read from."""
+    """A name, a keyword such as `:name`, or a number; `at` is its index in the source text."""
 
     text: str
     at: int = field(default=0, compare=False)
@@ -68,9 +68,9 @@ _SHOWN = 40
 
 
 def read(text: str, caps: Caps) -> Expression:
-    """Return the one expression that `text` is.
+    """Parse `text`, a single expression.
 
-    Raises `SymbolicExpressionError`, which says what is wrong and where.
+    Raises `SymbolicExpressionError` with the error and its place.
     """
     if (size := len(text)) > caps.characters:
         raise SymbolicExpressionError(f"{size} characters are too many: at most {caps.characters}", caps.characters)
@@ -92,55 +92,55 @@ def read(text: str, caps: Caps) -> Expression:
         if opened:
             opened[-1][1].append(done)
         elif at < len(text):
-            raise SymbolicExpressionError("the expression has ended, but the text goes on", at)
+            raise SymbolicExpressionError("text after the end of the expression", at)
         else:
             return done
     raise SymbolicExpressionError("the text ends before its expression does" if opened else "no expression", len(text))
 
 
-def written(expression: Expression) -> str:
-    """Return the text of `expression`: one line but for what strings hold; `read` gives the same expression again.
+def text_form(expression: Expression) -> str:
+    """Return the text of `expression`, one line except for line breaks in strings. `read` is the inverse function.
 
-    Raises `ValueError` for a word that cannot be written as one.
+    Raises `ValueError` for an invalid word.
     """
     match expression:
         case Word(text):
             if not _WORD.fullmatch(text):
-                raise ValueError(f"{text!r} is no word")
+                raise ValueError(f"{text!r} is not a valid word")
             return text
         case String(text):
             escaped = text.replace("\\", "\\\\").replace('"', '\\"')
             return f'"{escaped}"'
         case List(items):
-            return f"({' '.join(map(written, items))})"
+            return f"({' '.join(map(text_form, items))})"
         case never:
             assert_never(never)
 
 
 def name(text: str) -> Word | String:
-    """`text` as a word if it can be one, otherwise as a string: a word may not begin with a digit."""
+    """Return `text` as a word if possible, otherwise as a string: a word must not begin with a digit."""
     return Word(text) if _SAFE_NAME.fullmatch(text) else String(text)
 
 
 def list_of(head: str, *items: Expression) -> List:
-    """Return the list that begins with the word `head`."""
+    """Return a list beginning with the word `head`."""
     return List((Word(head), *items))
 
 
 def text_of(expression: Expression, what: str) -> str:
-    """Return the text of a word or a string. Raises `SymbolicExpressionError`, which calls the expression `what`."""
+    """Return the text of a word or a string. Raises `SymbolicExpressionError`, where `what` names the expression."""
     if isinstance(expression, List):
-        raise SymbolicExpressionError(f"{what} is to be a word or a string, not a list", expression.at)
+        raise SymbolicExpressionError(f"{what} must be a word or a string, not a list", expression.at)
     return expression.text
 
 
 def head_of(expression: Expression, what: str) -> str:
-    """Return the word, in small letters, that a list begins with.
+    """Return the first word of a list in lower case.
 
-    Raises `SymbolicExpressionError` where there is none.
+    Raises `SymbolicExpressionError` if it has none.
     """
     if not isinstance(expression, List) or not expression.items or not isinstance(expression.items[0], Word):
-        raise SymbolicExpressionError(f"{what} is to be a list that begins with a word", expression.at)
+        raise SymbolicExpressionError(f"{what} must be a list that begins with a word", expression.at)
     return expression.items[0].text.lower()
 
 
@@ -152,17 +152,17 @@ def items_of(expression: Expression, heads: tuple[str, ...], what: str) -> tuple
     head = head_of(expression, what)
     if head not in heads or not isinstance(expression, List):
         raise SymbolicExpressionError(
-            f"{what} is to begin with {' or '.join(heads)}, not with {_shown(head)}", expression.at
+            f"{what} must begin with {' or '.join(heads)}, not with {_shown(head)}", expression.at
         )
     return expression.items[1:]
 
 
 def parameters(items: tuple[Expression, ...], what: str) -> dict[str, Expression]:
-    """`:key value :key value ...` by key in small letters, without the colon. Raises `SymbolicExpressionError`."""
+    """Parse `:key value :key value ...`; keys are in lower case, without colons. Raises `SymbolicExpressionError`."""
     found: dict[str, Expression] = {}
     for key, value in zip(items[::2], items[1::2], strict=False):
         if not isinstance(key, Word) or not key.text.startswith(":"):
-            raise SymbolicExpressionError(f"a parameter of {what} is to begin with a colon", key.at)
+            raise SymbolicExpressionError(f"a parameter of {what} must begin with a colon", key.at)
         known = key.text[1:].lower()
         if known in found:
             raise SymbolicExpressionError(f"{what} has {_shown(key.text)} twice", key.at)
@@ -185,7 +185,7 @@ def _closed(text: str, at: int, opened: list[tuple[int, list[Expression]]]) -> t
 
 
 def _atom(text: str, at: int) -> tuple[Word | String, int]:
-    """Return the word or string at `at`, and where it ends."""
+    """Return the word or string at `at`, and its end."""
     if text[at] == '"':
         return _string(text, at)
     if sized := _SIZE.match(text, at):
@@ -200,23 +200,23 @@ def _string(text: str, began: int) -> tuple[String, int]:
     found = _STRING.match(text, began)
     if not found:
         raise SymbolicExpressionError("a string is never closed", began)
-    # Two backslashes first: what is between them has none that is escaped itself.
+    # Double backslashes are split first: the parts then have no escaped backslashes.
     content = "\\".join(part.replace('\\"', '"') for part in found[1].split("\\\\"))
     return String(content, began), found.end()
 
 
 def _sized_string(text: str, began: int, start: int, size: int) -> tuple[String, int]:
-    """Return a string that says how many bytes of UTF-8 it has (FIPA00070, ByteLengthEncodedString)."""
+    """Return a string with a declared number of UTF-8 bytes (FIPA00070, ByteLengthEncodedString)."""
     content = text[start : start + size].encode("utf-8", "surrogatepass")[:size]
     try:
         decoded = content.decode()
     except UnicodeDecodeError:
-        raise SymbolicExpressionError(f"{size} bytes are no whole characters of UTF-8", began) from None
+        raise SymbolicExpressionError(f"{size} bytes are not complete characters of UTF-8", began) from None
     if len(content) < size:
-        raise SymbolicExpressionError(f"a string is to have {size} bytes, and the text ends before", began)
+        raise SymbolicExpressionError(f"a string must have {size} bytes, but the text ends before", began)
     return String(decoded, began), start + len(decoded)
 
 
 def _shown(text: str) -> str:
-    """As much of a foreign word as belongs in a message."""
+    """Return a word, shortened for an error message."""
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

@@ -26,8 +26,8 @@ from robochoc.services.symbolic import (
     name,
     parameters,
     read,
+    text_form,
     text_of,
-    written,
 )
 from robochoc.system.errors import RobochocError
 
@@ -101,7 +101,7 @@ def text(message: ACLMessage) -> str:
         items += [Word(":reply-by"), Word(message.reply_by)]
     for key, value in message.user:
         items += [Word(f":X-{key[2:]}"), name(value)]
-    return written(list_of(message.performative.upper(), *items))
+    return text_form(list_of(message.performative.upper(), *items))
 
 
 def parse(message: str) -> ACLMessage:

@@ -1,1 +1,1 @@
-"""Checks of answers, which share nothing with the protocols that found them."""
+"""Checks of answers, independent of the protocols that have found them."""

@@ -1,4 +1,4 @@
-"""The constraints that explain a `no-solution` of a team in which robots are absent, or have to stay."""
+"""Explanations of `no-solution` for teams in which robots are absent or must not withdraw."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _MOST_NAMED = 3
 
 
 def absence_reason(team: Team, *, withdrawal: bool = False) -> str:
-    """Return a text on the constraints that leave no solution because robots are absent; empty if there are none.
+    """Return a text on the constraints that exclude all solutions because robots are absent; empty if there are none.
 
     Args:
         team: The team without the robots that were lost or removed.
@@ -34,7 +34,7 @@ def absence_reason(team: Team, *, withdrawal: bool = False) -> str:
 
 
 def _can_hold(constraint: Constraint, team: Team) -> bool:
-    """Return whether some values satisfy `constraint` alone. True where there are too many to try."""
+    """Return whether some values satisfy `constraint` by itself; True if there are too many to try."""
     domains = [team.variables[name].domain for name in constraint.variables]
     if math.prod(map(len, domains)) > MAX_TRIES:
         return True

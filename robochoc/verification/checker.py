@@ -1,6 +1,6 @@
-"""The checker: checks the answer of a team with every constraint of every file.
+"""The checker: checks a team's answer against every constraint of every file.
 
-It shares no code with the protocols and the solver: constraints are evaluated as the files state them, tuple by tuple
+It shares no code with the protocols and the solver: constraints are evaluated in their original form, tuple by tuple
 and term by term.
 """
 
@@ -34,7 +34,7 @@ MAX_TRIES = 20_000
 
 
 class RefutedError(RobochocError):
-    """An answer that the checker or the central solver refutes: a fault of the protocol, or of this program."""
+    """The checker or the central solver refutes an answer, because of an error in the protocol or this program."""
 
 
 def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
@@ -59,27 +59,27 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
 
 
 def assignment_cost(team: Team, assignment: Assignment) -> float:
-    """Return the cost of `assignment`: of all constraints in force when robots without values are absent."""
+    """Return the cost of `assignment` by all constraints in force, where robots without values are absent."""
     in_force = constraints_in_force(team, robots_without_values(team, assignment))
     return sum(constraint_cost(constraint, assignment) for constraint in in_force)
 
 
 def robots_without_values(team: Team, assignment: Assignment) -> tuple[str, ...]:
-    """Return the robots without values: they withdraw."""
+    """Return the robots without values, which withdraw."""
     return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
 
-def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, without: Collection[str] = ()) -> None:
-    """Check a cost in the user's numbers against every constraint of every file, as the files state them.
+def check_user_cost(team: Team, assignment: Assignment, cost: Cost | None, without: Collection[str] = ()) -> None:
+    """Check a cost in the user's units against every constraint of every file in its original form.
 
     Args:
-        team: The team as its files have it: its costs have not been normalised.
+        team: The team in the form of its files, without normalised costs.
         assignment: The values of all robots that have not withdrawn.
-        cost: The claimed cost. None: there is no assignment.
+        cost: The claimed cost; None if there is no assignment.
         without: The robots that have withdrawn.
 
     Raises:
-        RefutedError: if the cost is another.
+        RefutedError: if the cost is wrong.
     """
     if cost is None:
         return
@@ -102,9 +102,9 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
-    """Yield withdrawn robots for which there is a place beside the others.
+    """Yield withdrawn robots that could have values without breaking constraints.
 
-    For each robot at most `MAX_TRIES` values are tried.
+    At most `MAX_TRIES` values are tried for each robot.
     """
     on: dict[str, list[Constraint]] = {name: [] for name in team.variables}
     for constraint in team.constraints():
@@ -116,21 +116,21 @@ def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collecti
         met = [restated(constraint, absent - names) for variable in names for constraint in on[variable]]
         in_force = [constraint for constraint in met if constraint is not None]
         others = (constraint for constraint in in_force if names.isdisjoint(constraint.variables))
-        if all(constraint_cost(one, assignment) < INFINITE for one in others) and _has_a_place(
+        if all(constraint_cost(one, assignment) < INFINITE for one in others) and _can_be_placed(
             team[name].variables, assignment, in_force, [MAX_TRIES]
         ):
             yield name
 
 
 def has_local_solution(robot: Robot) -> bool | None:
-    """Return whether the private constraints of `robot` have a solution. None: `MAX_TRIES` tries were too few."""
+    """Return whether the private constraints of `robot` have a solution; None if `MAX_TRIES` tries do not suffice."""
     tries = [MAX_TRIES]
-    if _has_a_place(robot.variables, {}, robot.private, tries):
+    if _can_be_placed(robot.variables, {}, robot.private, tries):
         return True
     return False if tries[0] else None
 
 
-def _has_a_place(
+def _can_be_placed(
     open_still: Sequence[Variable], assignment: Assignment, own: Sequence[Constraint], tries: list[int]
 ) -> bool:
     """Return whether values for `open_still` can be added to `assignment` without breaking one of `own`."""
@@ -143,7 +143,7 @@ def _has_a_place(
         tries[0] -= 1
         place = {**assignment, first.name: value}
         met = (c for c in own if first.name in c.variables and all(name in place for name in c.variables))
-        if all(constraint_cost(constraint, place) < INFINITE for constraint in met) and _has_a_place(
+        if all(constraint_cost(constraint, place) < INFINITE for constraint in met) and _can_be_placed(
             rest, place, own, tries
         ):
             return True

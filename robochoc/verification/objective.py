@@ -15,13 +15,13 @@ Price = Callable[[Sequence[int]], float]
 
 
 class Objective:
-    """The objective for an assignment that changes.
+    """The objective for a changing assignment.
 
     Args:
         team: The team, with normalised costs (`model/costs.py`).
-        withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. None: no
+        withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. If None, no
             robot may withdraw, and the cost is infinite until all have values.
-        in_step: Whether decisions of the same time are made at once, so that states in between are not assignments.
+        in_step: Whether decisions with equal times are simultaneous, so that intermediate states do not count.
 
     Attributes:
         interfaces: The interface variables of each robot. Runs that reorder the team replace them.
@@ -35,7 +35,7 @@ class Objective:
         self._constraints = list(team.constraints())
         self._prices: list[Price] = [cost_function(one, one.variables) for one in self._constraints]
         self._restated: dict[tuple[int, tuple[str, ...]], Constraint | None] = {}
-        self._paid: list[float] = [0] * len(self._constraints)
+        self._costs: list[float] = [0] * len(self._constraints)
         self._sum: float = 0
         self._broken = 0
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
@@ -45,7 +45,7 @@ class Objective:
             for name in constraint.variables:
                 self._on[name].append(number)
             if not constraint.variables:
-                self._pay(number, self._prices[number](()))
+                self._set_cost(number, self._prices[number](()))
         self._values: dict[str, int] = {}
         self._absent = set(self._weights)
         self._weight = sum(self._weights.values())
@@ -65,11 +65,11 @@ class Objective:
             names = self._constraints[number].variables
             known = all(name in self._values for name in names)
             if known:
-                self._pay(number, self._prices[number]([self._values[name] for name in names]))
+                self._set_cost(number, self._prices[number]([self._values[name] for name in names]))
             else:
-                self._pay(number, self._price_for_some(number) if self._withdrawal_cost is not None else 0)
+                self._set_cost(number, self._cost_with_absent(number) if self._withdrawal_cost is not None else 0)
 
-    def _price_for_some(self, number: int) -> float:
+    def _cost_with_absent(self, number: int) -> float:
         """Return the cost of a constraint when robots of its scope are absent."""
         constraint = self._constraints[number]
         absent = tuple([name for name in constraint.variables if name not in self._values])
@@ -78,21 +78,21 @@ class Objective:
         in_force = self._restated[number, absent]
         return 0 if in_force is None else in_force.price(self._values)
 
-    def _pay(self, number: int, cost: float) -> None:
-        """Set what a constraint costs. The sum goes along: costs are integers, and infinite ones are counted."""
-        for paid, sign in ((self._paid[number], -1), (cost, 1)):
+    def _set_cost(self, number: int, cost: float) -> None:
+        """Set the cost of a constraint, and update the sum of finite costs and the number of infinite ones."""
+        for paid, sign in ((self._costs[number], -1), (cost, 1)):
             if paid == INFINITE:
                 self._broken += sign
             else:
                 self._sum += sign * paid
-        self._paid[number] = cost
+        self._costs[number] = cost
 
     def clear(self) -> None:
-        """Take back the values of all robots."""
+        """Remove the values of all robots."""
         self.change({robot: {} for robot in self._weights})
 
     def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]] | None:
-        """Return each robot's variables for `values`, as neighbours see them; None if that is impossible."""
+        """Return each robot's interface variables with their `values`; None if they do not match."""
         if any(len(self.interfaces.get(robot, (*value, ""))) != len(value) for robot, value in values.items()):
             return None
         return {
@@ -107,8 +107,8 @@ class Objective:
             return INFINITE
         return self._sum + self._weight * (self._withdrawal_cost or 0)
 
-    def told(self, cost: float) -> Cost:
-        """Return `cost`, which includes withdrawal costs, in the user's numbers."""
+    def in_user_units(self, cost: float) -> Cost:
+        """Convert `cost`, which includes withdrawal costs, to the user's units."""
         return user_cost(self._team, cost)
 
 

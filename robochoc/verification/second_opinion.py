@@ -22,19 +22,19 @@ def confirmed(
     """Return the names of the central solvers that agree with a protocol.
 
     Args:
-        solvers: the central solvers, the first of which has to be there.
-        team: the team as its files have it.
-        protocol: the protocol's name.
-        alone: a robot that has no local solution. The checker looks at it as well, as the central solver and the
-            compiler of domains share their encoding.
-        total: the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
-        withdrawal_cost: the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
+        solvers: The central solvers. The first one is required.
+        team: The team in the form of its files.
+        protocol: The protocol's name.
+        alone: A robot that has no local solution. This is also verified by the checker, because the central solver and
+            the compiler of domains share their encoding.
+        total: The claimed minimum cost, including withdrawal costs; infinite for the claim of no solution.
+        withdrawal_cost: The withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
 
     Returns:
-        The solvers that agree; a solver that did not finish does not count.
+        The solvers that agree. Solvers that did not finish are omitted.
 
     Raises:
-        RefutedError: when one has found something else.
+        RefutedError: when a solver has found a different result.
     """
     agreeing = []
     for solver in solvers:
@@ -42,8 +42,8 @@ def confirmed(
         against = contradiction(opinion, total)
         if against or (alone is not None and has_local_solution(team[alone])):
             claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
-            found = f"{team.name} has {claim}, and {solver.name} has found {against or 'one'}"
-            raise RefutedError(f"{protocol} says that {found}")
+            found = f"{team.name} has {claim}, but {solver.name} has found {against or 'one'}"
+            raise RefutedError(f"{protocol} claims that {found}")
         if opinion.verdict != Verdict.UNKNOWN:
             agreeing.append(solver.name)
     return tuple(agreeing)
@@ -52,7 +52,7 @@ def confirmed(
 def contradiction(opinion: CentralAnswer, total: float) -> str | None:
     """Return the central solver's objection to a claim; None if it agrees, or did not finish.
 
-    `total` is the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
+    `total` is the claimed minimum cost, including withdrawal costs; infinite for the claim of no solution.
     """
     if opinion.verdict == Verdict.NO_SOLUTION:
         return None if total == INFINITE else "none"
@@ -66,6 +66,6 @@ def contradiction(opinion: CentralAnswer, total: float) -> str | None:
 
 
 def total_cost(team: Team, assignment: Mapping[str, int], withdrawal_cost: float | None) -> float:
-    """Return the cost of `assignment`, and the robots without values, at a withdrawal cost for one of weight 1."""
+    """Return the cost of `assignment` and of withdrawing the robots without values."""
     withdrawn = (robot for robot in team.robots if robot.variables[0].name not in assignment)
     return assignment_cost(team, assignment) + (withdrawal_cost or 0) * sum(robot.weight for robot in withdrawn)

@@ -9,7 +9,7 @@ import pytest
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle
-from robochoc.services.sl import Function, df_on, request
+from robochoc.services.sl import DirectoryFunction, df_on, request
 from tests.support.program import robochoc_within
 
 DF = df_on("h:7447/robochoc")
@@ -20,9 +20,9 @@ SERVICES = (ServiceDescription("V1", "variable"), ServiceDescription("/a", "topi
 def test_an_answer_is_printed_as_a_table_as_json_or_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     directory = Directory()
     agent = AgentDescription(AGENT, SERVICES, protocols=("abt",))
-    handle(directory, AGENT, request(DF, Function.REGISTER, agent), 0)
+    handle(directory, AGENT, request(DF, DirectoryFunction.REGISTER, agent), 0)
     answers = [
-        handle(directory, AGENT, request(DF, Function.SEARCH, AgentDescription(protocols=(name,))), 0)[1]
+        handle(directory, AGENT, request(DF, DirectoryFunction.SEARCH, AgentDescription(protocols=(name,))), 0)[1]
         for name in ("abt", "sfb")
     ]
     monkeypatch.setattr("robochoc.run.networked.join.identity_of", lambda *_: None)

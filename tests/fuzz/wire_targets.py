@@ -59,7 +59,7 @@ from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle, subscribe
 from robochoc.services.identifier import AgentIdentifier, identifier_on
-from robochoc.services.sl import Function, df_on, request
+from robochoc.services.sl import DirectoryFunction, df_on, request
 from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
 from robochoc.solver.explanation import KeyedConstraint
 from tests.fuzz.harness import Target, assert_said
@@ -266,8 +266,8 @@ def _requests() -> Sequence[bytes]:
         f"R@{PLATFORM}", (service,), ("abt",), ("o",), ("sl",), lease_s=60.0, addresses=("tcp/1.2.3.4:5",)
     )
     asked = [
-        *((function, whole, None) for function in Function),
-        (Function.SEARCH, AgentDescription(services=(ServiceDescription(type="robot"),)), 3),
+        *((function, whole, None) for function in DirectoryFunction),
+        (DirectoryFunction.SEARCH, AgentDescription(services=(ServiceDescription(type="robot"),)), 3),
     ]
     return [request(df, function, description, most).encode() for function, description, most in asked]
 

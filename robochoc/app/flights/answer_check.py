@@ -21,7 +21,7 @@ from robochoc.formats import InvalidInputError, read_team
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import INFINITE, Team
 from robochoc.modelling.errors import ModelError
-from robochoc.verification.checker import RefutedError, check_told_cost, constraint_cost
+from robochoc.verification.checker import RefutedError, check_user_cost, constraint_cost
 
 CHECK_S = 5.0
 """The time limit for checking all constraints; after it, the answer counts as not checked."""
@@ -120,7 +120,7 @@ def _checked(team: Team, code: _Code, result: RunResult) -> Checked | None:
 
 def _is_cost_correct(team: Team, values: Mapping[str, int], result: RunResult, aside: frozenset[str]) -> bool:
     try:
-        check_told_cost(team, values, result.cost, without=aside)
+        check_user_cost(team, values, result.cost, without=aside)
     except RefutedError:
         return False
     return True

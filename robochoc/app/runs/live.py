@@ -86,7 +86,7 @@ class LiveReader:
         self._label = label
         self._known = KnownCosts(objective) if objective else None
         self._robots = frozenset(objective.interfaces) if objective else None
-        self._minimised = objective is not None and objective.told(0) < objective.told(1)
+        self._minimised = objective is not None and objective.in_user_units(0) < objective.in_user_units(1)
         self._spoken = JournalSentences(called)
         self._open: BinaryIO | None = None
         self._follower: Follower | None = None

@@ -15,7 +15,7 @@ from robochoc.communication.network.transport import CannotConnectError, Transpo
 from robochoc.protocols.acts import Performative
 from robochoc.run.networked.address import Address
 from robochoc.services.descriptions import AgentDescription, ServiceDescription
-from robochoc.services.sl import Function, descriptions_in, df_on, request, searched_in
+from robochoc.services.sl import DirectoryFunction, descriptions_in, df_on, request, searched_in
 from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
@@ -65,7 +65,7 @@ def platform_at(place: Address) -> str:
 def search_request(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
     """Return a search as an action in SL0. Raises `TemplateError`."""
     platform = platform_at(place)
-    return request(df_on(platform), Function.SEARCH, search_template(slots), at_most)
+    return request(df_on(platform), DirectoryFunction.SEARCH, search_template(slots), at_most)
 
 
 def query_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> str:

@@ -127,5 +127,5 @@ def test_in_step_only_whole_cycles_have_a_cost(seed: int) -> None:
         weighed.change({event.robot: event.assignment for event in decided if event.t == cycle})
         if weighed.cost < best:
             best = weighed.cost
-            expected.append((cycle, weighed.told(best)))
+            expected.append((cycle, weighed.in_user_units(best)))
     assert [(event.t, event.cost) for event in told] == expected

@@ -42,7 +42,7 @@ from robochoc.run.orchestrator import solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
-from robochoc.verification.checker import RefutedError, assignment_cost, check_told_cost
+from robochoc.verification.checker import RefutedError, assignment_cost, check_user_cost
 from tests.support.examples import count
 from tests.support.losing import Losing
 from tests.support.real_costs import best_cost, random_costs_team
@@ -163,9 +163,9 @@ def test_withdrawal_and_utilities_do_not_go_together() -> None:
 
 
 def test_a_wrong_cost_is_refuted() -> None:
-    check_told_cost(tutored(), {"x": 1, "y": 2}, Decimal("1.95"))
+    check_user_cost(tutored(), {"x": 1, "y": 2}, Decimal("1.95"))
     with pytest.raises(RefutedError, match=r"costs 1\.95, but the protocol claims 2"):
-        check_told_cost(tutored(), {"x": 1, "y": 2}, 2)
+        check_user_cost(tutored(), {"x": 1, "y": 2}, 2)
 
 
 # Constant costs of robots that come and go: each counts while its robot is there

@@ -18,7 +18,7 @@ from robochoc.services.facilitator import handle
 from robochoc.services.identifier import AgentIdentifier, expression_of, identifier_of, identifier_on
 from robochoc.services.sl import (
     REQUEST_CAPS,
-    Function,
+    DirectoryFunction,
     described,
     description_of,
     descriptions_in,
@@ -34,7 +34,7 @@ from robochoc.services.symbolic import (
     Word,
     name,
     read,
-    written,
+    text_form,
 )
 from tests.support.cases import cases
 from tests.support.examples import examples
@@ -74,13 +74,13 @@ def descriptions(draw: st.DrawFn) -> AgentDescription:
 
 @given(EXPRESSIONS)
 def test_what_is_written_is_read(expression: Expression) -> None:
-    assert read(written(expression), Caps(10_000, 1000, 50)) == expression
+    assert read(text_form(expression), Caps(10_000, 1000, 50)) == expression
 
 
 @given(EXPRESSIONS)
 def test_an_independent_reader_finds_the_same_strings_and_lists(expression: Expression) -> None:
     """Words that we would not write, such as numbers, are left out: sexpdata has its own mind about them."""
-    assert sexpdata.loads(written(quoted(expression)), nil=None, true=None) == foreign(quoted(expression))
+    assert sexpdata.loads(text_form(quoted(expression)), nil=None, true=None) == foreign(quoted(expression))
 
 
 def quoted(expression: Expression) -> Expression:
@@ -99,13 +99,13 @@ BAD_EXPRESSIONS: list[tuple[str, str, int]] = [
     ("", "no expression", 0),
     ("  ", "no expression", 2),
     ("(a (b)", "ends before", 6),
-    ("a)", "goes on", 1),
+    ("a)", "after the end", 1),
     (")", "closes nothing", 0),
-    ("(a) b", "goes on", 4),
+    ("(a) b", "after the end", 4),
     ('(a "b', "never closed", 3),
     ('("a\\"', "never closed", 1),
     ('#9"abc', "the text ends before", 0),
-    ('#1"é', "whole characters", 0),
+    ('#1"é', "complete characters", 0),
     ("(" * 11, "deeper than 10", 10),
     ("(" + "a " * 100, "more than 100", 199),
     ("x" * 10_001, "too many", 10_000),
@@ -134,7 +134,7 @@ def test_backslashes_before_other_characters_stand_for_themselves() -> None:
 def test_any_text_is_read_or_refused(text: str) -> None:
     with contextlib.suppress(SymbolicExpressionError):
         expression = read(text, CAPS)
-        assert read(written(expression), Caps(200, 100, 10)) == expression
+        assert read(text_form(expression), Caps(200, 100, 10)) == expression
 
 
 def test_millions_of_escapes_end() -> None:
@@ -146,16 +146,16 @@ def test_millions_of_escapes_end() -> None:
 
 
 def test_words_that_begin_with_a_digit_are_written_as_strings() -> None:
-    assert written(name("7")) == '"7"'
-    assert written(name("Robot3.1@192.168.1.14:7447/robochoc")) == "Robot3.1@192.168.1.14:7447/robochoc"
-    with pytest.raises(ValueError, match="no word"):
-        written(Word("a b"))
+    assert text_form(name("7")) == '"7"'
+    assert text_form(name("Robot3.1@192.168.1.14:7447/robochoc")) == "Robot3.1@192.168.1.14:7447/robochoc"
+    with pytest.raises(ValueError, match="not a valid word"):
+        text_form(Word("a b"))
 
 
 @given(st.recursive(st.builds(AgentIdentifier, TEXTS.filter(bool), NAMES), lambda inner: st.builds(
     AgentIdentifier, TEXTS.filter(bool), NAMES, st.lists(inner, max_size=2).map(tuple)), max_leaves=4))  # fmt: skip
 def test_identifiers_are_read_as_they_are_written(identifier: AgentIdentifier) -> None:
-    assert identifier_of(read(written(expression_of(identifier)), Caps(10_000, 1000, 50))) == identifier
+    assert identifier_of(read(text_form(expression_of(identifier)), Caps(10_000, 1000, 50))) == identifier
 
 
 def test_an_identifier_has_a_local_name_and_a_platform() -> None:
@@ -169,12 +169,12 @@ def test_an_identifier_has_a_local_name_and_a_platform() -> None:
 
 @given(descriptions())
 def test_descriptions_are_read_as_they_are_written(description: AgentDescription) -> None:
-    assert description_of(read(written(described(description)), REQUEST_CAPS)) == description
+    assert description_of(read(text_form(described(description)), REQUEST_CAPS)) == description
 
 
 def test_a_lease_is_written_in_days_hours_minutes_and_seconds() -> None:
     description = AgentDescription("r", lease_s=(((1 * 24 + 2) * 60) + 3) * 60 + 4.5)
-    text = written(described(description))
+    text = text_form(described(description))
     assert ":lease-time +00000001T020304500" in text
     assert description_of(read(text, REQUEST_CAPS)) == description
 
@@ -184,7 +184,7 @@ ABT = AgentDescription(ROBOT, (ServiceDescription("abt", "robochoc", protocols=(
 
 def test_register_is_done_and_searches_find_it() -> None:
     directory = Directory()
-    registered = handle(directory, ROBOT, request(DF, Function.REGISTER, ABT), 0)
+    registered = handle(directory, ROBOT, request(DF, DirectoryFunction.REGISTER, ABT), 0)
     assert registered[0] is Performative.INFORM
     assert registered[1] == (
         f"((done (action (agent-identifier :name {DF.name}) (register (df-agent-description"
@@ -192,22 +192,22 @@ def test_register_is_done_and_searches_find_it() -> None:
         " :services (set (service-description :name abt :type robochoc :protocols (set abt)))"
         " :protocols (set abt) :lease-time +00000000T000030500)))))"
     )
-    found = handle(directory, "x@p", request(DF, Function.SEARCH, AgentDescription(protocols=("abt",))), 1)
+    found = handle(directory, "x@p", request(DF, DirectoryFunction.SEARCH, AgentDescription(protocols=("abt",))), 1)
     assert found[0] is Performative.INFORM
     assert descriptions_in(found[1]) == (ABT,)
-    later = handle(directory, "x@p", request(DF, Function.SEARCH, AgentDescription(protocols=("abt",))), 31)
+    later = handle(directory, "x@p", request(DF, DirectoryFunction.SEARCH, AgentDescription(protocols=("abt",))), 31)
     assert descriptions_in(later[1]) == ()
 
 
 def test_modify_and_deregister() -> None:
     directory = Directory()
     for function, description, performative in (
-        (Function.MODIFY, ABT, Performative.FAILURE),
-        (Function.REGISTER, ABT, Performative.INFORM),
-        (Function.REGISTER, ABT, Performative.FAILURE),
-        (Function.MODIFY, AgentDescription(ROBOT), Performative.INFORM),
-        (Function.DEREGISTER, AgentDescription(ROBOT), Performative.INFORM),
-        (Function.DEREGISTER, AgentDescription(ROBOT), Performative.FAILURE),
+        (DirectoryFunction.MODIFY, ABT, Performative.FAILURE),
+        (DirectoryFunction.REGISTER, ABT, Performative.INFORM),
+        (DirectoryFunction.REGISTER, ABT, Performative.FAILURE),
+        (DirectoryFunction.MODIFY, AgentDescription(ROBOT), Performative.INFORM),
+        (DirectoryFunction.DEREGISTER, AgentDescription(ROBOT), Performative.INFORM),
+        (DirectoryFunction.DEREGISTER, AgentDescription(ROBOT), Performative.FAILURE),
     ):
         assert handle(directory, ROBOT, request(DF, function, description), 0)[0] is performative
     assert not len(directory)
@@ -216,9 +216,9 @@ def test_modify_and_deregister() -> None:
 def test_max_results_limits_a_search() -> None:
     directory = Directory()
     for robot in "cab":
-        handle(directory, robot, request(DF, Function.REGISTER, AgentDescription(robot)), 0)
+        handle(directory, robot, request(DF, DirectoryFunction.REGISTER, AgentDescription(robot)), 0)
     for wanted, names in ((2, ["a", "b"]), (0, []), (-1, ["a", "b", "c"]), (None, ["a", "b", "c"])):
-        answer = handle(directory, "x", request(DF, Function.SEARCH, AgentDescription(), wanted), 0)[1]
+        answer = handle(directory, "x", request(DF, DirectoryFunction.SEARCH, AgentDescription(), wanted), 0)[1]
         assert [one.name for one in descriptions_in(answer)] == names
 
 

@@ -17,7 +17,7 @@ from robochoc.services.descriptions import AgentDescription, ServiceDescription
 from robochoc.services.directory import Directory
 from robochoc.services.facilitator import handle
 from robochoc.services.identifier import AgentIdentifier
-from robochoc.services.sl import REQUEST_CAPS, Function, df_on, request
+from robochoc.services.sl import REQUEST_CAPS, DirectoryFunction, df_on, request
 from robochoc.services.symbolic import Expression, read
 from robochoc.sniffer.acl import ACLError, ACLMessage, parse, text
 from tests.support.acl_conversations import (
@@ -112,7 +112,7 @@ BAD_TEXTS: list[tuple[str, str, int]] = [
     ("(INFORM :sender", "ends before", 15),
     ("(INFORM :sender)", "has no value", 8),
     ("(INFORM sender a)", "begin with a colon", 8),
-    ("(INFORM :sender a)", "agent-identifier is to be a list", 16),
+    ("(INFORM :sender a)", "agent-identifier must be a list", 16),
     ("(INFORM :sender (agent-identifier))", "needs a :name", 16),
     ("(INFORM :sender (agent-identifier :name (a)))", "not a list", 40),
     ("(INFORM :receiver (agent-identifier :name a))", "begin with set", 18),
@@ -172,10 +172,10 @@ def test_the_documented_words_with_the_directory_are_ours() -> None:
     variables = ServiceDescription("variables", "robochoc-variables", properties=(("X31", "0..3"),))
     own = AgentDescription(robot, (variables,), ("abt",), ("robochoc",), ("json",), 30.0)
     asked = [
-        request(df, Function.REGISTER, own),
-        request(df, Function.SEARCH, AgentDescription(protocols=("abt",)), 10),
-        request(df, Function.REGISTER, AgentDescription(robot)),
-        request(df, Function.DEREGISTER, AgentDescription(f"Robot4.1@{PLATFORM}")),
+        request(df, DirectoryFunction.REGISTER, own),
+        request(df, DirectoryFunction.SEARCH, AgentDescription(protocols=("abt",)), 10),
+        request(df, DirectoryFunction.REGISTER, AgentDescription(robot)),
+        request(df, DirectoryFunction.DEREGISTER, AgentDescription(f"Robot4.1@{PLATFORM}")),
     ]
     answers = [handle(directory, robot, one, 0.0) for one in asked]
     said = [asked[0], answers[0][1], asked[1], answers[1][1], answers[2][1], answers[3][1]]

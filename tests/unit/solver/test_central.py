@@ -186,7 +186,7 @@ def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
-    with pytest.raises(RefutedError, match="no solution, and the central solver has found one"):
+    with pytest.raises(RefutedError, match="no solution, but the central solver has found one"):
         solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
 
 

@@ -166,7 +166,7 @@ def test_that_costs_are_those_of_the_objective(tmp_path: Path) -> None:
             weighed.change({event.robot: event.assignment})
             seen.append(weighed.cost)
     assert facts.costs
-    assert facts.costs[-1][1] == weighed.told(min(seen))
+    assert facts.costs[-1][1] == weighed.in_user_units(min(seen))
 
 
 def _written(file: Path, *events: AnyEvent) -> Path:
