@@ -168,8 +168,8 @@ def test_processes_report_it_too_and_nobody_is_told_without_asking() -> None:
     ("options", "why"),
     [
         (Options(protocol="dpop", count=True), "--count is for --protocol central, or count-dpop"),
-        (Options(protocol="count-dpop", count=True, withdraw=Withdrawal.MINIMUM), "who can do without"),
-        (Options(protocol="count-dpop", count=True, runtime=Runtime.NETWORK), "one robot's word"),
+        (Options(protocol="count-dpop", count=True, withdraw=Withdrawal.MINIMUM), "counts solutions for all robots"),
+        (Options(protocol="count-dpop", count=True, runtime=Runtime.NETWORK), "the number cannot be checked"),
     ],
 )
 def test_counting_is_refused_where_nobody_counts(options: Options, why: str) -> None:
