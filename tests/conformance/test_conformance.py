@@ -235,7 +235,7 @@ def test_costs_that_do_not_fit_into_messages_are_refused() -> None:
     own = Constraint("D", dear, (first.variables[0].name,), (first.variables[0].name,), model=None)
     team = replace(team, robots=(replace(first, private=(*first.private, *[own] * 10)), *others))
     for protocol in MINIMISING:
-        with pytest.raises(UnsupportedError, match="scale them down"):
+        with pytest.raises(UnsupportedError, match="scale the costs down"):
             solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
 
 

@@ -221,7 +221,7 @@ def test_costs_that_come_later_must_fit_as_well() -> None:
         AddConstraint("RB", "RA", Constraint(f"D{number}", _UNLIKE, ("A", "B"), ("A", "B"), cost=most))
         for number in range(5)
     ]
-    with pytest.raises(UnsupportedError, match="scale them down"):
+    with pytest.raises(UnsupportedError, match="scale the costs down"):
         solve(
             replace(team, scenario=(ScenarioEvent(tuple(dear)),)), Options(protocol="dpop", runtime=Runtime.SIMULATOR)
         )
