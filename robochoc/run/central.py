@@ -25,7 +25,7 @@ from robochoc.verification.second_opinion import total_cost
 
 
 class _Decision(NamedTuple):
-    """The decision of the central solver for one epoch, and the number of solutions if it was asked for."""
+    """The decision of the central solver for one epoch, and the number of solutions if the options require it."""
 
     answer: PhaseAnswer
     solutions: int | None = None

@@ -174,9 +174,9 @@ ORDERS = MappingProxyType(
 """The orders that suit the protocols. Other protocols build trees, or use no order."""
 
 ORDERS_TEXT = (
-    "order, if none is asked for: max-degree for abt, afc-ng and afb; min-width for sfb, with costs max-degree, with",
-    "--withdraw dom-deg. The files' order stays for the others, and where constraints are partially known, the problem",
-    "changes, or --withdraw maximal asks who is placed first",
+    "order, unless --order names one: max-degree for abt, afc-ng and afb; min-width for sfb (with costs max-degree, with",
+    "--withdraw dom-deg). The order of the files is kept for other protocols, and if constraints are partially known,",
+    "the problem changes, or --withdraw maximal decides by priority",
 )
 """The rules of `_with_suitable_order` and `_with_order`, in lines for the user."""
 

@@ -75,19 +75,19 @@ class RunContext:
 
     def cp_sat_solver(self) -> CpSatSolver:
         """Return a central solver of this run that uses OR-Tools."""
-        from robochoc.solver.cp_sat import CpSatSolver  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.solver.cp_sat import CpSatSolver  # noqa: PLC0415 - start-up: rarely needed
 
         return CpSatSolver(self.deadline, partial(self.show_stage, "OR-Tools decides the whole team"))
 
     def second_opinions(self) -> list[TeamSolver]:
         """Return the solvers that check the proofs of robots: the central solver, and OR-Tools if it is installed."""
-        from robochoc.solver.cp_sat import is_installed  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.solver.cp_sat import is_installed  # noqa: PLC0415 - start-up: rarely needed
 
         return [self.central_solver(), *([self.cp_sat_solver()] if is_installed() else [])]
 
     def central_solver(self, warm: AceProcess | None = None) -> CentralSolver:
         """Return a central solver of this run; it uses the process `warm`, unless the run has a process."""
-        from robochoc.solver.central import CentralSolver  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.solver.central import CentralSolver  # noqa: PLC0415 - start-up: rarely needed
 
         show = partial(self.show_stage, "ACE decides the whole team")
         always_ace = self.options.local.always_ace

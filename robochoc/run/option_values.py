@@ -131,14 +131,14 @@ def priority_order(name: str, value: object) -> object:
 
 def channel_model(name: str, value: object) -> object:
     """Accept a `ChannelModel`."""
-    from robochoc.communication.simulator.channel import ChannelModel  # noqa: PLC0415 - start-up: seldom asked for
+    from robochoc.communication.simulator.channel import ChannelModel  # noqa: PLC0415 - start-up: rarely needed
 
     return instance_of(ChannelModel)(name, value)
 
 
 def kill(name: str, value: object) -> object:
     """Accept a `Kill`, with its time in seconds."""
-    from robochoc.communication.kill_schedule import Kill  # noqa: PLC0415 - start-up: seldom asked for
+    from robochoc.communication.kill_schedule import Kill  # noqa: PLC0415 - start-up: rarely needed
 
     if not isinstance(value, Kill):
         raise OptionTypeError(_refusal(name, value, "a Kill(robot, after_s)"))

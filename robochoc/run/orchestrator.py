@@ -54,11 +54,11 @@ def solve(
     Args:
         team: the team with its scenario.
         options: how to run.
-        observer: gets all events.
-        progress: gets the number of messages so far, now and then.
+        observer: receives all events.
+        progress: receives the number of messages so far, now and then.
         solver: a constraint solver that is running already: a program that solves many teams saves time with it.
-        environment: gets each epoch's answer, and returns the next change of the problem.
-        audience: with `Options.improve`, gets each answer while the search goes on.
+        environment: receives each epoch's answer, and returns the next change of the problem.
+        audience: with `Options.improve`, receives each answer during the search.
         ordered: whether the user chose the priority order of `team`. Otherwise one is chosen for any protocol.
 
     Returns:
@@ -160,7 +160,7 @@ def _check_costs(team: Team, outcome: Outcome) -> None:
 def _solve_centrally(team: Team, context: RunContext) -> Outcome:
     """Let the central solver decide. See `run/central.py`."""
     refuse_unfit(team, context.options, CENTRAL_TRAITS)
-    from robochoc.run.central import solve_centrally  # noqa: PLC0415 - start-up: seldom asked for
+    from robochoc.run.central import solve_centrally  # noqa: PLC0415 - start-up: rarely needed
 
     return solve_centrally(team, context, _header(team, context.options))
 
@@ -177,7 +177,7 @@ def _solve_distributed(
     except UnfitProtocolError as unfit:
         raise UnsupportedError(f"{unfit}{_alternatives(team, options, complete=unfit.complete)}") from None
     if options.channel is not None:
-        from robochoc.run.compatibility.channel_rules import refuse_channel  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.run.compatibility.channel_rules import refuse_channel  # noqa: PLC0415 - start-up: rarely needed
 
         refuse_channel(team, options)
     deployment = ThisMachine(team, context, environment, audience)

@@ -26,7 +26,7 @@ def objective_to_record(team: Team, options: Options) -> Callable[[], Objective]
 
 def journal_header(team: Team, options: Options) -> Header:
     """Return the header of the run's journal."""
-    from msgspec import UNSET  # noqa: PLC0415 - start-up: seldom asked for
+    from msgspec import UNSET  # noqa: PLC0415 - start-up: rarely needed
 
     from robochoc.journal.entries import BOUNDED, VERSION, Header  # noqa: PLC0415 - as above
 

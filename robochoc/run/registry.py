@@ -141,7 +141,7 @@ _SPELLINGS = {CENTRAL, AUTO}
 
 
 def installed_spelling(name: str) -> str:
-    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself where it fits none, or several."""
+    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself if it matches none or several."""
     if name in _SPELLINGS or _entries(name):
         _SPELLINGS.add(name)
         return name

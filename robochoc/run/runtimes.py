@@ -142,7 +142,7 @@ def _losses_of(options: Options) -> Losses | None:
 
     if options.message_loss or not options.loss or options.channel is None:
         return Losses(options.loss, options.seed) if options.loss else None
-    from robochoc.communication.simulator.channel_losses import ChannelLosses  # noqa: PLC0415 - start-up: seldom asked for
+    from robochoc.communication.simulator.channel_losses import ChannelLosses  # noqa: PLC0415 - start-up: rarely needed
 
     return ChannelLosses(options.channel, options.seed)
 
@@ -157,7 +157,7 @@ def open_arrays(request: SessionRequest) -> Session:
 def _schedule_of(options: Options) -> Schedule:
     """Return the simulator's schedule that `options` ask for."""
     if options.channel:
-        from robochoc.communication.simulator.timed import Timed  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.communication.simulator.timed import Timed  # noqa: PLC0415 - start-up: rarely needed
 
         return Timed(options.seed, options.channel)
     from robochoc.communication.simulator.schedule import (  # noqa: PLC0415 - the simulator's

@@ -158,7 +158,7 @@ class ThisMachine(Deployment):
         """See `Deployment.confirm`."""
         if not self.options.verify:
             return ()
-        from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: rarely needed
 
         cost = phase.parameters.withdrawal_cost
         if answer.verdict == Verdict.NO_SOLUTION:
@@ -212,7 +212,7 @@ class ThisMachine(Deployment):
         """Return the reason for a missing solution: constraints that the remaining robots cannot satisfy."""
         if answer.verdict != Verdict.NO_SOLUTION:
             return None
-        from robochoc.verification.absence_reason import absence_reason  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.verification.absence_reason import absence_reason  # noqa: PLC0415 - start-up: rarely needed
 
         return absence_reason(self._scenario.team, withdrawal=withdrawal) or None
 
@@ -345,7 +345,7 @@ class ThisMachine(Deployment):
         """Return the central solvers that confirm an answer, if required. For the arguments see `confirmed`."""
         if not self.options.verify:
             return ()
-        from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for
+        from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: rarely needed
 
         cost = None if withdrawal_cost is None else int(withdrawal_cost)
         solvers, team = self._context.second_opinions(), self._scenario.team

@@ -45,7 +45,7 @@ class ConflictTable:
     def __init__(self, constraints: Sequence[SharedConstraint], size: int) -> None:
         self._size = size
         grouped = [list(group) for _, group in itertools.groupby(constraints, key=lambda c: c.agents)]
-        self._groups = [_Group(group) for group in grouped]
+        self._groups = [_ConstraintGroup(group) for group in grouped]
         self._firsts = list(itertools.accumulate((len(group) for group in grouped), initial=0))
         self._view: tuple[dict[str, Value], int] | None = None
         self._last = _BrokenConstraints([], [], [])
@@ -78,7 +78,7 @@ class ConflictTable:
         return _BrokenConstraints(checks.tolist(), broken.tolist(), constraints)
 
 
-class _Group:
+class _ConstraintGroup:
     """Constraints with the same robots, in the order of checking."""
 
     def __init__(self, constraints: Sequence[SharedConstraint]) -> None:

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from robochoc.communication.network.access import ALL, access_control, frame_key, journal_key, life_key, name_in
 from robochoc.communication.network.framing import MASTER
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.profile import possible_neighbours
 from robochoc.model.problem import Team
 from tests.support.cases import looped
@@ -194,7 +194,7 @@ def test_who_may_sniff_asks_in_its_own_name_and_the_master_alone_answers(sniffer
 @given(seed=st.integers(0, 2**32), make=st.sampled_from([lambda s: random_team(Random(s)), sparse_team]))
 def test_who_stays_within_writes_to_neighbours_and_sharers_only(seed: int, make: Any) -> None:  # noqa: ANN401
     team: Team = make(seed)
-    members = TeamMembers()
+    members = NetworkMembers()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "incarnation")
     met = possible_neighbours(profiles_of(team))
@@ -206,7 +206,7 @@ def test_who_stays_within_writes_to_neighbours_and_sharers_only(seed: int, make:
 
 
 def test_nobody_writes_to_who_is_lost() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     for name, profile in profiles_of(sparse_team(1)).items():
         members.register(name, profile, "incarnation")
     members.remove(["RX03"])

@@ -9,7 +9,7 @@ from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.checked_snapshots import CheckedSnapshots
 from robochoc.communication.network.control_messages import CheckRequest, CheckResult, Recall, ToRobot
 from robochoc.communication.network.framing import FrameRefusedError
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.searcher import SnapshotValues, values_for_recall
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint
@@ -31,7 +31,7 @@ class Round:
     """The snapshots of a search by three robots, and what the master has sent them."""
 
     def __init__(self) -> None:
-        members = TeamMembers(ROBOTS)
+        members = NetworkMembers(ROBOTS)
         for name, profile in profiles_of(TEAM).items():
             members.register(name, profile, "incarnation").joined = True
         self.state = AuditedSearchState(1, ROBOTS, declared=members.declared(DSA.traits))

@@ -12,7 +12,7 @@ from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network.control_messages import ControlMessage, LostFrames, Objection
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.master_events import MasterEvents
-from robochoc.communication.network.members import Member, TeamMembers
+from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.quotas import BURST_S, EVENTS_A_SECOND, REPORTS_A_SECOND
 from robochoc.journal.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
 
@@ -62,7 +62,7 @@ def test_a_robot_that_floods_reports_of_others_is_named(monkeypatch: pytest.Monk
     told: list[AnyEvent] = []
     authority = InMemoryAuthority("ABC")
     identity = authority.master_identity(("127.0.0.1",))
-    master = Master(authority, identity, "127.0.0.1:7447", TeamMembers(), observer=told.append)
+    master = Master(authority, identity, "127.0.0.1:7447", NetworkMembers(), observer=told.append)
     member = Member(cast("Profile", None), "1")
 
     def hear(name: str, message: ControlMessage) -> None:

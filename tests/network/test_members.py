@@ -8,7 +8,7 @@ from random import Random
 import msgspec
 import pytest
 
-from robochoc.communication.network.members import RegistrationRefusedError, TeamMembers
+from robochoc.communication.network.members import NetworkMembers, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Constraint, Predicate, ProblemKind
@@ -23,12 +23,12 @@ PROFILES = profiles_of(team_of(dict.fromkeys("ABC", (1, 2)), TRIANGLE))
 RA, RB, RC = PROFILES
 
 
-def join(members: TeamMembers, *names: str, incarnation: str = "first") -> None:
+def join(members: NetworkMembers, *names: str, incarnation: str = "first") -> None:
     for name in names:
         members.register(name, PROFILES[name], incarnation).joined = True
 
 
-def refused(members: TeamMembers, name: str, profile: Profile, incarnation: str = "first") -> str:
+def refused(members: NetworkMembers, name: str, profile: Profile, incarnation: str = "first") -> str:
     before = dict(members.robots)
     with pytest.raises(RegistrationRefusedError) as caught:
         members.register(name, profile, incarnation)
@@ -37,7 +37,7 @@ def refused(members: TeamMembers, name: str, profile: Profile, incarnation: str 
 
 
 def test_registering_twice_is_registering_once() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     first = members.register(RA, PROFILES[RA], "first")
     assert members.register(RA, PROFILES[RA], "first") is first
     first.joined = True
@@ -46,13 +46,13 @@ def test_registering_twice_is_registering_once() -> None:
 
 
 def test_a_name_is_one_robots() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA)
     assert refused(members, RA, PROFILES[RA], "second") == f"a robot called {RA} is registered already"
 
 
 def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA)
     members.robots[RA].away_since = 12.5
     now = members.register(RA, PROFILES[RA], "second")
@@ -64,7 +64,7 @@ def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
 
 
 def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA)
     members.remove([RA, "nobody"])
     assert "absent for too long: restart it" in refused(members, RA, PROFILES[RA], "first")
@@ -72,25 +72,25 @@ def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
 
 
 def test_a_certificate_is_for_one_file() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     assert refused(members, RB, PROFILES[RA]) == f"its file is '{RA}''s, and its certificate {RB}'s"
     long = msgspec.structs.replace(PROFILES[RA], name="R" * 5000)
     assert len(refused(members, RB, long)) < 200
 
 
 def test_strangers_are_not_taken_where_robots_are_expected() -> None:
-    assert refused(TeamMembers([RA, RB]), RC, PROFILES[RC]) == "it is not a member of the team"
+    assert refused(NetworkMembers([RA, RB]), RC, PROFILES[RC]) == "it is not a member of the team"
 
 
 def test_nobody_is_taken_once_the_team_is_closed() -> None:
-    members = TeamMembers([RA, RB, RC])
+    members = NetworkMembers([RA, RB, RC])
     join(members, RA, RB)
     members.closed = True
     assert refused(members, RC, PROFILES[RC]) == "the team is complete without it"
 
 
 def test_absurd_profiles_and_contradictions_are_not_taken() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA)
     assert "not a valid name" in refused(members, RB, msgspec.structs.replace(PROFILES[RB], children=("?",)))
     stranger = msgspec.structs.replace(PROFILES[RB], parents=())
@@ -99,7 +99,7 @@ def test_absurd_profiles_and_contradictions_are_not_taken() -> None:
 
 
 def test_who_comes_again_is_not_held_against_its_former_life() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA)
     members.robots[RA].away_since = 1.0
     other = msgspec.structs.replace(PROFILES[RA], children=(), variables={}, kind=ProblemKind.DISWCSP)
@@ -110,7 +110,7 @@ def test_who_comes_again_is_not_held_against_its_former_life() -> None:
 
 
 def test_complete_when_all_who_are_expected_are_there() -> None:
-    members = TeamMembers([RA, RB, RC])
+    members = NetworkMembers([RA, RB, RC])
     assert members.awaited == {RA, RB, RC}
     join(members, RC, RA)
     assert members.awaited == {RB}
@@ -120,7 +120,7 @@ def test_complete_when_all_who_are_expected_are_there() -> None:
 
 
 def test_complete_when_all_neighbours_are_there() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     assert not members.complete
     join(members, RC)
     assert members.awaited == {RA, RB}
@@ -130,7 +130,7 @@ def test_complete_when_all_neighbours_are_there() -> None:
 
 def test_complete_when_so_many_are_there_and_all_their_neighbours() -> None:
     lonely = Profile("RZ", ProblemKind.DISCSP, (), (), {}, {}, 1, 0, ())
-    members = TeamMembers(number=2)
+    members = NetworkMembers(number=2)
     members.register("RZ", lonely, "first").joined = True
     assert not members.awaited
     assert not members.complete
@@ -141,14 +141,14 @@ def test_complete_when_so_many_are_there_and_all_their_neighbours() -> None:
 
 
 def test_complete_when_all_have_read_their_welcome() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA, RB, RC)
     members.robots[RB].joined = False
     assert not members.complete
 
 
 def test_an_open_team_misses_who_is_given_up() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     join(members, RA, RB, RC)
     members.remove([RB])
     assert members.awaited == {RB}
@@ -156,7 +156,7 @@ def test_an_open_team_misses_who_is_given_up() -> None:
 
 
 def test_a_robot_that_has_dropped_out_is_waited_for_by_name_until_it_is_back() -> None:
-    members = TeamMembers(number=4)
+    members = NetworkMembers(number=4)
     join(members, RA, RB)
     members.drop_out(RB)
     assert members.waited_for == [f"{RB} (it was there, and has dropped out)", RC, "1 more robot"]
@@ -176,7 +176,7 @@ def looked_at() -> dict[str, Profile]:
 
 
 def test_variables_that_a_parent_looks_at_are_shown() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     members.register("A", looked_at()["A"], "first")
     assert members.unseen() == {}
     members.register("B", looked_at()["B"], "first")
@@ -189,7 +189,7 @@ def test_variables_that_a_parent_looks_at_are_shown() -> None:
 
 
 def test_who_is_no_child_is_not_asked_to_show_anything() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     members.register("B", looked_at()["B"], "first")
     spy = Profile("S", ProblemKind.DISCSP, (), (), {}, {"B": ("Secret",)}, 1, 0, ())
     assert "refers to variables of B, which is not a child" in refused(members, "S", spy)
@@ -208,7 +208,7 @@ def robot(
 
 
 def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_so_or_not() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     members.register("A", robot("A", children=("B",)), "first")
     members.register("B", robot("B", parents=("A",), shown="Y", wants=("X",)), "first")
     assert members.unseen() == {"A": ("X",)}
@@ -222,7 +222,7 @@ def test_what_a_childs_constraints_look_at_is_asked_for_whether_its_parent_says_
 
 
 def test_two_that_show_one_variable_are_both_named() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     for name in ("A", "C"):
         members.register(name, robot(name, children=("B",)), "first")
     members.register("B", robot("B", parents=("A", "C"), shown="Y", wants=("X",)), "first")
@@ -232,7 +232,7 @@ def test_two_that_show_one_variable_are_both_named() -> None:
 
 
 def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     members.register("A", robot("A", children=("B",)), "first")
     members.register("B", robot("B", parents=("A",), shown="Y", wants=("V9",)), "first")
     assert members.unseen() == {"A": ("V9",)}
@@ -243,11 +243,11 @@ def test_a_constraint_over_what_no_neighbour_has_is_told() -> None:
 
 def test_who_may_only_ask_does_not_take_part() -> None:
     with pytest.raises(RegistrationRefusedError, match="enrolled as an observer"):
-        TeamMembers().register("A", robot("A"), "first", admitted=False)
+        NetworkMembers().register("A", robot("A"), "first", admitted=False)
 
 
 def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     members.register("A", robot("A"), "first")
     with pytest.raises(RegistrationRefusedError, match="registered already"):
         members.register("A", robot("A"), "second")
@@ -256,7 +256,7 @@ def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
 
 
 def test_a_team_is_not_complete_while_one_that_has_come_is_away_or_may_be_another() -> None:
-    members = TeamMembers()
+    members = NetworkMembers()
     member = members.register("A", robot("A"), "first")
     steps: list[tuple[Callable[[], object], bool, dict[str, str]]] = [
         (lambda: member.join("another's", b""), False, {"A": "first"}),
@@ -279,7 +279,7 @@ def test_a_neighbourhood_is_what_sharers_of_constraints_show() -> None:
     any_three = Predicate("any", ("X", "Y", "Z"), PREDEFINED["ne"].body)
     scope = ("A", "B", "C")
     team = team_of(dict.fromkeys((*scope, "D"), (1, 2)), [Constraint("C", any_three, scope, scope)])
-    members = TeamMembers()
+    members = NetworkMembers()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "first")
     values = {"RA": {"A": 1, "Hidden": 7}, "RB": {"B": 2}, "RC": {"C": 1}, "RD": {"D": 2}, "RX": {"A": 9}}
@@ -296,7 +296,7 @@ def test_all_kinds_of_teams_are_taken_in_any_order() -> None:
             chance = Random(seed)
             profiles = list(profiles_of(make(chance)).items())
             chance.shuffle(profiles)
-            members = TeamMembers([name for name, _ in profiles])
+            members = NetworkMembers([name for name, _ in profiles])
             for name, profile in profiles:
                 assert not members.complete
                 members.register(name, profile, "incarnation").joined = True

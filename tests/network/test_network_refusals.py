@@ -10,7 +10,7 @@ from robochoc.communication.control import Counters, WentOn
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import LostFrames
 from robochoc.communication.network.master import HELD_S, Master
-from robochoc.communication.network.members import Member, TeamMembers
+from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.settings import PATIENCE_S
@@ -113,7 +113,7 @@ def test_messages_that_zenoh_may_hold_back_are_not_missing_yet() -> None:
             return super().missing(now, patience_s)
 
     authority = InMemoryAuthority(("A", "B"))
-    master = Master(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:7447", TeamMembers())
+    master = Master(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:7447", NetworkMembers())
     master.state = Recorded(1, ["A", "B"])
     master._detect_end(0)  # noqa: SLF001 - a step of its loop
     master.members.robots["A"] = Member(cast("Profile", None), "incarnation")

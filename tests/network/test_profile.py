@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.network.control_messages import SearchTask
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.profile import (
     LARGEST_WEIGHT,
     LONGEST_NAME,
@@ -65,9 +65,9 @@ TREE = Traits(tree=True)
 random_teams = st.builds(lambda make, seed: make(Random(seed)), st.sampled_from(MAKERS), st.integers(0, 2**32))
 
 
-def registered(team: Team) -> TeamMembers:
+def registered(team: Team) -> NetworkMembers:
     """All of `team`, come in any order, with the variables that others want to see."""
-    members = TeamMembers(team.order)
+    members = NetworkMembers(team.order)
     robots = list(team.robots)
     Random(len(team.name)).shuffle(robots)
     for robot in robots:
@@ -104,7 +104,7 @@ def comparable(part: AgentProblem) -> AgentProblem:
     )
 
 
-def assert_same(team: Team, members: TeamMembers, robots: Sequence[Robot], parameters: RunParameters) -> None:
+def assert_same(team: Team, members: NetworkMembers, robots: Sequence[Robot], parameters: RunParameters) -> None:
     """What robots know by the master's word is what they would know in a process of the whole team."""
     expected = agent_problems(CompiledTeam(team, nothing_of), parameters, tree=True)
     tasks = members.tasks(1, "abt", TREE, parameters)

@@ -22,7 +22,7 @@ from robochoc.communication.network.control_messages import (
     SearchTask,
     ToMaster,
 )
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.quotas import MIB
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.robot_loop import EVENTS_AT_ONCE
@@ -75,7 +75,7 @@ def chain(cost: float = INFINITE) -> Team:
 def tasks(
     team: Team, protocol: type[Protocol], parameters: RunParameters = DEFAULT_PARAMETERS
 ) -> dict[str, SearchTask]:
-    members = TeamMembers()
+    members = NetworkMembers()
     for name, profile in profiles_of(team).items():
         members.register(name, profile, "incarnation")
     return members.tasks(1, protocol.__name__, protocol.traits, parameters)

@@ -20,7 +20,7 @@ from robochoc.communication.network.access import ALL, access_control
 from robochoc.communication.network.framing import LARGEST_FRAME, MASTER, Framing, MessageTooLargeError
 from robochoc.communication.network.inbox import FrameArrived, Item
 from robochoc.communication.network.local import LocalNetwork
-from robochoc.communication.network.members import RegistrationRefusedError, TeamMembers
+from robochoc.communication.network.members import NetworkMembers, RegistrationRefusedError
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS
@@ -218,4 +218,4 @@ def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
         profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.max_cost, ()
     )
     with pytest.raises(RegistrationRefusedError, match=r"'\*' is not a valid name"):
-        TeamMembers().register(profile.name, bad, "incarnation")
+        NetworkMembers().register(profile.name, bad, "incarnation")

@@ -24,7 +24,7 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import FrameArrived, Item
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.search_result import SearchResult
@@ -88,7 +88,7 @@ class InMemoryNetwork:
     ) -> None:
         self.traitor = traitor
         self.inboxes: dict[str, SimpleQueue[Item]] = {name: SimpleQueue() for name in (*team.order, MASTER)}
-        self.members = TeamMembers(team.order)
+        self.members = NetworkMembers(team.order)
         self.state = AuditedSearchState()
         self.objections: list[Objection] = []
         self.failures: dict[str, RobotFailed] = {}

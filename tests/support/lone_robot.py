@@ -17,7 +17,7 @@ from robochoc.communication.network.control_messages import (
     Welcome,
 )
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
@@ -44,7 +44,7 @@ def chain_of_three() -> Team:
 
 
 def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> SearchTask:
-    members = TeamMembers()
+    members = NetworkMembers()
     for robot in chain_of_three().robots:
         members.register(robot.name, profile_of(robot), "incarnation")
     return members.tasks(epoch, protocol.__name__, protocol.traits, DEFAULT_PARAMETERS)["RB"]

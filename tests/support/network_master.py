@@ -11,7 +11,7 @@ import sys
 from robochoc.authority.authority import Authority
 from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.master import Master
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.search_result import Progress
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.paused_abt import CHAIN, PausedABT
@@ -25,7 +25,7 @@ def main(folder: str, endpoint: str, file: str) -> None:
 
     authority = Authority.open(folder)
     identity = authority.master_identity([LOOPBACK])
-    with Master(authority, identity, endpoint, TeamMembers(CHAIN.order), progress=progress) as master:
+    with Master(authority, identity, endpoint, NetworkMembers(CHAIN.order), progress=progress) as master:
         master.gather()
         result = master.search("held", PausedABT.traits, RunParameters(settings={"file": file}))
         sys.stdout.write(f"{result.verdict}\n")

@@ -19,7 +19,7 @@ from robochoc.communication.network.framing import Framing
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.local import LOOPBACK
 from robochoc.communication.network.master import Master
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.settings import NetworkSettings
@@ -88,7 +88,7 @@ class NetworkRun:
     def __enter__(self) -> Self:
         endpoint = free_endpoint()
         identity = self.household.master_identity((LOOPBACK,))
-        members = TeamMembers(self.team.order)
+        members = NetworkMembers(self.team.order)
         master = Master(
             self.household, identity, endpoint, members, self.settings, observer=self.events.append, watched=True
         )

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import CheckRequest, CheckResult, Recall, ToRobot
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.search_result import SearchResult
 from robochoc.protocols.findings import Incumbent
 from robochoc.protocols.message import Value
@@ -34,7 +34,9 @@ class CheckedSnapshots:
         checks: The robots' checks of it, by name.
     """
 
-    def __init__(self, state: AuditedSearchState, members: TeamMembers, send: Callable[[str, ToRobot], None]) -> None:
+    def __init__(
+        self, state: AuditedSearchState, members: NetworkMembers, send: Callable[[str, ToRobot], None]
+    ) -> None:
         self.number = 0
         self.checks: Mapping[str, CheckResult] = {}
         self._state = state

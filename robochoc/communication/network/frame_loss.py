@@ -12,7 +12,7 @@ from typing import Protocol
 
 from robochoc.communication.network.control_messages import LostFrames
 from robochoc.communication.network.inbox import FramesLost
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 
 TO_MASTER = "a frame to the master"
 
@@ -24,7 +24,7 @@ class _Lose(Protocol):
 class LossTracker:
     """Lost frames in a run of `members`. `refuse` reports each (who, what, why); `lose` removes a robot."""
 
-    def __init__(self, members: TeamMembers, refuse: Callable[[str, str, str], None], lose: _Lose) -> None:
+    def __init__(self, members: NetworkMembers, refuse: Callable[[str, str, str], None], lose: _Lose) -> None:
         self._members = members
         self._refuse = refuse
         self._lose = lose

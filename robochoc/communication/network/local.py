@@ -25,7 +25,7 @@ from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.main_guard import require_main_guard
 from robochoc.communication.network import fork_server
 from robochoc.communication.network.master import Master
-from robochoc.communication.network.members import TeamMembers, reach
+from robochoc.communication.network.members import NetworkMembers, reach
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot_process import START_S, NetworkRobotStart, network_robot_process
 from robochoc.communication.network.router import RouterError
@@ -103,7 +103,7 @@ class LocalNetwork(Session):
             self._authority,
             self._authority.master_identity((LOOPBACK,)),
             endpoint,
-            TeamMembers(team.order, order=team.order, ways=ways),
+            NetworkMembers(team.order, order=team.order, ways=ways),
             self._settings,
             observer=observer,
             watched=observer is not None,

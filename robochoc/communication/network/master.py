@@ -49,7 +49,7 @@ from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item,
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
-from robochoc.communication.network.members import Member, RegistrationRefusedError, TeamMembers
+from robochoc.communication.network.members import Member, NetworkMembers, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.search_result import Progress, RobotsLostError, SearchResult
@@ -75,7 +75,7 @@ class Registrar:
 
     def __init__(
         self,
-        members: TeamMembers,
+        members: NetworkMembers,
         connection: MasterConnection,
         facilitator: DirectoryFacilitator,
         events: MasterEvents,
@@ -150,7 +150,7 @@ class Master(MasterLoop):
         admission: Admission,
         identity: Identity,
         endpoint: str,
-        members: TeamMembers,
+        members: NetworkMembers,
         settings: NetworkSettings = NetworkSettings(),
         *,
         observer: Observer | None = None,

@@ -28,7 +28,7 @@ from robochoc.system.errors import RobochocError
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-    """Return the receivers of each robot of a team besides the master. See `TeamMembers.reach`."""
+    """Return the receivers of each robot of a team besides the master. See `NetworkMembers.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
     met = possible_neighbours(profiles)
@@ -85,7 +85,7 @@ class Member:
         return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
-class TeamMembers:
+class NetworkMembers:
     """All registered robots, by name.
 
     `expected` are the only allowed robots (None: all that the Authority admits), `number` is the size of the team.

@@ -228,7 +228,7 @@ class Machines(Deployment):
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
             withdrawn = without if phase.withdrawal and result.verdict == Verdict.SOLUTION else ()
-            why = "every robot knows its own values, and nobody else's (--private)"
+            why = "each robot knows only its own values (--private)"
             return Answer(Verdict.UNKNOWN, withdrawn=withdrawn, reason=why)
         self._values = self._reported(result.assignments)
         held, cost = self._master.checked(self._values)

@@ -17,7 +17,7 @@ from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master import Master
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.search_result import Progress, RobotsLostError
@@ -162,7 +162,7 @@ def run_master(
     conditions = replace(
         plan.conditions, protocol="" if plan.protocol in {None, AUTO} else plan.protocol, listen=str(plan.place)
     )
-    members = TeamMembers(plan.names, plan.number)
+    members = NetworkMembers(plan.names, plan.number)
     master = Master(
         authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
     )

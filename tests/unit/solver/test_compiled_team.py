@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.network.members import TeamMembers
+from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.profile import profile_of, ranges_of, restrict_to_team
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
@@ -147,9 +147,9 @@ def test_what_is_heard_in_words_that_cannot_be_is_passed_over() -> None:
 # Machines
 
 
-def all_shown(team: Team) -> TeamMembers:
+def all_shown(team: Team) -> NetworkMembers:
     """All of `team`, registered, and asked for what they had not shown."""
-    members = TeamMembers(team.order)
+    members = NetworkMembers(team.order)
     for robot in team.robots:
         members.register(robot.name, profile_of(robot), "visit")
     for name, variables in members.unseen().items():
@@ -189,7 +189,7 @@ def test_who_is_left_shows_what_it_showed_and_keeps_its_place() -> None:
 def test_an_order_does_not_change_when_somebody_is_lost() -> None:
     """Without Z, the parent of A, natural order would have A before B."""
     robots = (Robot("B", ()), Robot("Z", (), children=(Child("A"),)), Robot("A", (), parents=(Parent("Z"),)))
-    members = TeamMembers(["A", "B", "Z"])
+    members = NetworkMembers(["A", "B", "Z"])
     for robot in robots:
         members.register(robot.name, profile_of(robot), "visit")
     members.closed = True
