@@ -174,7 +174,7 @@ ORDERS = MappingProxyType(
 """The orders that suit the protocols. Other protocols build trees, or use no order."""
 
 ORDERS_TEXT = (
-    "order, unless --order names one: max-degree for abt, afc-ng and afb; min-width for sfb (with costs max-degree, with",
+    "order, if not given: max-degree for abt, afc-ng and afb; min-width for sfb (with costs max-degree, with",
     "--withdraw dom-deg). The order of the files is kept for other protocols, and if constraints are partially known,",
     "the problem changes, or --withdraw maximal decides by priority",
 )
