@@ -164,13 +164,13 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
     """
     others = [*others]
     cells = _cells(crafts)
-    held = [*cells, *(other.cell for other in others if other.cell)]
+    included = [*cells, *(other.cell for other in others if other.cell)]
     if ground is not None:
         cells = _standing(crafts, cells, ground)
-        held += [*cells, ground.first, ground.x_and_y(ground.columns, ground.rows)]
+        included += [*cells, ground.first, ground.x_and_y(ground.columns, ground.rows)]
     volume = ground.volume if ground else None
     heights = [volume.z(1), volume.z(volume.levels)] if volume else []
-    axes = _axes(crafts, others, held, max(ground.columns, ground.rows) if ground else 0, heights)
+    axes = _axes(crafts, others, included, max(ground.columns, ground.rows) if ground else 0, heights)
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []

@@ -45,8 +45,8 @@ def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
     if cosine > _NEARLY_ONE:
         turned = start + between[:, None] * (end - start)
         return np.asarray(turned / _lengths(turned)[:, None])
-    whole = np.arccos(cosine)
-    parts = np.sin(np.outer(whole, np.stack([1 - between, between]))) / np.sin(whole)
+    total = np.arccos(cosine)
+    parts = np.sin(np.outer(total, np.stack([1 - between, between]))) / np.sin(total)
     first, last = parts.reshape(2, -1, 1)
     return np.asarray(first * start + last * end)
 

@@ -40,8 +40,8 @@ def quadrotor() -> TriangleMesh:
     parts = [_body(), _bar((-_REACH, -_REACH), (_REACH, _REACH)), _bar((-_REACH, _REACH), (_REACH, -_REACH))]
     parts += [_rotor(x, y) for x, y in corners]
     parts += [_skid(side) for side in (-0.11, 0.11)]
-    whole = joined_shapes(parts)
-    return whole._replace(vertices=whole.vertices - np.array(HUB))
+    joined = joined_shapes(parts)
+    return joined._replace(vertices=joined.vertices - np.array(HUB))
 
 
 def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float, float, float]) -> TriangleMesh:
@@ -132,8 +132,8 @@ def _rotor(x: float, y: float) -> TriangleMesh:
     guard = _painted(ring, _band(sides), _ROTOR)
     blade = np.array([[-0.13, -0.012, height], [0.13, -0.03, height], [0.13, 0.012, height], [-0.13, 0.03, height]])
     blades = _painted(blade, np.array([[0, 1, 2], [0, 2, 3]]), _DARK)
-    whole = joined_shapes([guard, blades])
-    return whole._replace(vertices=whole.vertices + np.array([x, y, 0]))
+    joined = joined_shapes([guard, blades])
+    return joined._replace(vertices=joined.vertices + np.array([x, y, 0]))
 
 
 def _skid(side: float) -> TriangleMesh:

@@ -121,13 +121,13 @@ def playback_json(scene: Scene) -> str:
     Times are in seconds. `corners` and `cell` are in meshcat's frame as `drawing` scales it. Names may come from
     foreign files: they are escaped so that they cannot end the script element.
     """
-    whole = {
+    data = {
         "corners": [[round(part, 5) for part in corner] for corner in corners(scene)],
         "cell": round(cell_of(scene), 5),
         "drones": [*_drone_data(scene)],
         **(_playback_data(scene.playback) if scene.playback else {"duration": 0, "chapters": [], "marks": []}),
     }
-    return json.dumps(whole, separators=(",", ":")).replace("<", "\\u003c")
+    return json.dumps(data, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _drone_data(scene: Scene) -> Iterator[dict[str, Any]]:

@@ -119,8 +119,8 @@ class Controller:
         # The direction's change, turned by a right angle: the angular velocity, in the world's frame.
         self._up[:3] = up
         self._up[3:] = up[:2]
-        wanted = self._up[1:4] * turn[2:] - self._up[2:] * turn[1:4]
-        rates = bodies.rates - (bodies.axes * wanted).sum(1)
+        desired_rates = self._up[1:4] * turn[2:] - self._up[2:] * turn[1:4]
+        rates = bodies.rates - (bodies.axes * desired_rates).sum(1)
         return np.asarray(-_ATTITUDE * attitude - _RATES * rates)
 
 

@@ -151,10 +151,10 @@ class RigidBodies:
             self.fallen |= hit & (
                 (self.state[5] < -IMPACT_MAX_M_S) | (self._axes[2, 2] < TILT_MAX_COSINE) | ~self.motors_running.all(0)
             )
-        held = low & self.stands
+        standing = low & self.stands
         if before is not None and axes_before is not None:
-            np.copyto(self.state[:2], before, where=held)
-            np.copyto(self._axes, axes_before, where=held)
+            np.copyto(self.state[:2], before, where=standing)
+            np.copyto(self._axes, axes_before, where=standing)
         np.copyto(self.state[2], self.grounds, where=low)
         np.copyto(self.state[3:], 0.0, where=low)
         np.copyto(self.rates, 0.0, where=low)

@@ -128,8 +128,8 @@ class QuadrotorSimulation:
         idle = low & bodies.stands & ~moving
         low &= ~idle
         idle |= self._off
-        wanted = self._adjusted_setpoints(low, moving, late=late) if low.any() else self.setpoints
-        bodies.step(self._controller.command(bodies, wanted, idle), self._wind.air())
+        setpoints = self._adjusted_setpoints(low, moving, late=late) if low.any() else self.setpoints
+        bodies.step(self._controller.command(bodies, setpoints, idle), self._wind.air())
         self._steps += 1
         if not bool(np.abs(bodies.state).max() < _BOUNDS):  # true of nan as well
             self._ground_invalid()
@@ -161,9 +161,9 @@ class QuadrotorSimulation:
         """Return the setpoints, with those of the `low` drones moved above the ground, or below it for landing."""
         off = np.square(self.setpoints[:2] - self._bodies.state[:2]).sum(0)
         lands = low & ~moving & (late | (off < _ABOVE_M**2))
-        wanted = self.setpoints.copy()
-        wanted[2] += self.hop_m * (low & moving) - _PRESS_M * lands
-        return wanted
+        setpoints = self.setpoints.copy()
+        setpoints[2] += self.hop_m * (low & moving) - _PRESS_M * lands
+        return setpoints
 
     def _fail(self, failure: MotorFailure) -> None:
         drone = self._names.index(failure.drone)

@@ -73,22 +73,22 @@ class Trajectory:
         rate = 1 - share * share * (3 - 2 * share)
         motion = self.plan.at(self._s)
         if self._everybody:
-            wanted = self._setpoints
-            self._fill(wanted, motion.position, rate * motion.velocity, rate * rate * motion.acceleration)
+            setpoints = self._setpoints
+            self._fill(setpoints, motion.position, rate * motion.velocity, rate * rate * motion.acceleration)
         else:
-            wanted = np.empty((9, len(self.who)))
-            self._fill(wanted, motion.position, rate * motion.velocity, rate * rate * motion.acceleration)
+            setpoints = np.empty((9, len(self.who)))
+            self._fill(setpoints, motion.position, rate * motion.velocity, rate * rate * motion.acceleration)
         if self.stopping:
-            wanted[6:] -= motion.velocity.T * (6 * share * (1 - share) / STOP_S)
+            setpoints[6:] -= motion.velocity.T * (6 * share * (1 - share) / STOP_S)
         if not self._everybody:
-            self._setpoints[:, self.who] = wanted
+            self._setpoints[:, self.who] = setpoints
         return self._setpoints
 
     @staticmethod
-    def _fill(wanted: Array, position: Array, velocity: Array, acceleration: Array) -> None:
-        wanted[:3] = position.T
-        wanted[3:6] = velocity.T
-        wanted[6:] = acceleration.T
+    def _fill(setpoints: Array, position: Array, velocity: Array, acceleration: Array) -> None:
+        setpoints[:3] = position.T
+        setpoints[3:6] = velocity.T
+        setpoints[6:] = acceleration.T
 
 
 class ObstacleEncounter(NamedTuple):

@@ -32,8 +32,8 @@ def parts_per_pixel(radius: float, pixels: int) -> int:
     It is odd: then the centres of pixels are points of the lattice.
     """
     # Rounding must not decide: the same radius in metres and in other units has to give the same lattice.
-    wanted = min(_FINE / max(radius, _ROUNDING) - _ROUNDING, _PARTS_MAX)
-    parts = 2 * math.ceil((max(wanted, 1) - 1) / 2) + 1
+    parts_wished = min(_FINE / max(radius, _ROUNDING) - _ROUNDING, _PARTS_MAX)
+    parts = 2 * math.ceil((max(parts_wished, 1) - 1) / 2) + 1
     while parts > 1 and pixels * parts * parts > POINTS_MAX:
         parts -= 2
     return parts

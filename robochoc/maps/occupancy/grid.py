@@ -149,8 +149,8 @@ class _Description:
         """Return which pixels are free, and which are occupied; rows from the lowest y on, unlike in the image."""
         # Thresholds are compared in Python's integers: equality is exact on every machine, and no number of decimal
         # places overflows.
-        shares, whole = self._shares(image.white)
-        free_below, occupied_above = self._free * whole, self._occupied * whole
+        shares, full = self._shares(image.white)
+        free_below, occupied_above = self._free * full, self._occupied * full
         free = np.array([share is not None and share < free_below for share in shares])[image.pixels]
         occupied = np.array([share is not None and share > occupied_above for share in shares])[image.pixels]
         if image.opaque is not None and self.mode == "scale":  # transparent pixels are unknown
