@@ -1,4 +1,4 @@
-"""An outcome in one line: the title of its page, and the first line on the terminal."""
+"""Describe an outcome in one line: the title of its page, and the first line on the terminal."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from robochoc.model.outcome import Outcome, Verdict
 def describe_outcome(
     outcome: Outcome, total: int, *, flying: int | None = None, noun: str = "robot", weighted: bool | None = None
 ) -> str:
-    """Return what happened, in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
+    """Return the outcome in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
 
     Args:
-        outcome: How the run ended.
-        total: The number of robots that took part. If the outcome has epochs, those of the last epoch are counted.
-        flying: How many of `total` have a place, where drones are counted and a robot decides about several.
-        noun: What is counted, in the singular.
-        weighted: Whether robots differ in weight; None if that is not known. A maximum is then one of weight, not of
-            number, or simply the best.
+        outcome: The outcome of the run.
+        total: The number of robots in the run. If the outcome has epochs, the robots of the last epoch are counted.
+        flying: The number of `total` that have a place, if drones are counted and a robot decides about several.
+        noun: The noun for the counted robots or drones, in the singular.
+        weighted: Whether robots differ in weight, so that a maximum is one of weight instead of number. None: unknown,
+            and the words are "the best".
     """
     if flying is None:
         if outcome.epochs and outcome.epochs[-1].robots:

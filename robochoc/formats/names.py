@@ -15,7 +15,7 @@ BEYOND = 10**18
 MAX_NAME = 251
 """The maximum length of a robot's name: with `.xml` it is a file name, and file systems allow no longer ones."""
 _WRITABLE = 2000
-"""Python converts integers of up to so many bits to text, whatever its limit is."""
+"""Python can always convert integers of up to 2000 bits to text; longer ones may exceed its limit."""
 RESERVED = "scenario"
 """A name that no robot can have: `scenario.xml` contains the changes of a team."""
 

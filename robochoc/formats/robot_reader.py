@@ -74,7 +74,7 @@ class RobotFile(TeamMember):
         return replace(self, robot=with_table(self.robot, names)) if names else self
 
     def in_places(self, places: int) -> RobotFile:
-        """Return the file with costs in the unit of so many decimal places, at least as many as now.
+        """Return the file with costs in the unit of `places` decimal places, at least as many as now.
 
         Raises:
             InvalidInputError: if a cost then has too many digits.

@@ -73,9 +73,9 @@ def limited(constraints: Iterable[Constraint]) -> list[Constraint]:
     Raises:
         ValueError: if there are more than `MAX_CONSTRAINTS`.
     """
-    kept: list[Constraint] = []
+    found: list[Constraint] = []
     for constraint in constraints:
-        if len(kept) == MAX_CONSTRAINTS:
+        if len(found) == MAX_CONSTRAINTS:
             raise ValueError(f"the team would have more than {MAX_CONSTRAINTS:,} constraints; use smaller numbers")
-        kept.append(constraint)
-    return kept
+        found.append(constraint)
+    return found

@@ -55,7 +55,7 @@ def read_graph(path: Path) -> Graph:
         graph = getattr(nx, reader)(BytesIO(content), **options)
         nodes, edges = list(graph.nodes), [(one, other) for one, other, *_ in graph.edges]
     except Exception as error:  # noqa: BLE001 - networkx raises what its parsers raise
-        raise _invalid(path, "networkx cannot read it", f"it says: {error}") from None
+        raise _invalid(path, "networkx cannot read it", f"correct the file: {error}") from None
     numbered = _numbered(nodes)
     if not 1 <= len(nodes) <= MAX_NODES:
         raise _invalid(path, f"the graph has {len(nodes)} nodes", f"it must have from 1 to {MAX_NODES}")

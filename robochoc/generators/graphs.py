@@ -109,7 +109,7 @@ def small_world(agents: int, neighbours: int = 4, rewiring: float = 0.1, *, conn
         connected: Whether graphs are drawn until one is connected.
 
     Raises:
-        ValueError: if `neighbours` is odd, or there are not so many others.
+        ValueError: if `neighbours` is odd, or more than the number of other nodes.
     """
     check_bounds({"agents": (agents, 3, MAX_NODES), "neighbours": (neighbours, 2, agents - 1)})
     check_bounds({"rewiring": (rewiring, 0, 1), "constraints": (agents * neighbours // 2, 1, MAX_EDGES)})

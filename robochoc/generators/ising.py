@@ -30,13 +30,13 @@ def ising(
     Args:
         rows: The number of rows.
         columns: The number of columns.
-        seed: The same seed makes the same problem on every machine.
+        seed: The same seed gives the same problem on every machine.
         coupling: The strength of couplings, beta.
         field: The strength of fields, rho.
         places: The decimal places of both.
 
     Raises:
-        ValueError: if a number is out of its bounds. The text says which.
+        ValueError: if a number is out of its bounds.
     """
     check_bounds({"rows": (rows, 2, MAX_NODES), "columns": (columns, 2, MAX_NODES)})
     check_bounds({"rows x columns": (rows * columns, 4, MAX_NODES)})

@@ -168,12 +168,12 @@ def drawn_meetings(chance: Random, sizes: tuple[int, int, int, int], max_length:
     """Return random meetings; `sizes` are the numbers of persons, meetings, participants and slots."""
     agents, count, participants, slots = sizes
     free = {person: [random_integer(chance, 0, max_value) for _ in range(slots)] for person in range(1, agents + 1)}
-    held = []
+    found = []
     for number in range(1, count + 1):
         length = random_integer(chance, 1, max_length)
         persons = [place + 1 for place in sample(chance, agents, participants)]
-        held.append(Meeting(number, {person: random_integer(chance, 1, max_value) for person in persons}, length))
-    return Meetings(slots, free, held)
+        found.append(Meeting(number, {person: random_integer(chance, 1, max_value) for person in persons}, length))
+    return Meetings(slots, free, found)
 
 
 _Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
@@ -234,25 +234,25 @@ def _tsav(problem: Meetings, *, preferences: bool) -> _Parts:
         f"Robot{person}": [
             Variable(
                 f"V{person}.{slot}",
-                Domain(f"Slot{person}.{slot}", (range(1), *(_there(problem, one, parts, slot) for one in held))),
+                Domain(f"Slot{person}.{slot}", (range(1), *(_there(problem, one, parts, slot) for one in own))),
             )
             for slot in slots
         ]
-        for person, held in attended.items()
+        for person, own in attended.items()
     }
 
     def constraints() -> Iterator[Constraint]:
-        for person, held in attended.items():
+        for person, own in attended.items():
             names = [f"V{person}.{slot}" for slot in slots]
             for pair in itertools.combinations(names, 2):
                 yield Constraint("once", ONCE, pair, pair)
-            for one, pair in itertools.product(held, itertools.pairwise(names)):
+            for one, pair in itertools.product(own, itertools.pairwise(names)):
                 if one.length > 1:
                     yield Constraint("next", IN_A_ROW, pair, (*pair, parts[one.number][0], parts[one.number][-1]))
             if preferences:
-                yield from _worth_of_slots(problem, person, held, parts)
+                yield from _worth_of_slots(problem, person, own, parts)
             else:
-                yield from (_takes_place(person, one, parts[one.number][0], problem.slots) for one in held)
+                yield from (_takes_place(person, one, parts[one.number][0], problem.slots) for one in own)
         for meeting, slot in itertools.product(problem.meetings, slots):
             numbers = parts[meeting.number]
             for persons in itertools.combinations(meeting.worth, 2):

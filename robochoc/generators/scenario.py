@@ -174,13 +174,13 @@ class _ScenarioBuilder:
         return AddValue(variable.name, self._one(new)) if new else None
 
     def _remove_constraint(self) -> Change | None:
-        held = [
+        shared = [
             (robot.name, parent.name, one.name)
             for robot in self._team.robots
             for parent in robot.parents
             for one in parent.constraints
         ]
-        return RemoveConstraint(*self._one(held)) if held else None
+        return RemoveConstraint(*self._one(shared)) if shared else None
 
     def _add_constraint(self) -> Change | None:
         there = self._team.owner

@@ -75,7 +75,7 @@ def tracking(
     requirement: int = 100,
     credibility: int = 30,
 ) -> Team:
-    """Return the problem of tracking `targets` in a field of side x side cells that `seed` stands for.
+    """Return the random problem of `seed` of tracking `targets` in a field of side x side cells.
 
     `Robot3` owns `V3`. All robots start in different cells, and all targets are in different cells.
 

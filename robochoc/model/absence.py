@@ -128,13 +128,13 @@ def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | No
         terms = [formals[name] for name in left.parameters] if left else []
     else:
         body = without_terms(_with_constants(definition.body, formals), lost)
-        kept = names(body) if body else ()
-        symbolic = tuple(name for name in definition.symbolic if name in kept)
+        remaining = names(body) if body else ()
+        symbolic = tuple(name for name in definition.symbolic if name in remaining)
         if body is None:
             return None
         name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # one definition can have several remainders
-        left = replace(definition, name=name, parameters=kept, body=body, symbolic=symbolic)
-        terms = [formals[name] for name in kept]
+        left = replace(definition, name=name, parameters=remaining, body=body, symbolic=symbolic)
+        terms = [formals[name] for name in remaining]
     if left is None:
         return None
     scope = tuple(term for term in constraint.scope if term in terms)
@@ -165,10 +165,10 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
             left = [_term(one, lost) for one in _flat(expression)]
         else:
             raise NotAnAggregateError
-        kept = [one for one in left if one is not None]
-        if not any(names(one) for one in kept):
+        others = [one for one in left if one is not None]
+        if not any(names(one) for one in others):
             return None
-        return kept[0] if len(kept) == 1 else Apply(expression.operator, tuple(kept))
+        return others[0] if len(others) == 1 else Apply(expression.operator, tuple(others))
     if expression.operator not in _COMPARING:
         raise NotAnAggregateError
     (term,) = terms
@@ -362,8 +362,8 @@ def _without_groups(form: str, lost: Collection[str]) -> str:
 def _conjunction(body: Expression, lost: Collection[str]) -> Expression | None:
     """Return the conjuncts of `body` that mention none of `lost`."""
     parts = body.arguments if isinstance(body, Apply) and body.operator == "and" else (body,)
-    kept = tuple(one for one in parts if not any(name in lost for name in names(one)))
-    return Apply("and", kept) if len(kept) > 1 else kept[0] if kept else None
+    remaining = tuple(one for one in parts if not any(name in lost for name in names(one)))
+    return Apply("and", remaining) if len(remaining) > 1 else remaining[0] if remaining else None
 
 
 def _cumulative(body: Expression, lost: Collection[str], tasks: Sequence[bool]) -> Expression | None:
@@ -373,13 +373,13 @@ def _cumulative(body: Expression, lost: Collection[str], tasks: Sequence[bool]) 
     if not isinstance(body, Apply) or body.operator != "and":
         raise NotAnAggregateError
     conditions, peaks = body.arguments[: -len(tasks)], body.arguments[-len(tasks) :]
-    kept = [one for one in conditions if not any(name in lost for name in names(one))]
+    remaining = [one for one in conditions if not any(name in lost for name in names(one))]
     for is_lost, peak in zip(tasks, peaks, strict=True):
         if not is_lost:
             load, limit = peak.arguments if isinstance(peak, Apply) else ()
             loads = load.arguments if isinstance(load, Apply) and load.operator == "add" else (load,)
             others = tuple(one for one in loads if not any(name in lost for name in names(one)))
-            kept.append(Apply("le", (Apply("add", others) if len(others) > 1 else others[0], limit)))
-    if any(name in lost for one in kept for name in names(one)):
+            remaining.append(Apply("le", (Apply("add", others) if len(others) > 1 else others[0], limit)))
+    if any(name in lost for one in remaining for name in names(one)):
         raise NotAnAggregateError
-    return Apply("and", tuple(kept)) if len(kept) > 1 else kept[0]
+    return Apply("and", tuple(remaining)) if len(remaining) > 1 else remaining[0]

@@ -38,7 +38,7 @@ from robochoc.model.team_edits import (
     replace_robot,
     robot_named,
     shortened,
-    with_constraint_held,
+    with_shared_constraint,
     without_robots,
 )
 
@@ -202,7 +202,7 @@ def _check_parents(team: Team, robot: Robot, constraint: Constraint) -> None:
 
 def _with_constraint(team: Team, agent: str, parent: str, constraint: Constraint) -> Team:
     check_holder(team, agent, parent, constraint)
-    return with_constraint_held(team, constraint)
+    return with_shared_constraint(team, constraint)
 
 
 def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:

@@ -273,11 +273,11 @@ class _Reordering:
     def _robot(self, name: str) -> Robot:
         old = self._old[name]
         under: dict[str, list[Constraint]] = defaultdict(list)
-        stay = set(map(id, old.shared))
+        unmoved = set(map(id, old.shared))
         for constraint in self._held[name]:
             others = _owners(self._old, constraint) - {name}
-            held = constraint if id(constraint) in stay else replace(constraint, line=0)
-            under[max(others, key=self._seen.__getitem__)].append(held)
+            moved = constraint if id(constraint) in unmoved else replace(constraint, line=0)
+            under[max(others, key=self._seen.__getitem__)].append(moved)
         parents = {parent.name: parent for parent in old.parents}
         children = {child.name: child for child in old.children}
         return replace(
@@ -300,9 +300,9 @@ class _Reordering:
         """Return `child` with the variables of `robot` that it must know now."""
         needs_now = self._needed[child.name].get(robot.name, set())
         needed_before = self._needed_before[child.name].get(robot.name, set())
-        kept = [name for name in child.variables if name in needs_now or name not in needed_before]
+        remaining = [name for name in child.variables if name in needs_now or name not in needed_before]
         own = [variable.name for variable in robot.variables if variable.name in needs_now]
-        return replace(child, variables=tuple(dict.fromkeys([*kept, *own])))
+        return replace(child, variables=tuple(dict.fromkeys([*remaining, *own])))
 
 
 def _child(parent: Robot, name: str) -> Child:
@@ -313,10 +313,10 @@ def _owners(team: Team, constraint: Constraint) -> set[str]:
     return {team.owner[variable] for variable in constraint.variables}
 
 
-def _needed(team: Team, name: str, held: Sequence[Constraint]) -> dict[str, set[str]]:
-    """Return, for each other robot, its variables in the constraints that `name` holds."""
+def _needed(team: Team, name: str, constraints: Sequence[Constraint]) -> dict[str, set[str]]:
+    """Return, for each other robot, its variables in `constraints`, which the robot `name` holds."""
     needed: dict[str, set[str]] = defaultdict(set)
-    for constraint in held:
+    for constraint in constraints:
         for variable in constraint.variables:
             if team.owner[variable] != name:
                 needed[team.owner[variable]].add(variable)

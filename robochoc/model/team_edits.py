@@ -62,7 +62,7 @@ def without_robots(team: Team, names: Iterable[str], *, with_files: bool = False
     left = replace(team, robots=tuple(robots), dropped=(*team.dropped, *absence.dropped))
     if left.robots:
         for constraint in absence.restated:
-            left = with_constraint_held(left, constraint)
+            left = with_shared_constraint(left, constraint)
     return keep_needed_interfaces(left)
 
 
@@ -128,11 +128,11 @@ def dropped_constraints(team: Team, absent: Collection[str]) -> tuple[DroppedCon
     return (*before, *Absence(team, absent).dropped)
 
 
-def with_constraint_held(team: Team, constraint: Constraint) -> Team:
-    """Return `team` with `constraint`: held by the lowest robot of its scope, or private where it has one robot.
+def with_shared_constraint(team: Team, constraint: Constraint) -> Team:
+    """Return `team` with `constraint` added to the lowest robot of its scope; private if the scope has one robot.
 
-    Robots of the scope that are not linked with the lowest one are linked. A constraint without robots becomes private
-    to the first robot of the team.
+    All robots of the scope are linked with the lowest one. A constraint without robots becomes private to the first
+    robot of the team.
     """
     owners = [name for name in team.order if name in {team.owner[name] for name in constraint.variables}]
     if len(owners) <= 1:
@@ -142,8 +142,8 @@ def with_constraint_held(team: Team, constraint: Constraint) -> Team:
         return replace_robot(team, replace(robot, private=(*robot.private, replace(constraint, model=None))))
     *_, parent, agent = owners
     for owner in owners[:-1]:
-        theirs = tuple(name for name in constraint.variables if team.owner[name] == owner)
-        team = link(team, agent, owner, theirs)
+        shown = tuple(name for name in constraint.variables if team.owner[name] == owner)
+        team = link(team, agent, owner, shown)
     holder = team[agent]
     parents = (
         replace(one, constraints=(*one.constraints, constraint)) if one.name == parent else one

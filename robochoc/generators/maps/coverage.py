@@ -63,7 +63,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
     reachability = reachability_of(choice, seeded(seed))
     for number, own in enumerate(reachability.seconds, 1):
         if not own:
-            raise ValueError(f"robot {number} can get to no cell; take smaller cells, or allow more time")
+            raise ValueError(f"robot {number} can get to no cell; use smaller cells, or allow more time")
     seen = lines_of_sight(reachability.cells).visible_cells(range_m)
     a_cell = worth_of_a_cell(reachability, seconds)
     most = [max(len(seen[cell]) for cell in own) for own in reachability.seconds]
@@ -105,7 +105,7 @@ def _overlaps(values: Sequence[Mapping[int, int]], seen: Seen, a_cell: int) -> I
         if left < 0:
             raise ValueError(
                 f"the robots could see the same from more than {MAX_TUPLES:,} pairs of cells;"
-                " take larger cells, fewer robots, or less of sensing or within"
+                " use larger cells, fewer robots, or less sensing or within"
             )
         if twice and a_cell:
             costs = tuple(a_cell * count for count in twice.values())

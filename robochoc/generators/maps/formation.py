@@ -1,4 +1,4 @@
-"""Formations on a map: robots take the slots of a shape, and the sum of their ways is as small as it can be.
+"""Formations on a map: robots are assigned to the slots of a shape, with the minimum sum of travel times.
 
 The shapes are those of Balch and Arkin, "Behavior-based formation control for multirobot teams", IEEE Transactions on
 Robotics and Automation 14 (1998): line, column and wedge; also a circle and a square grid, or a file of offsets. The
@@ -130,7 +130,7 @@ def slots_of(reachability: Reachability, offsets: Sequence[Offset], anchor: Plac
     """
     left = set(reachability.reached)
     if len(left) < len(offsets):
-        raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; take smaller cells")
+        raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; use smaller cells")
     slots = []
     for x, y in _turned(offsets, heading):
         slots.append(reachability.nearest((anchor[0] + x, anchor[1] + y, *anchor[2:]), left))

@@ -97,7 +97,7 @@ def patrol(
         raise ValueError(f"{count} points in {rounds} rounds have more than {MAX_PLANS:,} plans; use fewer of them")
     if count > len(reachability.reached):
         raise ValueError(
-            f"robots can get to {len(reachability.reached)} cells, fewer than {count} points; take smaller cells"
+            f"robots can get to {len(reachability.reached)} cells, fewer than {count} points; use smaller cells"
         )
     chosen = _nearest(reachability, given) if given else drawn_points(reachability, count, chance)
     idleness = {point: random_integer(chance, 0, idle) * 10**PLACES for point in chosen}

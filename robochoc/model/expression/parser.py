@@ -33,7 +33,7 @@ class SymbolNames:
     """The symbols that an expression may contain.
 
     Attributes:
-        names: The names of the expression that stand for symbols.
+        names: The names of the expression that are symbols.
         code: Returns the code of a symbol by its name. Raises `ValueError` with the reason for an invalid symbol.
     """
 
@@ -51,7 +51,7 @@ def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames 
         text: The text.
         names: The names that may occur in it.
         wanted: The type of its value.
-        symbols: Which of `names` stand for symbols, if any; then other words, and words in quotes (`'red'`), are names
+        symbols: The `names` that are symbols, if any; then other words, and words in quotes (`'red'`), are names
             of symbols. Only eq, ne and in compare symbols.
 
     Raises:

@@ -153,7 +153,7 @@ def test_epochs_tell_their_own_costs() -> None:
 
 def test_a_value_that_nobody_named_is_refused_where_costs_are_functions() -> None:
     events = iter([ScenarioEvent((AddValue("y", 9),))])
-    with pytest.raises(UnsupportedError, match="the value 9 is new to y"):
+    with pytest.raises(UnsupportedError, match="the value 9 of y is new"):
         solve(tutored(), in_simulator("adopt"), environment=lambda *_: next(events, None))
 
 
