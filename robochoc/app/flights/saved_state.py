@@ -28,19 +28,6 @@ from robochoc.app.sketch.open_from_disk import DAMAGED, bounded_archive
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import FILES
 
-_OTHERS = re.compile(r"[^A-Za-z0-9_-]+")
-_LONGEST = 60
-_USUAL = "team"
-_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com[0-9]|lpt[0-9])")
-"""Names of devices on Windows."""
-
-
-def file_name(name: str, ending: str = "") -> str:
-    """Return a file name for `name` with ASCII letters, digits, `_` and `-` only, followed by `ending`."""
-    plain = _OTHERS.sub("-", name).strip("-")[:_LONGEST].strip("-")
-    return f"{_USUAL if not plain or _RESERVED.fullmatch(plain) else plain}{ending}"
-
-
 MAX_BYTES = 256 << 20
 """The maximum number of bytes of an unpacked run."""
 MAX_JOURNAL_BYTES = open_from_disk.MAX_BYTES * 3 // 4
@@ -173,3 +160,16 @@ def _is_sound(found: dict[str, bytes]) -> bool:
     if not is_sound(sketch) or (change is not None and not change.is_sound):
         return False
     return not (sketch.decisions and errors_of(sketch))  # a sketch without decisions is the picture of an imported team
+
+
+_OTHERS = re.compile(r"[^A-Za-z0-9_-]+")
+_LONGEST = 60
+_USUAL = "team"
+_RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com[0-9]|lpt[0-9])")
+"""Names of devices on Windows."""
+
+
+def file_name(name: str, ending: str = "") -> str:
+    """Return a file name for `name` with ASCII letters, digits, `_` and `-` only, followed by `ending`."""
+    plain = _OTHERS.sub("-", name).strip("-")[:_LONGEST].strip("-")
+    return f"{_USUAL if not plain or _RESERVED.fullmatch(plain) else plain}{ending}"

@@ -14,6 +14,42 @@ from robochoc.app.sketch.sketch import Sketch, SketchRule
 from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
 from robochoc.solver.compiled_domain import MAX_SOLUTIONS
 
+
+def troubles(sketch: Sketch) -> list[Trouble]:
+    """Return the errors of a sketch, followed by hints. Without errors, `building.model_of` returns its model.
+
+    Hints are on probable mistakes: rules that can never be satisfied, or too many combinations.
+    """
+    found, facts = _checked(sketch)
+    if facts and not any(trouble.is_error for trouble in found):
+        found += [*hopeless(facts), *large(facts)]
+    return sorted(found, key=lambda trouble: not trouble.is_error)
+
+
+def errors_of(sketch: Sketch) -> list[Trouble]:
+    """Return the errors of a sketch. This is faster than `troubles`, since hints are slow."""
+    return [trouble for trouble in _checked(sketch)[0] if trouble.is_error]
+
+
+def _checked(sketch: Sketch) -> tuple[list[Trouble], SketchFacts | None]:
+    """Return all errors and quick hints, and the facts about a sketch that is within bounds."""
+    found = [*element_checks.check_bounds(sketch)]
+    if found:
+        return found, None
+    found += [
+        *element_checks.check_names(sketch),
+        *element_checks.check_robots(sketch),
+        *element_checks.check_decisions(sketch),
+    ]
+    facts = SketchFacts(sketch)
+    return [
+        *found,
+        *facts.unfit.values(),
+        *rule_checks.check_private(facts),
+        *rule_checks.check_link_count(facts),
+    ], facts
+
+
 MAX_PAIRS = 10_000
 """The maximum number of pairs of values that are checked for two robots."""
 MAX_TRIED = 100_000
@@ -137,38 +173,3 @@ def large(facts: SketchFacts) -> Iterator[Trouble]:
 
 def _hint(rule: SketchRule, key: str, **named: str | int) -> Trouble:
     return Trouble(About.RULE, rule.id, f"trouble.never-{key}", named | {"rule": shortened(rule.id)}, Severity.HINT)
-
-
-def troubles(sketch: Sketch) -> list[Trouble]:
-    """Return the errors of a sketch, followed by hints. Without errors, `building.model_of` returns its model.
-
-    Hints are on probable mistakes: rules that can never be satisfied, or too many combinations.
-    """
-    found, facts = _checked(sketch)
-    if facts and not any(trouble.is_error for trouble in found):
-        found += [*hopeless(facts), *large(facts)]
-    return sorted(found, key=lambda trouble: not trouble.is_error)
-
-
-def errors_of(sketch: Sketch) -> list[Trouble]:
-    """Return the errors of a sketch. This is faster than `troubles`, since hints are slow."""
-    return [trouble for trouble in _checked(sketch)[0] if trouble.is_error]
-
-
-def _checked(sketch: Sketch) -> tuple[list[Trouble], SketchFacts | None]:
-    """Return all errors and quick hints, and the facts about a sketch that is within bounds."""
-    found = [*element_checks.check_bounds(sketch)]
-    if found:
-        return found, None
-    found += [
-        *element_checks.check_names(sketch),
-        *element_checks.check_robots(sketch),
-        *element_checks.check_decisions(sketch),
-    ]
-    facts = SketchFacts(sketch)
-    return [
-        *found,
-        *facts.unfit.values(),
-        *rule_checks.check_private(facts),
-        *rule_checks.check_link_count(facts),
-    ], facts

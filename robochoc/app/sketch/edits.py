@@ -17,64 +17,6 @@ from robochoc.formats.names import MAX_WEIGHT, RESERVED, is_name
 from robochoc.system.errors import RobochocError
 
 
-def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
-    """Return the sketch with a map of this size. Cells remain at their positions, so that their numbers change.
-
-    Robots outside the new map move to its edge. Removed cells are dropped from decisions and rules: `checks` then
-    reports a missing setting of a rule, and a decision without remaining cells gets all free cells.
-    """
-    blocked = frozenset(cell for cell in sketch.area.blocked if cell.x < columns and cell.y < rows)
-    area = Area(columns, rows, blocked)
-    robots = tuple(
-        msgspec.structs.replace(robot, at=Cell(min(robot.at.x, columns - 1), min(robot.at.y, rows - 1)))
-        for robot in sketch.robots
-    )
-    places = {decision.name for decision in sketch.decisions if decision.kind == DecisionKind.PLACE}
-    moved = _ResizedMap(sketch.area, area)
-    return msgspec.structs.replace(
-        sketch,
-        area=area,
-        robots=robots,
-        decisions=tuple(moved.decision(one) if one.name in places else one for one in sketch.decisions),
-        rules=tuple(moved.rule(rule) if rule.decision in places else rule for rule in sketch.rules),
-    )
-
-
-class _ResizedMap:
-    """Converts cells of a map to those of a map of another size."""
-
-    def __init__(self, before: Area, after: Area) -> None:
-        self._before, self._after = before, after
-
-    def decision(self, decision: Decision) -> Decision:
-        """Return a decision with the numbers of its remaining cells on the new map."""
-        return msgspec.structs.replace(decision, values=tuple(self._values(decision.values)))
-
-    def rule(self, rule: SketchRule) -> SketchRule:
-        """Return a rule with the numbers of its remaining cells on the new map."""
-        settings = dict(rule.settings)
-        for opening in PALETTE[rule.kind].openings if rule.kind in PALETTE else ():
-            if opening.form != Form.NUMBER and opening.name in settings:
-                kept = self._setting(settings.pop(opening.name))
-                if kept is not None:
-                    settings[opening.name] = kept
-        return msgspec.structs.replace(rule, settings=settings)
-
-    def _setting(self, given: Setting) -> Setting | None:
-        if not isinstance(given, list):
-            return next(iter(self._values([given])), None)
-        rows = [self._values(row) for row in given if isinstance(row, list)]
-        whole = 2
-        return [
-            *self._values([one for one in given if not isinstance(one, list)]),
-            *(r for r in rows if len(r) == whole),
-        ]
-
-    def _values(self, values: list[int | str] | tuple[int | str, ...]) -> list[int | str]:
-        cells = (self._before.cell(value) if isinstance(value, int) else None for value in values)
-        return [self._after.number(cell) for cell in cells if cell is not None and self._after.has(cell)]
-
-
 class EditError(RobochocError, ValueError):
     """An invalid edit: the `key` of its text in the catalogue, the arguments of the text, and the element."""
 
@@ -254,3 +196,61 @@ def _name(name: str, element: str, taken: Sequence[str] | set[str]) -> str:
 
 def _free_name(stem: str, taken: set[str]) -> str:
     return next(f"{stem}{number}" for number in range(1, len(taken) + 2) if f"{stem}{number}" not in taken)
+
+
+def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
+    """Return the sketch with a map of this size. Cells remain at their positions, so that their numbers change.
+
+    Robots outside the new map move to its edge. Removed cells are dropped from decisions and rules: `checks` then
+    reports a missing setting of a rule, and a decision without remaining cells gets all free cells.
+    """
+    blocked = frozenset(cell for cell in sketch.area.blocked if cell.x < columns and cell.y < rows)
+    area = Area(columns, rows, blocked)
+    robots = tuple(
+        msgspec.structs.replace(robot, at=Cell(min(robot.at.x, columns - 1), min(robot.at.y, rows - 1)))
+        for robot in sketch.robots
+    )
+    places = {decision.name for decision in sketch.decisions if decision.kind == DecisionKind.PLACE}
+    moved = _ResizedMap(sketch.area, area)
+    return msgspec.structs.replace(
+        sketch,
+        area=area,
+        robots=robots,
+        decisions=tuple(moved.decision(one) if one.name in places else one for one in sketch.decisions),
+        rules=tuple(moved.rule(rule) if rule.decision in places else rule for rule in sketch.rules),
+    )
+
+
+class _ResizedMap:
+    """Converts cells of a map to those of a map of another size."""
+
+    def __init__(self, before: Area, after: Area) -> None:
+        self._before, self._after = before, after
+
+    def decision(self, decision: Decision) -> Decision:
+        """Return a decision with the numbers of its remaining cells on the new map."""
+        return msgspec.structs.replace(decision, values=tuple(self._values(decision.values)))
+
+    def rule(self, rule: SketchRule) -> SketchRule:
+        """Return a rule with the numbers of its remaining cells on the new map."""
+        settings = dict(rule.settings)
+        for opening in PALETTE[rule.kind].openings if rule.kind in PALETTE else ():
+            if opening.form != Form.NUMBER and opening.name in settings:
+                kept = self._setting(settings.pop(opening.name))
+                if kept is not None:
+                    settings[opening.name] = kept
+        return msgspec.structs.replace(rule, settings=settings)
+
+    def _setting(self, given: Setting) -> Setting | None:
+        if not isinstance(given, list):
+            return next(iter(self._values([given])), None)
+        rows = [self._values(row) for row in given if isinstance(row, list)]
+        whole = 2
+        return [
+            *self._values([one for one in given if not isinstance(one, list)]),
+            *(r for r in rows if len(r) == whole),
+        ]
+
+    def _values(self, values: list[int | str] | tuple[int | str, ...]) -> list[int | str]:
+        cells = (self._before.cell(value) if isinstance(value, int) else None for value in values)
+        return [self._after.number(cell) for cell in cells if cell is not None and self._after.has(cell)]

@@ -23,44 +23,6 @@ from robochoc.formats.team_writer import SKETCH_FILE
 from robochoc.model.problem import Team
 from robochoc.system.temporary_files import PrivateFolder
 
-MOST_LISTED = 2 << 20
-"""The maximum size of an archive's list of files: enough for ten thousand files. Python reads the list at once."""
-
-
-class BoundedFile(io.FileIO):
-    """A file with a limit for each read.
-
-    Attributes:
-        most: The maximum number of bytes of a read. None: no limit.
-    """
-
-    most: int | None = MOST_LISTED
-
-    def read(self, size: int | None = -1) -> bytes:
-        """Read from the file. Raises `ValueError` if more than `most` bytes would be read."""
-        if self.most is not None:
-            here = self.tell()
-            rest = self.seek(0, io.SEEK_END) - here
-            self.seek(here)
-            if (rest if size is None or size < 0 else min(size, rest)) > self.most:
-                raise ValueError(f"its list of files has more than {self.most:,} bytes")
-        return super().read(-1 if size is None else size)
-
-
-@contextmanager
-def bounded_archive(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an untrusted ZIP archive for reading.
-
-    Raises:
-        ValueError: if its list of files is too long.
-        OSError: if it cannot be read.
-        zipfile.BadZipFile: if it is damaged; and other exceptions of `zipfile.ZipFile`.
-    """
-    with BoundedFile(path) as file, zipfile.ZipFile(file) as archive:
-        file.most = None
-        yield archive
-
-
 MAX_FILES = 2_000
 """The maximum number of files of a team. Larger teams can be solved by commands."""
 MAX_BYTES = 64 << 20
@@ -221,3 +183,41 @@ def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
         replace(one, file=one.file.removeprefix(inside), message=one.message.replace(inside, ""))
         for one in invalid.diagnostics
     ]
+
+
+MOST_LISTED = 2 << 20
+"""The maximum size of an archive's list of files: enough for ten thousand files. Python reads the list at once."""
+
+
+class BoundedFile(io.FileIO):
+    """A file with a limit for each read.
+
+    Attributes:
+        most: The maximum number of bytes of a read. None: no limit.
+    """
+
+    most: int | None = MOST_LISTED
+
+    def read(self, size: int | None = -1) -> bytes:
+        """Read from the file. Raises `ValueError` if more than `most` bytes would be read."""
+        if self.most is not None:
+            here = self.tell()
+            rest = self.seek(0, io.SEEK_END) - here
+            self.seek(here)
+            if (rest if size is None or size < 0 else min(size, rest)) > self.most:
+                raise ValueError(f"its list of files has more than {self.most:,} bytes")
+        return super().read(-1 if size is None else size)
+
+
+@contextmanager
+def bounded_archive(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open an untrusted ZIP archive for reading.
+
+    Raises:
+        ValueError: if its list of files is too long.
+        OSError: if it cannot be read.
+        zipfile.BadZipFile: if it is damaged; and other exceptions of `zipfile.ZipFile`.
+    """
+    with BoundedFile(path) as file, zipfile.ZipFile(file) as archive:
+        file.most = None
+        yield archive

@@ -19,63 +19,6 @@ from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, PossibleQuest
 from robochoc.app.studies.study import ENDED, Line, StudyStage, StudyState, study_on
 from robochoc.app.texts import say
 
-REPORT = "study/report.html"
-"""The address of the report, relative to the pages of its team."""
-
-
-def install_reports(projects: Projects) -> None:
-    """Install the address of reports."""
-
-    @app.get("/team/{name}/" + REPORT)
-    async def report(name: str) -> Response:  # in the event loop, as in all code that opens teams
-        try:
-            file = study_on(projects.open(name)).report
-        except (KeyError, ValueError):
-            file = None
-        if file is None:
-            return Response(status_code=404)
-        policy = "sandbox allow-popups; frame-ancestors 'self'"
-        return FileResponse(file, media_type="text/html", headers={"Content-Security-Policy": policy})
-
-
-def show_lines(lines: Sequence[Line], *, worth: bool = False) -> None:
-    """Show the medians of each protocol. `worth`: whether costs are utilities."""
-    if not lines:
-        return
-    costs = any(line.cost for line in lines)
-    most = max(1.0, *(line.messages for line in lines))
-    heads = ["protocol", "messages", "ncccs", "bytes", *([("worth" if worth else "cost")] if costs else []), "finished"]
-    with ui.element("div").classes("panel compare-lines"), ui.element("table"):
-        with ui.element("caption"):
-            ui.label(say("compare.medians"))
-        with ui.element("thead"), ui.element("tr"):
-            for head in heads:
-                with ui.element("th").props("scope=col"):
-                    ui.label(say(f"compare.head.{head}"))
-        with ui.element("tbody"):
-            for line in lines:
-                _row(line, most, costs=costs)
-
-
-def _row(line: Line, most: float, *, costs: bool) -> None:
-    with ui.element("tr"):
-        with ui.element("th").props("scope=row"):
-            ui.label(line.protocol)
-        with ui.element("td").classes("measured"):
-            ui.label(_count(line.messages))
-            with ui.element("div").classes("track").props("aria-hidden=true"):
-                ui.element("div").classes("fill").style(f"width: {100 * line.messages / most:.1f}%")
-        cells = [_count(line.ncccs), _count(line.bytes)]
-        cells += [("-" if line.cost is None else _count(line.cost))] if costs else []
-        for text in [*cells, say("compare.finished", finished=line.finished, runs=line.runs)]:
-            with ui.element("td"):
-                ui.label(text)
-
-
-def _count(number: float) -> str:
-    return f"{number:,.0f}" if number == int(number) else f"{number:,.1f}"
-
-
 _DELAY_S = 0.2
 _TEAM, _FAMILY = "team", "family"
 _FEWEST = 2
@@ -319,3 +262,60 @@ def _heading(tag: str, key: str) -> None:
 @cache
 def _style() -> str:
     return (files(__package__) / "compare.css").read_text(encoding="utf-8")
+
+
+REPORT = "study/report.html"
+"""The address of the report, relative to the pages of its team."""
+
+
+def install_reports(projects: Projects) -> None:
+    """Install the address of reports."""
+
+    @app.get("/team/{name}/" + REPORT)
+    async def report(name: str) -> Response:  # in the event loop, as in all code that opens teams
+        try:
+            file = study_on(projects.open(name)).report
+        except (KeyError, ValueError):
+            file = None
+        if file is None:
+            return Response(status_code=404)
+        policy = "sandbox allow-popups; frame-ancestors 'self'"
+        return FileResponse(file, media_type="text/html", headers={"Content-Security-Policy": policy})
+
+
+def show_lines(lines: Sequence[Line], *, worth: bool = False) -> None:
+    """Show the medians of each protocol. `worth`: whether costs are utilities."""
+    if not lines:
+        return
+    costs = any(line.cost for line in lines)
+    most = max(1.0, *(line.messages for line in lines))
+    heads = ["protocol", "messages", "ncccs", "bytes", *([("worth" if worth else "cost")] if costs else []), "finished"]
+    with ui.element("div").classes("panel compare-lines"), ui.element("table"):
+        with ui.element("caption"):
+            ui.label(say("compare.medians"))
+        with ui.element("thead"), ui.element("tr"):
+            for head in heads:
+                with ui.element("th").props("scope=col"):
+                    ui.label(say(f"compare.head.{head}"))
+        with ui.element("tbody"):
+            for line in lines:
+                _row(line, most, costs=costs)
+
+
+def _row(line: Line, most: float, *, costs: bool) -> None:
+    with ui.element("tr"):
+        with ui.element("th").props("scope=row"):
+            ui.label(line.protocol)
+        with ui.element("td").classes("measured"):
+            ui.label(_count(line.messages))
+            with ui.element("div").classes("track").props("aria-hidden=true"):
+                ui.element("div").classes("fill").style(f"width: {100 * line.messages / most:.1f}%")
+        cells = [_count(line.ncccs), _count(line.bytes)]
+        cells += [("-" if line.cost is None else _count(line.cost))] if costs else []
+        for text in [*cells, say("compare.finished", finished=line.finished, runs=line.runs)]:
+            with ui.element("td"):
+                ui.label(text)
+
+
+def _count(number: float) -> str:
+    return f"{number:,.0f}" if number == int(number) else f"{number:,.1f}"

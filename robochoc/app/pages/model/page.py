@@ -36,81 +36,6 @@ from robochoc.app.sketch.sketch import MAX_SIDE, Cell, DecisionKind, Setting, Sk
 from robochoc.app.sketch.troubles import About, Trouble
 from robochoc.app.texts import say
 
-
-class MapFields:
-    """The columns and rows of the map."""
-
-    def __init__(self, desk: Desk) -> None:
-        self._desk = desk
-        with ui.element("div").classes("map-size").props(f'role=group aria-label="{say("model.map-size")}"'):
-            self._columns = number_field("model.columns", 1, MAX_SIDE, lambda value: self._change(columns=value))
-            ui.label("×").props("aria-hidden=true").classes("soft")  # noqa: RUF001 - the sign of multiplication
-            self._rows = number_field("model.rows", 1, MAX_SIDE, lambda value: self._change(rows=value))
-        self._follow()
-        on_leave(desk.project.on_change(self._follow))
-
-    def _follow(self) -> None:
-        put(self._columns, self._desk.sketch.area.columns)
-        put(self._rows, self._desk.sketch.area.rows)
-
-    def _change(self, columns: int | None = None, rows: int | None = None) -> str | None:
-        area = self._desk.sketch.area
-        wanted = columns or area.columns, rows or area.rows
-        if wanted == (area.columns, area.rows):
-            return None
-        return self._desk.edit(lambda sketch: with_area(sketch, *wanted))
-
-
-def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
-    """Add a robot to a rule, or remove it. A rule of all robots becomes a rule of this robot.
-
-    Raises:
-        EditError: if it is the last robot of the rule: a rule without robots applies to all.
-    """
-    if sketch.robot(name) is None:
-        return sketch  # the robot was removed meanwhile
-    robots = rule.robots
-    if robots == (name,):
-        raise EditError("edit.last-of-rule", rule.id, robot=name)
-    kept = tuple(one for one in robots if one != name) if name in robots else (*robots, name)
-    return with_rule(sketch, msgspec.structs.replace(rule, robots=kept))
-
-
-def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: str | None) -> Sketch:
-    """Add a cell to the values of the decision `cells_of` or to the open rule, or remove it.
-
-    Raises:
-        EditError: if the cell is not on the map (any more), or is the last value.
-    """
-    check_cell(sketch, cell)
-    decision = None if cells_of is None else sketch.decision(cells_of)
-    if decision is not None and decision.kind == DecisionKind.PLACE:
-        values = with_cell(sketch, decision, sketch.area.number(cell))
-        made = msgspec.structs.replace(decision, values=values)
-        return with_decision(sketch, made, instead_of=decision.name)
-    rule = None if opened is None else sketch.rule(opened)
-    return sketch if rule is None else _with_cell_in_rule(sketch, rule, sketch.area.number(cell))
-
-
-def _with_cell_in_rule(sketch: Sketch, rule: SketchRule, number: int) -> Sketch:
-    decision = sketch.decision(rule.decision)
-    if decision is None or decision.kind != DecisionKind.PLACE or number not in sketch.values(decision):
-        return sketch
-    for opening in PALETTE[rule.kind].openings:
-        if opening.form == Form.VALUE:
-            return _filled(sketch, rule, opening.name, number)
-        if opening.form == Form.VALUES:
-            given = rule.settings.get(opening.name)
-            cells = [one for one in given if isinstance(one, int)] if isinstance(given, list) else []
-            kept = [one for one in cells if one != number] if number in cells else [*cells, number]
-            return _filled(sketch, rule, opening.name, [*kept])
-    return sketch
-
-
-def _filled(sketch: Sketch, rule: SketchRule, name: str, value: Setting) -> Sketch:
-    return with_rule(sketch, msgspec.structs.replace(rule, settings={**rule.settings, name: value}))
-
-
 TOOLS = {SELECT: "near_me", "add": "add_circle_outline", "block": "block"}
 """The tools, and their icons."""
 _QUIET_S = 0.15
@@ -305,3 +230,77 @@ def _troubles_and_links(sketch: Sketch) -> tuple[list[Trouble], LinksDrawn]:
 @cache
 def _style() -> str:
     return (files(__package__) / "model.css").read_text(encoding="utf-8")
+
+
+class MapFields:
+    """The columns and rows of the map."""
+
+    def __init__(self, desk: Desk) -> None:
+        self._desk = desk
+        with ui.element("div").classes("map-size").props(f'role=group aria-label="{say("model.map-size")}"'):
+            self._columns = number_field("model.columns", 1, MAX_SIDE, lambda value: self._change(columns=value))
+            ui.label("×").props("aria-hidden=true").classes("soft")  # noqa: RUF001 - the sign of multiplication
+            self._rows = number_field("model.rows", 1, MAX_SIDE, lambda value: self._change(rows=value))
+        self._follow()
+        on_leave(desk.project.on_change(self._follow))
+
+    def _follow(self) -> None:
+        put(self._columns, self._desk.sketch.area.columns)
+        put(self._rows, self._desk.sketch.area.rows)
+
+    def _change(self, columns: int | None = None, rows: int | None = None) -> str | None:
+        area = self._desk.sketch.area
+        wanted = columns or area.columns, rows or area.rows
+        if wanted == (area.columns, area.rows):
+            return None
+        return self._desk.edit(lambda sketch: with_area(sketch, *wanted))
+
+
+def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
+    """Add a robot to a rule, or remove it. A rule of all robots becomes a rule of this robot.
+
+    Raises:
+        EditError: if it is the last robot of the rule: a rule without robots applies to all.
+    """
+    if sketch.robot(name) is None:
+        return sketch  # the robot was removed meanwhile
+    robots = rule.robots
+    if robots == (name,):
+        raise EditError("edit.last-of-rule", rule.id, robot=name)
+    kept = tuple(one for one in robots if one != name) if name in robots else (*robots, name)
+    return with_rule(sketch, msgspec.structs.replace(rule, robots=kept))
+
+
+def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: str | None) -> Sketch:
+    """Add a cell to the values of the decision `cells_of` or to the open rule, or remove it.
+
+    Raises:
+        EditError: if the cell is not on the map (any more), or is the last value.
+    """
+    check_cell(sketch, cell)
+    decision = None if cells_of is None else sketch.decision(cells_of)
+    if decision is not None and decision.kind == DecisionKind.PLACE:
+        values = with_cell(sketch, decision, sketch.area.number(cell))
+        made = msgspec.structs.replace(decision, values=values)
+        return with_decision(sketch, made, instead_of=decision.name)
+    rule = None if opened is None else sketch.rule(opened)
+    return sketch if rule is None else _with_cell_in_rule(sketch, rule, sketch.area.number(cell))
+
+
+def _with_cell_in_rule(sketch: Sketch, rule: SketchRule, number: int) -> Sketch:
+    decision = sketch.decision(rule.decision)
+    if decision is None or decision.kind != DecisionKind.PLACE or number not in sketch.values(decision):
+        return sketch
+    for opening in PALETTE[rule.kind].openings:
+        if opening.form == Form.VALUE:
+            return _filled(sketch, rule, opening.name, number)
+        if opening.form == Form.VALUES:
+            given = rule.settings.get(opening.name)
+            cells = [one for one in given if isinstance(one, int)] if isinstance(given, list) else []
+            kept = [one for one in cells if one != number] if number in cells else [*cells, number]
+            return _filled(sketch, rule, opening.name, [*kept])
+    return sketch
+
+
+def _filled(sketch: Sketch, rule: SketchRule, name: str, value: Setting) -> Sketch:
+    return with_rule(sketch, msgspec.structs.replace(rule, settings={**rule.settings, name: value}))

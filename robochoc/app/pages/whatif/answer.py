@@ -22,62 +22,6 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.model.cost_units import cost_shown
 
-ASIDE = "whatif-aside"
-"""The purpose of a run with withdrawals after a change."""
-
-
-class WaysOut:
-    """The panel of the page "Decide" for a team without a solution, here for the changed team."""
-
-    def __init__(self, project: Project, story: Story, after: Sketch) -> None:
-        self._project, self._story, self._after = project, story, after
-        self._end_following: Callable[[], None] | None = None
-        self._deciding: asyncio.Task[None] | None = None
-        NoSolutionPanel(project, after, self._decide)
-        self._box = ui.element("div").classes("whatif-aside").props("aria-live=polite")
-        on_leave(self._end)
-        last = runs_of(project).latest_for(ASIDE)
-        if last is not None and _is_of(last, after):
-            self._follow(last)
-
-    def _decide(self, *, withdraw: bool = False) -> None:
-        if withdraw:
-            self._follow(runs_of(self._project).start(RunOptions(withdraw=True), sketch=self._after, purpose=ASIDE))
-        else:  # a rule was changed: decide again before and after the changes
-            self._deciding = asyncio.get_running_loop().create_task(self._story.decide())
-
-    def _end(self) -> None:
-        if self._end_following:
-            self._end_following()
-
-    def _follow(self, run: Run) -> None:
-        self._end()
-        self._end_following = run.on_change(lambda: self._show(run))
-        self._show(run)
-
-    def _show(self, run: Run) -> None:
-        if self._box.is_deleted:
-            self._end()
-            return
-        self._box.clear()
-        with self._box, ui.element("section").classes("panel answer"):
-            if run.state == RunState.RUNNING:
-                ui.label(say("whatif.running"))
-                return
-            with ui.element("h2").classes("headline"):
-                ui.label(headline(run))
-            if run.result is not None:
-                ui.label(effort(run)).classes("soft")
-                if run.result.assignment:
-                    ui.html(table_html(self._after, run.result), sanitize=False).classes("values")
-
-
-def _is_of(run: Run, sketch: Sketch) -> bool:
-    try:
-        return run.sketch == sketch
-    except (OSError, ValueError):  # its files are damaged
-        return False
-
 
 class WhatIfAnswer:
     """The part of the page below the map. It is rebuilt after each change of the outcome."""
@@ -242,3 +186,60 @@ def _failure(story: Story) -> str:
         if run is not None and run.state == RunState.STOPPED:
             return say("whatif.stopped")
     return say("whatif.unknown") if story.run else ""
+
+
+ASIDE = "whatif-aside"
+"""The purpose of a run with withdrawals after a change."""
+
+
+class WaysOut:
+    """The panel of the page "Decide" for a team without a solution, here for the changed team."""
+
+    def __init__(self, project: Project, story: Story, after: Sketch) -> None:
+        self._project, self._story, self._after = project, story, after
+        self._end_following: Callable[[], None] | None = None
+        self._deciding: asyncio.Task[None] | None = None
+        NoSolutionPanel(project, after, self._decide)
+        self._box = ui.element("div").classes("whatif-aside").props("aria-live=polite")
+        on_leave(self._end)
+        last = runs_of(project).latest_for(ASIDE)
+        if last is not None and _is_of(last, after):
+            self._follow(last)
+
+    def _decide(self, *, withdraw: bool = False) -> None:
+        if withdraw:
+            self._follow(runs_of(self._project).start(RunOptions(withdraw=True), sketch=self._after, purpose=ASIDE))
+        else:  # a rule was changed: decide again before and after the changes
+            self._deciding = asyncio.get_running_loop().create_task(self._story.decide())
+
+    def _end(self) -> None:
+        if self._end_following:
+            self._end_following()
+
+    def _follow(self, run: Run) -> None:
+        self._end()
+        self._end_following = run.on_change(lambda: self._show(run))
+        self._show(run)
+
+    def _show(self, run: Run) -> None:
+        if self._box.is_deleted:
+            self._end()
+            return
+        self._box.clear()
+        with self._box, ui.element("section").classes("panel answer"):
+            if run.state == RunState.RUNNING:
+                ui.label(say("whatif.running"))
+                return
+            with ui.element("h2").classes("headline"):
+                ui.label(headline(run))
+            if run.result is not None:
+                ui.label(effort(run)).classes("soft")
+                if run.result.assignment:
+                    ui.html(table_html(self._after, run.result), sanitize=False).classes("values")
+
+
+def _is_of(run: Run, sketch: Sketch) -> bool:
+    try:
+        return run.sketch == sketch
+    except (OSError, ValueError):  # its files are damaged
+        return False
