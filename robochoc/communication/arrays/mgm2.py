@@ -265,7 +265,7 @@ class ArrayMGM2(ArrayGainers):
         return order[found], wanted - (sums[found] - counted[found])
 
     def _go(self, committed: Integers, partners: Integers, moves: Flags) -> None:
-        """Exchange between partners whether they gain most; both must (`MGM2._decide`, `MGM2._go`)."""
+        """Exchange between partners whether they gain most; both must (`MGM2._decide`, `MGM2._receive_go`)."""
         self.tally.add(Go.__name__, len(encode(Go(True))), len(committed))
         if self.clocks is not None:
             self.clocks[committed] = np.maximum(self.clocks[committed], self.clocks[partners[committed]])

@@ -135,7 +135,7 @@ class ACLS(CycleProtocol):
         self._values: dict[str, wire.Value] = {}
 
     def start_cycles(self) -> None:
-        """Take a random value."""
+        """Choose a random value."""
         self.choose(self.any_value())
         self.exchange_values(self._propose)
 
@@ -175,7 +175,7 @@ class ACLS(CycleProtocol):
         self.listen(self.problem.neighbours, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
-        """Take the proposal with a probability, if it is cheap enough for both sides together."""
+        """Accept the proposal with a probability, if it is cheap enough for both sides together."""
         index = self.present
         if self.proposal is not None and len(messages) == len(self.problem.neighbours):
             sides = [message for message in messages.values() if isinstance(message, Sides)]

@@ -170,7 +170,7 @@ class ATWB(AFB):
     # The holder
 
     def _assign(self, index: int) -> None:
-        """Take a value; its cost contains the least costs of this robot's sides, and the known costs of other sides."""
+        """Choose a value; its cost includes the least costs of this robot's sides, and known costs of other sides."""
         super()._assign(index)
         self.cost += sum(least[index] for least in self.least.values())
 
@@ -204,7 +204,7 @@ class ATWB(AFB):
         self.cost += side.cost
 
     def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
-        """Keep a value, or take the next one, as AFB; pass on the CPA once the sides of all robots before are known."""
+        """Keep a value, or choose the next one, as AFB; send the CPA on once all sides of robots before are known."""
         super()._assign_cpa(lower_bounds)
         if self.value is not None and self.asked is not None and not self.asked:
             self.asked = None

@@ -101,7 +101,7 @@ class MCSMGM(Gainers):
         self._values: dict[str, wire.Value] = {}
 
     def start_cycles(self) -> None:
-        """Take a random value."""
+        """Choose a random value."""
         self.choose(self.any_value())
         self.exchange_values(self._transfer)
 

@@ -209,7 +209,7 @@ class SyncABB(SyncBB):
     # The holder
 
     def _start_cpa(self, cpa: CPA) -> None:
-        """Take the first value with a CPA of all robots before, if its values are possible."""
+        """Choose the first value with a CPA of all robots before, if its values are possible."""
         if len(cpa.values) != self.rank:
             raise ValueError(f"a CPA for {self.problem.agent} has {self.rank} values, not {len(cpa.values)}")
         self._view = dict(zip(self.order.names, cpa.values, strict=False))

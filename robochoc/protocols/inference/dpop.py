@@ -96,7 +96,6 @@ class DPOPSettings(Settings, frozen=True):
     memory: int = GIB
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` unless `memory` is positive."""
         if self.memory < 1:
             raise ValueError(f"memory is {self.memory}; it must be a number of bytes, 1 or more")
 

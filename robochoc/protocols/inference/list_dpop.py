@@ -75,7 +75,6 @@ class ListDPOPSettings(DPOPSettings, frozen=True):
     limit: int = 100
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` unless `memory` is positive, and `limit` is too and not too large."""
         super().__post_init__()
         if not 1 <= self.limit <= MOST_LISTED:
             raise ValueError(f"limit is {self.limit}; it must be from 1 to {MOST_LISTED:,} optima")

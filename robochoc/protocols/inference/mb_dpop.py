@@ -93,7 +93,6 @@ class MBDPOPSettings(DPOPSettings, frozen=True):
     k: int = 4
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` unless `memory` and `k` are positive."""
         super().__post_init__()
         if self.k < 1:
             raise ValueError(f"k is {self.k}; it must be 1 or more, as a table has at least one dimension")

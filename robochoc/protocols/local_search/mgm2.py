@@ -20,7 +20,7 @@ The phases of a cycle:
     offers (offerers), to one neighbour each    `_offer`, `_answer`
     accept, reject                              `_answer`, `_receive_answer`
     gain messages                               `_send_gain`, `_decide`
-    go, no go (of committed robots)             `_decide`, `_go`
+    go, no go (of committed robots)             `_decide`, `_receive_go`
 
 Choices that the paper leaves open, and differences:
 
@@ -310,9 +310,9 @@ class MGM2(Gainers):
         else:
             self.send(self.partner, Go(wins))
             self._wins = wins
-            self.listen_for(_GO, (self.partner,), self._go)
+            self.listen_for(_GO, (self.partner,), self._receive_go)
 
-    def _go(self, messages: Mapping[str, wire.Message]) -> None:
+    def _receive_go(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the joint move if both robots allow it."""
         answer = next(iter(messages.values()), None)
         self._end_cycle(move=self._wins and isinstance(answer, Go) and answer.go)

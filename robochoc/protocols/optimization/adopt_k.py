@@ -126,7 +126,7 @@ class ADOPTk(BnBADOPT):
             self.allowance = message.allowance
 
     def act(self) -> None:
-        """Keep LB <= TH^A <= UB; choose a value and send what changed (Backtrack)."""
+        """Keep LB <= TH^A <= UB; choose a value and send the changes (Backtrack)."""
         self.allowance = min(max(self.allowance, self.lb), self.ub)
         super().act()
 

@@ -351,7 +351,7 @@ class AFB(Protocol):
             self.left = self.costs.by_decreasing_cost()
 
     def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
-        """Keep the value while its bound is below B; otherwise take the cheapest one left, or backtrack."""
+        """Keep the value while its bound is below B; otherwise choose the cheapest one left, or backtrack."""
         while True:
             totals = self.estimates.totals(stamp_of(self._cpa))
             shortest = self._backtrack_to(lower_bounds, totals)
@@ -443,7 +443,7 @@ class AFB(Protocol):
         self._adopt_best()
 
     def _adopt_best(self) -> None:
-        """Take this robot's value in the best solution. Its message may arrive after `Terminate`."""
+        """Adopt this robot's value in the best solution. Its message may arrive after `Terminate`."""
         self.value = None if self.solution is None else self.problem.values.index(self.solution.values[self.rank])
 
     def _bound_of_all(self) -> Cost | None:

@@ -118,7 +118,7 @@ class BnBADOPT(DepthFirstProtocol):
     # Floors
 
     def _store_domain(self, sender: str, values: list[message.Value]) -> None:
-        """Note the values of the parent."""
+        """Store the values of the parent."""
         if sender != self.parent or self._parent_values is not None or not values:
             raise ValueError(f"unexpected values from {sender}")
         for value in values:

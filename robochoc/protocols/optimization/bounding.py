@@ -178,7 +178,7 @@ class BoundingProtocol(TreeProtocol):
     # This robot's value, and messages about it
 
     def assign(self, index: int) -> None:
-        """Take the value at `index`."""
+        """Choose the value at `index`."""
         if index != self.value:
             self.value = index
             self.counter += 1

@@ -244,7 +244,7 @@ class BranchingProtocol(TreeProtocol):
         return min(range(len(self.local)), key=self.local.__getitem__)
 
     def descend(self, child: str) -> None:
-        """Let `child` search, or take the next value if the present one is ruled out: its bound has arrived."""
+        """Let `child` search, or choose the next value if the present one is ruled out: its bound has arrived."""
         index = self.present(child)
         branch = self.branches[child]
         total = self.estimate(index)
@@ -299,7 +299,7 @@ class BranchingProtocol(TreeProtocol):
                     self.tighten(child, rest)
 
     def _advance(self, child: str) -> None:
-        """Take the value with the least lower bound in the subtree of `child`; if none is left, the branch is idle."""
+        """Choose the value with the least lower bound in the subtree of `child`; without one, the branch is idle."""
         branch = self.branches[child]
         left = branch.left
         index = min(left, key=self.estimate, default=None)
@@ -340,7 +340,7 @@ class BranchingProtocol(TreeProtocol):
         self.finish(solution)
 
     def finish(self, values: Mapping[str, Value]) -> None:
-        """Take this robot's final value, and send the children the values of their subtrees.
+        """Choose this robot's final value, and send the children the values of their subtrees.
 
         Raises:
             ValueError: if a value is missing, or this robot's is invalid.

@@ -146,7 +146,7 @@ class NCBB(ForwardBoundingProtocol):
     # The first phase
 
     def _choose_greedily(self) -> None:
-        """Take the cheapest value once all values above are known, and send it to all robots below."""
+        """Choose the cheapest value once all values above are known, and send it to all robots below."""
         if len(self.greedy_view) < len(self.ancestors):
             return
         self.local = self.problem.costs(self.greedy_view)

@@ -107,7 +107,7 @@ class PTFB(ForwardBoundingProtocol):
     )
 
     def begin_search(self) -> None:
-        """Begin the search without a bound, as the root."""
+        """Start the search without a bound, as the root."""
         self.search(self.limit, self.above.alone)
 
     def handle(self, sender: str, message: Message) -> None:

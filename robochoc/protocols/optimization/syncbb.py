@@ -232,7 +232,7 @@ class SyncBB(Protocol):
             self.conclude(Verdict.NO_SOLUTION)
 
     def _adopt_best(self) -> None:
-        """Take this robot's value in the best path, at the end of the search."""
+        """Adopt this robot's value in the best path, at the end of the search."""
         self.over = True
         self.value = self.problem.values.index(self.best.values[self.rank])
 

@@ -42,7 +42,6 @@ class P2DPOPSettings(Settings, frozen=True):
     spare: int = 2
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for numbers outside their range."""
         if not 1 <= self.ciphers <= MOST_CIPHERS:
             raise ValueError(f"ciphers is {self.ciphers}; it must be from 1 to {MOST_CIPHERS:,}")
         if not 0 <= self.spare <= MOST:

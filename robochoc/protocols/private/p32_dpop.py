@@ -75,7 +75,6 @@ class P32DPOPSettings(PDPOPSettings, frozen=True):
     spare: int = 2
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for numbers outside their range."""
         super().__post_init__()
         if not 0 <= self.spare <= MOST:
             raise ValueError(f"spare is {self.spare}; it must be from 0 to {MOST} turns")

@@ -88,7 +88,6 @@ class PDPOPSettings(Settings, frozen=True):
     cells: int = 1_000_000
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for a number outside its range."""
         if not 1 <= self.cells <= MOST_CELLS:
             raise ValueError(f"cells is {self.cells}; it must be from 1 to {MOST_CELLS:,}")
 

@@ -186,7 +186,7 @@ class AFCng(Protocol):
             self._assign()
 
     def _assign(self) -> None:
-        """Take the first remaining value and send the CPA on."""
+        """Choose the first remaining value and send the CPA on."""
         index = self.store.first_open()
         assert index is not None  # noqa: S101 - for mypy: a value is left
         self.value = index

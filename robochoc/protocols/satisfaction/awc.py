@@ -182,7 +182,7 @@ class AWC(Protocol):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if all higher robots allow it; else take another that they allow, else backtrack."""
+        """Keep the value if all higher robots allow it; otherwise choose another allowed one, or backtrack."""
         self._recompute()
         if self.value is not None and self._reason(self.value) is None:
             return
@@ -213,7 +213,7 @@ class AWC(Protocol):
         self._choose_value(self._allowed())
 
     def _choose_value(self, allowed: list[int]) -> None:
-        """Take the value with the fewest conflicts (the first of equals) and send it to all neighbours."""
+        """Choose the value with the fewest conflicts (the first of equals) and send it to all neighbours."""
         self.value = allowed[0] if len(allowed) == 1 else min(allowed, key=self._violations)
         for agent in self.neighbours:
             self.send(agent, self._ok())

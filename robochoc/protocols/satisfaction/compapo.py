@@ -282,7 +282,7 @@ class CompAPO(Protocol):
         """Whether this robot is the highest of a conflict; None: not known since the last change."""
 
     def start(self) -> None:
-        """Take the first value, and send the domain to all neighbours."""
+        """Choose the first value, and send the domain to all neighbours."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -372,7 +372,7 @@ class CompAPO(Protocol):
         self.send(mediator, Evaluation(request.session, self._place(), self.count, tables))
 
     def _accept(self, mediator: str, place: int, changes: Changes) -> None:
-        """Take the value from the mediator, which has sent it to all neighbours."""
+        """Adopt the value from the mediator, which has sent it to all neighbours."""
         if mediator != self.holder or not 0 <= place < len(self.problem.values):
             raise ValueError(f"{mediator} assigns value number {place + 1}, which it must not")
         if place != self.value:
@@ -405,7 +405,7 @@ class CompAPO(Protocol):
         return self._conflict
 
     def _repair(self) -> bool:
-        """Take a value without conflicts, and send it to all neighbours; return whether there is one."""
+        """Choose a value without conflicts, and send it to all neighbours; return whether there is one."""
         if self.repairs >= len(self.good_list):
             return False
         places = range(len(self.problem.values))
@@ -420,7 +420,7 @@ class CompAPO(Protocol):
         return True
 
     def _open(self) -> None:
-        """Begin a session."""
+        """Start a session."""
         self.holder, self.held = self.name, (-len(self.good_list), self.order.rank[self.name])
         self.session += 1
         self.asked = {self.name}

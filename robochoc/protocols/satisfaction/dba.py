@@ -139,7 +139,7 @@ class DBA(CycleProtocol):
         self._missed = False
 
     def start_cycles(self) -> None:
-        """Take a random value."""
+        """Choose a random value."""
         self.choose(self.any_value())
         self.exchange_values(self._weigh)
 
@@ -182,7 +182,7 @@ class DBA(CycleProtocol):
             self.conclude(Verdict.UNKNOWN)
 
     def _are_complete(self, messages: Mapping[str, wire.Message]) -> bool:
-        """Return whether a message of each neighbour has arrived in this phase; note a missing one."""
+        """Return whether a message of each neighbour has arrived in this phase; record a missing one."""
         complete = len(messages) == len(self.problem.neighbours)
         self._missed = self._missed or not complete
         return complete

@@ -93,7 +93,7 @@ class TreeProtocol(Protocol):
             case Token(visited):
                 self._visit(sender, visited)
             case Back(visited):
-                self._pass_token(self._note_visited(visited))
+                self._pass_token(self._store_visited(visited))
             case _ if self.placed:
                 self.handle(sender, message)
             case _:
@@ -130,13 +130,13 @@ class TreeProtocol(Protocol):
         """
         self.parent = parent
         neighbours = self.problem.neighbours
-        left = visited if len(neighbours) == 1 else self._note_visited(visited)
+        left = visited if len(neighbours) == 1 else self._store_visited(visited)
         self._met.update([] if parent is None else [parent])
         self.pseudo_parents = self._sorted(self._met - {parent})
         unaware = sum(name != parent and self._election.degree(name) > 1 for name in neighbours)
         self._pass_token({**left, self.problem.agent: unaware} if unaware else left)
 
-    def _note_visited(self, visited: Mapping[str, int]) -> Mapping[str, int]:
+    def _store_visited(self, visited: Mapping[str, int]) -> Mapping[str, int]:
         """Store which neighbours were `visited`; return those visited robots that some neighbour does not know yet."""
         new = [name for name in self.problem.neighbours if name in visited and name not in self._met]
         if not new:
