@@ -96,7 +96,7 @@ __all__ = [
     "register",
 ]
 
-__version__ = "0.1.0"
+__version__ = "1.0.0"
 
 if os.environ.get("ROBOCHOC_PURE", "0") not in {"", "0"}:  # before any other module of ours is imported
     from robochoc.system.compiled_core import prefer_sources

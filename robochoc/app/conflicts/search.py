@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from enum import StrEnum
+from importlib.util import find_spec
 from pathlib import Path
 from typing import NamedTuple
 
@@ -14,6 +15,7 @@ from robochoc.app.jobs.job import EndedError, Job, LateError
 from robochoc.app.jobs.process import Command
 from robochoc.app.log import error_text
 from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.texts import say
 
 PATIENCE_S = 30.0
 """The time limit of a search."""
@@ -46,6 +48,14 @@ class Conflict(msgspec.Struct, frozen=True):
     late: bool = False
     why: str = ""
     words: tuple[str, ...] = ()
+
+
+def found_by(conflict: Conflict) -> str:
+    """Return how a conflict was searched for, with advice if CPMpy is not installed."""
+    if conflict.finder == Finder.CPMPY:
+        return say("decide.by-cpmpy")
+    advice = "" if find_spec("cpmpy") else say("decide.without-cpmpy")
+    return advice if conflict.late else " ".join(filter(None, (say("decide.by-own"), advice)))
 
 
 class TeamOfFiles(NamedTuple):

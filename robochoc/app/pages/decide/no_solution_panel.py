@@ -9,7 +9,7 @@ import msgspec
 from nicegui import run, ui
 
 from robochoc.app.conflicts.rules import with_only
-from robochoc.app.conflicts.search import PATIENCE_S, Conflict, ConflictSearch, Finder
+from robochoc.app.conflicts.search import PATIENCE_S, Conflict, ConflictSearch, found_by
 from robochoc.app.pages.shell import edit_error_text, on_leave
 from robochoc.app.pages.widgets import TroubleLines
 from robochoc.app.projects import Project
@@ -93,11 +93,11 @@ class NoSolutionPanel:
                 with ui.element("ul").classes("rules"):
                     for name in conflict.rules:
                         self._rule(name, [hint for hint in hints if hint.element == name])
-                ui.label(say("decide.by-cpmpy" if conflict.finder == Finder.CPMPY else "decide.by-own")).classes("soft")
+                ui.label(found_by(conflict)).classes("soft")
         elif conflict.why:
             self._set_text(say("decide.conflict-failed", why=conflict.why))
         elif conflict.late:
-            self._set_text(say("decide.conflict-late", seconds=int(PATIENCE_S)))
+            self._set_text(f"{say('decide.conflict-late', seconds=int(PATIENCE_S))} {found_by(conflict)}".strip())
         else:
             self._set_text(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
 

@@ -8,7 +8,7 @@ from html import escape
 
 from nicegui import ui
 
-from robochoc.app.conflicts.search import PATIENCE_S, Conflict, ConflictSearch, Finder, TeamOfFiles
+from robochoc.app.conflicts.search import PATIENCE_S, Conflict, ConflictSearch, TeamOfFiles, found_by
 from robochoc.app.imported.facts import ImportedFacts
 from robochoc.app.pages.imported.model import style
 from robochoc.app.pages.shell import on_leave
@@ -92,7 +92,7 @@ class ImportedNoSolutionPanel:
         if conflict.why:
             self._set_text(say("decide.conflict-failed", why=conflict.why))
         elif conflict.late:
-            self._set_text(say("imported.conflict-late"))
+            self._set_text(f"{say('imported.conflict-late')} {found_by(conflict)}".strip())
         elif not conflict.rules:
             self._set_text(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
         else:
@@ -105,7 +105,7 @@ class ImportedNoSolutionPanel:
                     if (more := len(conflict.words) - _MOST_CONSTRAINTS) > 0:
                         with ui.element("li"):
                             ui.label(say("imported.more", count=f"{more:,}"))
-                ui.label(say("decide.by-cpmpy" if conflict.finder == Finder.CPMPY else "decide.by-own")).classes("soft")
+                ui.label(found_by(conflict)).classes("soft")
 
 
 def _choice_card(title: str, hint: str, does: Callable[[], object]) -> None:

@@ -10,7 +10,8 @@ import pytest
 
 from robochoc.app.conflicts.process import conflict_in
 from robochoc.app.conflicts.rules import candidates, minimal, rule_of
-from robochoc.app.conflicts.search import Conflict, ConflictSearch, Finder
+from robochoc.app.conflicts.search import Conflict, ConflictSearch, Finder, found_by
+from robochoc.app.texts import say
 from tests.support.cases import looped
 from tests.support.rule_teams import can_hold, random_rules
 from tests.support.slot_sketches import slots
@@ -85,3 +86,12 @@ def found(search: ConflictSearch) -> Conflict:
     conflict = search.result()
     assert conflict is not None
     return conflict
+
+
+def test_what_to_install_is_said_where_cpmpy_is_missing(monkeypatch: pytest.MonkeyPatch) -> None:
+    install = "pip install 'robochoc[cpmpy]'"
+    assert found_by(Conflict(("a",), Finder.CPMPY)) == say("decide.by-cpmpy")
+    assert found_by(Conflict(("a",), Finder.OWN)) == say("decide.by-own")
+    monkeypatch.setattr("robochoc.app.conflicts.search.find_spec", lambda _: None)
+    assert found_by(Conflict(("a",), Finder.OWN)).endswith(install)
+    assert found_by(Conflict(None, Finder.OWN, late=True)).endswith(install)
