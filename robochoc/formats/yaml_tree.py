@@ -140,7 +140,7 @@ class Node:
         found = self.get(key)
         if found is not None:
             return found
-        keys = {shown(one)[:40]: one for one in self._value} if isinstance(self._value, dict) else {}
+        keys = {scalar_text(one)[:40]: one for one in self._value} if isinstance(self._value, dict) else {}
         for close in difflib.get_close_matches(key, [one for one in keys if one != key], n=1, cutoff=_ALIKE):
             message = f"unknown key '{shortened(close)}' in {owner}"
             raise MistakeError(message, f"did you mean '{key}'?", self.key_line(keys[close]))
@@ -174,7 +174,7 @@ class Node:
             for key, one in self._value.items():
                 if key in self._asked:
                     if not one.is_done:
-                        yield one, (path, shown(key))
+                        yield one, (path, scalar_text(key))
                 elif not one.is_named:  # a part that is repeated by an alias need not be read here
                     yield self._unknown(key, path)
 
@@ -188,7 +188,9 @@ class Node:
         where = f" in {_written(path)}" if path else ""
         known = sorted(str(one) for one in self._asked)
         return MistakeError(
-            f"unknown key '{shortened(shown(key))}'{where}", suggestion(shown(key), known, "keys"), self.key_line(key)
+            f"unknown key '{shortened(scalar_text(key))}'{where}",
+            suggestion(scalar_text(key), known, "keys"),
+            self.key_line(key),
         )
 
     def append(self, node: Node) -> None:
@@ -385,7 +387,7 @@ class _Composer:
                 holder.merged.update({key: one for key, one in source.named() if key not in holder.merged})
             holder.node.merge(holder.merged)
         elif not holder.node.enter(key, node, line):
-            self._repeated(line, shown(key))
+            self._repeated(line, scalar_text(key))
 
     def _key(self, node: Node) -> Scalar:
         if not node.is_scalar:
@@ -442,7 +444,7 @@ class _Open:
     merged: dict[Scalar, Node] = field(default_factory=dict)
 
 
-def shown(value: Scalar) -> str:
+def scalar_text(value: Scalar) -> str:
     """Return `value` as Python's `str` does: pyDCOP compares this text with the words of a table."""
     return repr(float(value)) if isinstance(value, Fraction) else str(value)
 

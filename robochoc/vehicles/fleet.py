@@ -15,7 +15,7 @@ import msgspec
 
 from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
-from robochoc.formats.yaml_tree import Node, read_yaml, shown
+from robochoc.formats.yaml_tree import Node, read_yaml, scalar_text
 from robochoc.system.errors import RobochocError
 from robochoc.vehicles.frames import FAR_M, LATITUDE_MAX, GpsPlace
 from robochoc.vehicles.kinds import VehicleKind, address_of, shared_port
@@ -165,7 +165,7 @@ def _vehicles(node: Node, kind: VehicleKind, origin: GpsPlace | None) -> dict[st
     names: dict[str, str] = {}
     _check_mapping(node, "'vehicles'")
     for key, entry in node.named():
-        name = shown(key)
+        name = scalar_text(key)
         link = _link(entry, name, kind, origin)
         address = address_of(link.url)
         if address in names:
@@ -200,7 +200,7 @@ def _url(node: Node, name: str, kind: VehicleKind) -> str:
     if isinstance(text, str) and found and (found["port"] is None or int(found["port"]) in _PORTS):
         return text
     raise MistakeError(
-        f"the link of {shortened(name)}, {shortened(shown(text))!r}, is not valid",
+        f"the link of {shortened(name)}, {shortened(scalar_text(text))!r}, is not valid",
         f"expected {kind.rules.links}",
         node.line,
     )
@@ -232,7 +232,7 @@ def _end(node: Node) -> AtEnd:
     for how in AtEnd:
         if node.scalar == how.value:
             return how
-    raise MistakeError(f"'end' is {shortened(shown(node.scalar))!r}", f"expected {' or '.join(AtEnd)}", node.line)
+    raise MistakeError(f"'end' is {shortened(scalar_text(node.scalar))!r}", f"expected {' or '.join(AtEnd)}", node.line)
 
 
 def _point(node: Node, what: str) -> Point:
@@ -249,7 +249,7 @@ def _number(root: Node, name: str, usual: float, least: float, most: float) -> f
         return usual
     found = _decimal(node)
     if found is None or not least <= found <= most:
-        given = shortened(shown(node.scalar))
+        given = shortened(scalar_text(node.scalar))
         raise MistakeError(f"'{name}' is {given!r}", f"expected {least:g} to {most:,g}", node.line)
     return found
 

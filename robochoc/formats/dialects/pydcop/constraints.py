@@ -17,7 +17,7 @@ from robochoc.formats.dialects.pydcop.domains import DomainValues
 from robochoc.formats.dialects.pydcop.python_function import PythonFunction
 from robochoc.formats.dialects.pydcop.python_values import NoValueError, Value
 from robochoc.formats.dialects.pydcop.translation import VariableInfo, ViolationCost, translate
-from robochoc.formats.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 from robochoc.model.expression import Expression
 from robochoc.model.expression.bounds import Interval, bounds
 
@@ -216,7 +216,7 @@ def _tuple_words(scope: Sequence[str], node: Node) -> Iterator[tuple[int, list[s
         elif isinstance(one.scalar, str):
             yield from ((one.line, part.split()) for part in one.scalar.split("|"))
         else:
-            yield one.line, [shown(one.scalar)]
+            yield one.line, [scalar_text(one.scalar)]
 
 
 def load_functions(path: Path) -> dict[str, Callable[..., Value]]:

@@ -11,7 +11,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.dialect import NameMap
 from robochoc.formats.dialects.exact_costs import xml_name
 from robochoc.formats.names import check_integer
-from robochoc.formats.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 from robochoc.model.constraint import Domain
 
 _HINT = "write values: [R, G] or [0..4]"
@@ -32,7 +32,7 @@ class DomainValues:
     @cached_property
     def codes(self) -> dict[str, int]:
         """The integers in the team, by the words in tables of the file: Python's `str` of the values."""
-        return {shown(value): code for code, value in self.scalars.items()}
+        return {scalar_text(value): code for code, value in self.scalars.items()}
 
     @property
     def kind(self) -> type | None:
@@ -62,7 +62,7 @@ class Domains:
         return self._symbols.originals.items()
 
     def _label(self, value: Scalar) -> str:
-        return self._symbols.allowed(shown(value))
+        return self._symbols.allowed(scalar_text(value))
 
     def _named(self, name: str, values: Iterable[Scalar]) -> DomainValues:
         scalars = {self._places[self._label(value)]: value for value in values}
@@ -103,9 +103,11 @@ def _scalars(name: str, node: Node) -> list[Scalar]:
         raise MistakeError(what, "use a smaller domain", node.line)
     seen: dict[str, Scalar] = {}
     for value, one in zip(found, values.items, strict=True):
-        known = seen.setdefault(shown(value), value)
+        known = seen.setdefault(scalar_text(value), value)
         if type(known) is not type(value):
-            what = f"the domain '{shortened(name)}' has two different values with the text {shortened(shown(value))}"
+            what = (
+                f"the domain '{shortened(name)}' has two different values with the text {shortened(scalar_text(value))}"
+            )
             raise MistakeError(what, "rename one of them", one.line)
     return found
 

@@ -19,7 +19,7 @@ from robochoc.formats.dialects.pydcop.files import ProblemFiles, SourceText, rea
 from robochoc.formats.dialects.pydcop.owners import VariableOwners, agent_names, name_text
 from robochoc.formats.dialects.pydcop.scenario import read_scenario
 from robochoc.formats.dialects.pydcop.translation import ViolationCost
-from robochoc.formats.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import (
     INFINITE,
@@ -312,7 +312,7 @@ def _is_soft(constraint: Constraint) -> bool:
 
 def _values(name: str, node: Node, domains: Domains) -> DomainValues:
     domain = _mapping(node, f"the variable '{shortened(name)}'").get("domain")
-    domain_name = shown(domain.scalar) if domain is not None else ""
+    domain_name = scalar_text(domain.scalar) if domain is not None else ""
     if domain_name not in domains.all:
         what = f"the variable '{shortened(name)}' has no domain, or an unknown one"
         raise MistakeError(what, suggestion(domain_name, list(domains.all), "domains"), node.line)

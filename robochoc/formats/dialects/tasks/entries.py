@@ -10,7 +10,7 @@ from fractions import Fraction
 from typing import TypeVar
 
 from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, shortened, suggestion
-from robochoc.formats.yaml_tree import Node, Scalar, shown
+from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 
 Point = tuple[Fraction, ...]
 
@@ -139,7 +139,7 @@ class EntryReader:
         for member in kind:
             if node.scalar == member.value:
                 return member
-        raise self._mistake(key, node, suggestion(shown(node.scalar), [one.value for one in kind], "words"))
+        raise self._mistake(key, node, suggestion(scalar_text(node.scalar), [one.value for one in kind], "words"))
 
     def node(self, key: str) -> Node | None:
         """Return the value of `key`; None if the key is missing."""
@@ -156,13 +156,13 @@ class EntryReader:
         return Fraction(scalar)
 
     def _mistake(self, key: str, node: Node, hint: str) -> MistakeError:
-        value = f"'{shortened(shown(node.scalar))}'" if node.is_scalar else "this value"
+        value = f"'{shortened(scalar_text(node.scalar))}'" if node.is_scalar else "this value"
         return MistakeError(f"{self._what} cannot have {value} as '{key}'", hint, node.line)
 
 
 def name_text(value: Scalar) -> str:
     """Return a name as text, even if YAML reads it as a number (7) or a truth value (yes)."""
-    return "yes" if value is True else "no" if value is False else shown(value)
+    return "yes" if value is True else "no" if value is False else scalar_text(value)
 
 
 def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEntry]:
