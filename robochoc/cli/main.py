@@ -11,7 +11,7 @@ import signal
 import sys
 import time
 
-from robochoc.system.signals import Terminated
+from robochoc.system.termination import Terminated
 
 TYPE_CHECKING = False  # see robochoc/__init__.py
 if TYPE_CHECKING:

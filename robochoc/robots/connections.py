@@ -16,7 +16,7 @@ from robochoc.robots.source import Source, SourceError
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.files import resolved
 from robochoc.system.installed import entry_points_named, load_entry_point, not_installed_message
-from robochoc.system.signals import Terminated
+from robochoc.system.termination import Terminated
 
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 

@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from robochoc.system.entry_points import EntryPoint, entry_points
-from robochoc.system.signals import Terminated
+from robochoc.system.termination import Terminated
 
 Fault = Callable[[object], str]
 """Returns the reason why a loaded object cannot be used; empty if it can."""

@@ -18,10 +18,6 @@ _delayed_threads: set[int] = set()
 """The threads in which signals are delayed."""
 
 
-class Terminated(SystemExit):
-    """Raised on SIGTERM. Unlike other `SystemExit`s, it is never raised by the code of a package."""
-
-
 @contextmanager
 def signals_delayed() -> Iterator[None]:
     """Delay Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) in the block: unfinished work would be lost.

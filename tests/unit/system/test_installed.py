@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.robots import connections
 from robochoc.system.installed import load_entry_point
-from robochoc.system.signals import Terminated
+from robochoc.system.termination import Terminated
 
 
 class Struck:
