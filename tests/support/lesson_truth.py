@@ -24,14 +24,14 @@ from itertools import product
 
 from robochoc.app.lessons.lesson import ROBOTS, AnswerChoice, Lesson, LessonStep, TeamSpec
 from robochoc.app.lessons.record import model_of
-from robochoc.app.lessons.recording import LessonTurn, RecordedRun
+from robochoc.app.lessons.recording import LessonRun, LessonTurn
 
 
-def is_true(lesson: Lesson, runs: Mapping[str, RecordedRun], step: LessonStep, choice: AnswerChoice) -> bool:
+def is_true(lesson: Lesson, runs: Mapping[str, LessonRun], step: LessonStep, choice: AnswerChoice) -> bool:
     """Return whether what the choice claims is so."""
     kind, _, rest = step.about.partition(" ")
     team = lesson.team_of(step)
-    run = runs.get(step.run, RecordedRun(""))
+    run = runs.get(step.run, LessonRun(""))
     if kind == "next":
         return _next(run, run.turns[step.turn], choice, step.turn)
     if kind == "levels":
@@ -52,7 +52,7 @@ def breaks(team: TeamSpec, choice: AnswerChoice) -> bool:
     return choice.breaks in team.apart and choice.levels[one] == choice.levels[other]
 
 
-def _next(run: RecordedRun, turn: LessonTurn, choice: AnswerChoice, number: int) -> bool:
+def _next(run: LessonRun, turn: LessonTurn, choice: AnswerChoice, number: int) -> bool:
     if choice.words:
         return any((run.messages[one].to, run.messages[one].words) == (choice.to, choice.words) for one in turn.said)
     if choice.silent:
@@ -66,17 +66,17 @@ def _next(run: RecordedRun, turn: LessonTurn, choice: AnswerChoice, number: int)
 # Who
 
 
-def _told(_: TeamSpec, run: RecordedRun, step: LessonStep, words: str) -> set[str]:
+def _told(_: TeamSpec, run: LessonRun, step: LessonStep, words: str) -> set[str]:
     said = (run.messages[one] for one in run.turns[step.turn].said)
     return {one.to for one in said if words in one.words}
 
 
-def _hears(_: TeamSpec, run: RecordedRun, step: LessonStep, words: str) -> set[str]:
+def _hears(_: TeamSpec, run: LessonRun, step: LessonStep, words: str) -> set[str]:
     del step
     return {one.to for one in run.messages if f"{words.strip()} " in one.words}
 
 
-def _knows(team: TeamSpec, run: RecordedRun, step: LessonStep, pair: str) -> set[str]:
+def _knows(team: TeamSpec, run: LessonRun, step: LessonStep, pair: str) -> set[str]:
     del run, step
     files = model_of(team).team
     return {
@@ -87,17 +87,17 @@ def _knows(team: TeamSpec, run: RecordedRun, step: LessonStep, pair: str) -> set
     }
 
 
-def _neighbours(team: TeamSpec, run: RecordedRun, step: LessonStep, name: str) -> set[str]:
+def _neighbours(team: TeamSpec, run: LessonRun, step: LessonStep, name: str) -> set[str]:
     del run, step
     return {robot for pair in team.apart if name in pair for robot in pair} - {name}
 
 
-def _children(_: TeamSpec, run: RecordedRun, step: LessonStep, name: str) -> set[str]:
+def _children(_: TeamSpec, run: LessonRun, step: LessonStep, name: str) -> set[str]:
     del step
     return {one.to for one in run.messages if one.sender == name and one.kind == "Token"}
 
 
-_ROBOTS: dict[str, Callable[[TeamSpec, RecordedRun, LessonStep, str], set[str]]] = {
+_ROBOTS: dict[str, Callable[[TeamSpec, LessonRun, LessonStep, str], set[str]]] = {
     "told": _told, "hears": _hears, "rule": _knows, "neighbours": _neighbours, "children": _children,
 }  # fmt: skip
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import robochoc
 from robochoc.app.lessons.lesson import ROBOTS, Lesson, RunSpec, TeamSpec
-from robochoc.app.lessons.recording import LessonMessage, LessonTurn, RecordedRun
+from robochoc.app.lessons.recording import LessonMessage, LessonRun, LessonTurn
 from robochoc.journal.entries import Header
 from robochoc.journal.events import AnyEvent
 from robochoc.modelling.model import Model
@@ -21,7 +21,7 @@ LEVEL = "level"
 AUTO = "auto"
 
 
-def recorded(lesson: Lesson) -> dict[str, RecordedRun]:
+def recorded(lesson: Lesson) -> dict[str, LessonRun]:
     """Run and return the recordings of a lesson."""
     return {name: _recorded(lesson.teams[run.team], run) for name, run in lesson.runs.items()}
 
@@ -45,11 +45,11 @@ def model_of(spec: TeamSpec) -> Model:
     return model
 
 
-def _recorded(spec: TeamSpec, run: RunSpec) -> RecordedRun:
+def _recorded(spec: TeamSpec, run: RunSpec) -> LessonRun:
     model = model_of(spec)
     if run.protocol == AUTO:
         choice = choose(model.team, Options(protocol=AUTO))
-        return RecordedRun(choice.options.protocol, choice.options.chosen["protocol"])
+        return LessonRun(choice.options.protocol, choice.options.chosen["protocol"])
     events: list[AnyEvent] = []
     found = model.solve(
         run.protocol,
@@ -62,7 +62,7 @@ def _recorded(spec: TeamSpec, run: RunSpec) -> RecordedRun:
     )
     events.sort(key=lambda event: event.t)
     messages, turns = _messages_and_turns(events, run)
-    return RecordedRun(
+    return LessonRun(
         run.protocol,
         messages=messages,
         turns=turns,

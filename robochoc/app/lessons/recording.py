@@ -32,7 +32,7 @@ class LessonTurn(msgspec.Struct, frozen=True, omit_defaults=True):
     why: tuple[str, ...] = ()
 
 
-class RecordedRun(msgspec.Struct, frozen=True, omit_defaults=True):
+class LessonRun(msgspec.Struct, frozen=True, omit_defaults=True):
     """A run: its protocol, the reason for its choice, messages and turns in order, verdict and cost."""
 
     protocol: str
@@ -56,10 +56,10 @@ class LessonMoment(msgspec.Struct, frozen=True):
 
 
 @cache
-def recordings(number: int) -> dict[str, RecordedRun]:
+def recordings(number: int) -> dict[str, LessonRun]:
     """Return the runs of a lesson by their names."""
     file = files(__package__) / "runs" / f"{number:02}.json"
-    return msgspec.json.decode(file.read_bytes(), type=dict[str, RecordedRun])
+    return msgspec.json.decode(file.read_bytes(), type=dict[str, LessonRun])
 
 
 def before(number: int, step: LessonStep) -> LessonMoment:

@@ -119,7 +119,7 @@ class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
     Attributes:
         id: Its name in the team: `R1`, `R2`, ...
-        kind: The key of the rule in the palette (`palette.PALETTE`).
+        kind: The key of the rule in the palette (`rules.PALETTE`).
         decision: The decision that it restricts.
         robots: The robots of the rule. Empty: all robots with the decision. In rules with a leader, the first one.
         settings: The values of the rule's fields, by name: a number, a value, or several values.

@@ -11,7 +11,7 @@ from robochoc.app.lessons.lesson import COUNT, ROBOTS, Lesson, LessonStep, lesso
 from robochoc.app.lessons.picture import HEIGHT, WIDTH, picture
 from robochoc.app.lessons.progress import LessonProgress
 from robochoc.app.lessons.record import recorded
-from robochoc.app.lessons.recording import RecordedRun, after, before, reasons, recordings
+from robochoc.app.lessons.recording import LessonRun, after, before, reasons, recordings
 from tests.support.cases import looped
 from tests.support.lesson_truth import breaks, is_true
 
@@ -63,7 +63,7 @@ def test_what_protocols_no_longer_say_is_noticed() -> None:
     taught = lesson(3)
     runs = recordings(3)
     run = runs["abt"]
-    others = {"abt": RecordedRun(run.protocol, messages=run.messages[::-1], turns=run.turns)}
+    others = {"abt": LessonRun(run.protocol, messages=run.messages[::-1], turns=run.turns)}
     assert not any(is_true(taught, others, step, step.answer) for step in taught.steps[:2])
 
 
