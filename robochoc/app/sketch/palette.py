@@ -2,7 +2,8 @@
 
 A rule of the palette defines the kinds of decisions that it fits, its fields, the robots that it links in the picture,
 and its condition. The condition can be applied to terms of a `robochoc.Model`, to Python text, which the user can copy
-(`python_text`), and to values, for which it is true or false. Its sentence is in the catalogue (`app/texts`): `rule.KEY`.
+(`python_text`), and to values, for which it is true or false. Its sentence is in the catalogue (`app/texts`) under
+`rule.KEY`.
 """
 
 from __future__ import annotations
