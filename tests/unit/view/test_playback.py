@@ -323,7 +323,7 @@ def test_too_many_are_not_flown(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(previews, "_FLIGHTS_MAX", 14)
     scene = flown_scene_of(epochs_of_three(), five())
     assert scene.playback is None
-    assert dict(scene.facts)["flight"].startswith("none: 5 drones in 3 epochs are more than")
+    assert dict(scene.facts)["flight"].startswith("none: 5 drones in 3 epochs are too many")
 
 
 def test_a_flight_whose_legs_are_others_still_plays() -> None:
