@@ -200,7 +200,7 @@ class ArrayMaxSum(CycleRun):
         self._preferred: list[Floats] = []
 
     def _start_active(self) -> None:
-        """Choose the cheapest values, send domains, and build functions (`MaxSum.begin`, `MaxSum._build`)."""
+        """Choose the cheapest values, send domains, and build functions (`MaxSum._make_functions`)."""
         self._preferred = [self._prefer(group) for group in self.layout.groups]
         for group, preferred in zip(self.layout.groups, self._preferred, strict=True):
             active = slice(group.first, group.first + group.active)
