@@ -86,16 +86,15 @@ class Fleet(msgspec.Struct, frozen=True):
     kind: VehicleKind = VehicleKind.MAVLINK
     speed_ms: float = 1.0
     """The highest speed, in m/s, for kinds of vehicles that need it."""
+    distance_m: float = 1.0
+    """The distance that vehicles keep from each other, between their centres."""
+    downwash: float = 1.0
+    """The vertical distance between vehicles, as a multiple of `distance_m`."""
 
     @property
     def connect_s(self) -> float:
         """The longest time from the first message of a vehicle until it has reported everything, in seconds."""
         return max(self.patience_s, self.kind.rules.connect_s)
-
-    distance_m: float = 1.0
-    """The distance that vehicles keep from each other, between their centres."""
-    downwash: float = 1.0
-    """The vertical distance between vehicles, as a multiple of `distance_m`."""
 
     @property
     def tolerance_m(self) -> float:

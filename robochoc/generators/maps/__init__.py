@@ -1,1 +1,1 @@
-"""Families of problems on a map: a robot's values are the cells that it can get to, and ways cost time."""
+"""Families of problems on a map: a robot's values are the cells that it can reach, at the cost of travel times."""

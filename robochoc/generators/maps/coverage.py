@@ -2,7 +2,7 @@
 
 The aim is that of Cortes, Martinez, Karatas and Bullo, "Coverage control for mobile sensing networks", IEEE
 Transactions on Robotics and Automation 20 (2004), and of mobile sensing teams (Zivan and others, JAAMAS 29, 2015): one
-step, in which each robot chooses among the cells that it can get to.
+step, in which each robot chooses among the cells that it can reach.
 
 A robot sees the free cells within its sensing range to which a straight line is free. Seen area is worth travel time.
 The area that the team sees, a union, is a function over all robots. Here it is approximated by pairs: the sum of the
@@ -57,13 +57,13 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
 
     Raises:
         InvalidInputError: A file is not a valid map.
-        ValueError: A number is out of its bounds, or a robot can get to no cell.
+        ValueError: A number is out of its bounds, or a robot cannot reach any cell.
     """
     range_m, seconds = exact("sensing", sensing, 0, 1000), exact("worth", worth, 0, 10_000)
     reachability = reachability_of(choice, seeded(seed))
     for number, own in enumerate(reachability.seconds, 1):
         if not own:
-            raise ValueError(f"robot {number} can get to no cell; use smaller cells, or allow more time")
+            raise ValueError(f"robot {number} cannot reach any cell; use smaller cells, or allow more time")
     seen = lines_of_sight(reachability.cells).visible_cells(range_m)
     a_cell = worth_of_a_cell(reachability, seconds)
     most = [max(len(seen[cell]) for cell in own) for own in reachability.seconds]
@@ -105,7 +105,7 @@ def _overlaps(values: Sequence[Mapping[int, int]], seen: Seen, a_cell: int) -> I
         if left < 0:
             raise ValueError(
                 f"the robots could see the same from more than {MAX_TUPLES:,} pairs of cells;"
-                " use larger cells, fewer robots, or less sensing or within"
+                " use larger cells, fewer robots, or smaller values of sensing or within"
             )
         if twice and a_cell:
             costs = tuple(a_cell * count for count in twice.values())

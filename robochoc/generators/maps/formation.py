@@ -6,7 +6,7 @@ slots are assigned to robots (ST-SR-IA in Gerkey and Mataric, IJRR 23, 2004): no
 sum of their travel times is minimised. All slots have the same worth, and a robot chooses among those that it can get
 to.
 
-A slot of the shape may be in a wall, or unreachable: it is moved to the nearest cell that a robot can get to and that
+A slot of the shape may be in a wall, or unreachable: it is moved to the nearest cell that a robot can reach and that
 no slot before it has.
 """
 
@@ -87,7 +87,7 @@ def formation(
 
     Raises:
         InvalidInputError: A file is not a valid map, or not a valid list of offsets.
-        ValueError: A number is out of its bounds, or a robot can get to no slot.
+        ValueError: A number is out of its bounds, or a robot cannot reach any slot.
     """
     check_bounds({"spacing": (spacing, 0.001, MAX_SPACING), "heading": (heading, -360, 360)})
     middle = places_in(anchor, "anchor")
@@ -103,7 +103,7 @@ def formation(
     values = [sorted(set(slots) & own.keys()) for own in reachability.seconds]
     for number, own in enumerate(values, 1):
         if not own:
-            raise ValueError(f"robot {number} can get to no slot; move the anchor, or allow more time")
+            raise ValueError(f"robot {number} cannot reach any slot; move the anchor, or allow more time")
     travel = [
         cost_constraint("travel", f"V{number}", {cell: seconds[cell] for cell in own})
         for number, (own, seconds) in enumerate(zip(values, reachability.seconds, strict=True), 1)
@@ -121,7 +121,7 @@ def formation(
 
 
 def slots_of(reachability: Reachability, offsets: Sequence[Offset], anchor: Place, heading: float) -> list[int]:
-    """Return the cell of each slot: the nearest one that a robot can get to and no slot before it has.
+    """Return the cell of each slot: the nearest one that a robot can reach and no slot before it has.
 
     Of cells that are equally near, the one of the lowest number.
 
@@ -130,7 +130,7 @@ def slots_of(reachability: Reachability, offsets: Sequence[Offset], anchor: Plac
     """
     left = set(reachability.reached)
     if len(left) < len(offsets):
-        raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; use smaller cells")
+        raise ValueError(f"robots can reach {len(left)} cells, fewer than {len(offsets)} slots; use smaller cells")
     slots = []
     for x, y in _turned(offsets, heading):
         slots.append(reachability.nearest((anchor[0] + x, anchor[1] + y, *anchor[2:]), left))

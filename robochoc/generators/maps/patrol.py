@@ -81,7 +81,7 @@ def patrol(
 
     Raises:
         InvalidInputError: A file is not a valid map.
-        ValueError: A number is out of its bounds, or a robot can get to no point.
+        ValueError: A number is out of its bounds, or a robot cannot reach any point.
     """
     chance = seeded(seed)
     given = places_in(visit, "visit")
@@ -97,7 +97,7 @@ def patrol(
         raise ValueError(f"{count} points in {rounds} rounds have more than {MAX_PLANS:,} plans; use fewer of them")
     if count > len(reachability.reached):
         raise ValueError(
-            f"robots can get to {len(reachability.reached)} cells, fewer than {count} points; use smaller cells"
+            f"robots can reach {len(reachability.reached)} cells, fewer than {count} points; use smaller cells"
         )
     chosen = _nearest(reachability, given) if given else drawn_points(reachability, count, chance)
     idleness = {point: random_integer(chance, 0, idle) * 10**PLACES for point in chosen}
@@ -121,7 +121,7 @@ def patrol(
 
 
 def drawn_points(reachability: Reachability, count: int, chance: Random) -> list[int]:
-    """Return points of interest that are spread over the cells that robots can get to."""
+    """Return points of interest that are spread over the cells that robots can reach."""
     cells = reachability.reached
     found = [cells[random_integer(chance, 0, len(cells) - 1)]]
     away = dict.fromkeys(cells, MAX_IDLE**2)
@@ -135,13 +135,13 @@ def drawn_points(reachability: Reachability, count: int, chance: Random) -> list
 
 
 class _Plan:
-    """The visits of a robot: a variable for each round, whose values are the points that it can get to."""
+    """The visits of a robot: a variable for each round, whose values are the points that it can reach."""
 
     def __init__(self, reachability: Reachability, number: int, points: Sequence[int], rounds: int) -> None:
         self.number = number
         self.first = [point for point in points if point in reachability.seconds[number - 1]]
         if not self.first:
-            raise ValueError(f"robot {number} can get to no point; give other points, or allow more time")
+            raise ValueError(f"robot {number} cannot reach any point; give other points, or allow more time")
         self._points = points
         self.names = [f"V{number}"] if rounds == 1 else [f"V{number}.{turn}" for turn in range(1, rounds + 1)]
 

@@ -156,7 +156,7 @@ def test_pixels_are_summed_once_for_all_sides_of_cells(monkeypatch: pytest.Monke
 
 
 def reached(rows: list[str], start: Pixel, radius: Fraction, seconds_a_pixel: Fraction) -> dict[Pixel, int]:
-    """Return the tenths of seconds to each pixel that a robot can get to."""
+    """Return the tenths of seconds to each pixel that a robot can reach."""
     found = ways(start, fitting(rows, radius))
     return {pixel: floor(length * seconds_a_pixel * Fraction(2, 3) + Fraction(1, 2)) for pixel, length in found.items()}
 

@@ -201,7 +201,7 @@ def test_formations_on_a_map(tmp_path: Path) -> None:
             (
                 {"at": "1,1 3.5,1", "within": 1.5, "cell": 0.5, "radius": 0},
                 {"anchor": "1,1", "spacing": 0.5},
-                "robot 2 can get to no slot",
+                "robot 2 cannot reach any slot",
             ),
         ):
             choice = {"map": rooms, **({} if "at" in how else {"agents": 2}), **how}
@@ -232,7 +232,7 @@ def test_coverages_and_patrols() -> None:
         [
             (lambda: coverage(building(agents=2), sensing=-1), "sensing is -1"),
             (lambda: coverage(building(agents=2), worth=20_000), "worth is 20000"),
-            (lambda: coverage(building(at="1.1,1.1", within=0)), "robot 1 can get to no cell"),
+            (lambda: coverage(building(at="1.1,1.1", within=0)), "robot 1 cannot reach any cell"),
             (lambda: patrol(three, rounds=3), "3 robots make 9 visits, more than 6 points"),
             (lambda: patrol(three, points=101), "points is 101"),
             (lambda: patrol(three, rounds=5), "rounds is 5"),
@@ -243,7 +243,7 @@ def test_coverages_and_patrols() -> None:
             (lambda: patrol(building(agents=1), visit="1 2"), "visit has '1'"),
             (
                 lambda: patrol(building(at="1,1 9,5", within=3, cell=0.5), visit="1,1 1,2"),
-                "robot 2 can get to no point",
+                "robot 2 cannot reach any point",
             ),
         ]
     )
