@@ -7,24 +7,138 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator
+from itertools import islice
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
+from robochoc.formats.symbols import different_tables, mistyped_constraints
 from robochoc.formats.team_members import TeamMembers
+from robochoc.formats.tkc_copies import differing_copies
 from robochoc.model.magnitudes import MagnitudeError, Magnitudes
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Constraint, ConstraintModel, Parent, Robot
 
+MAX_BETWEEN = 1000
+"""The maximum number of mistakes between the robots of one team that are reported."""
 
-def excessive_numbers(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield constraints whose expressions may reach numbers that are too large."""
-    domains = {variable.name: variable.domain for robot in members.robots for variable in robot.variables}
-    magnitudes = Magnitudes(domains, max((robot.costs.places for robot in members.robots), default=0))
-    for member in members.files.values():
-        for constraint in member.robot.constraints():
-            try:
-                magnitudes.check(constraint)
-            except MagnitudeError as error:
-                yield member.places.constraint(constraint).mistake(error.message, error.hint)
+
+def check_between_robots(members: TeamMembers) -> list[Diagnostic]:
+    """Return the mistakes between the robots of a team."""
+    return list(islice(_between(members), MAX_BETWEEN))
+
+
+def _between(members: TeamMembers) -> Iterator[Diagnostic]:
+    yield from missing_robots(members)
+    yield from disagreements(members)
+    yield from cycles(members)
+    yield from out_of_order(members)
+    yield from mixed_kinds(members)
+    yield from mixed_costs(members)
+    yield from shared_variables(members)
+    yield from different_tables(members)
+    yield from mistyped_constraints(members)
+    scopes = list(misplaced_constraints(members))
+    yield from scopes
+    yield from misplaced_parts(members)
+    yield from missing_shown_variables(members)
+    yield from excessive_numbers(members)
+    yield from differing_copies(members, {mistake.file for mistake in scopes})
+
+
+def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield neighbours that the team lacks."""
+    known = dict.fromkeys([*members.files, *sorted(members.broken)])
+    for entry in members.entries.values():
+        if entry.other not in known:
+            name = shortened(entry.other)
+            absent, step = members.files[entry.robot.name].places.absent(name)
+            hint = f"{step}; {suggestion(name, known, 'robots')}"
+            yield entry.place.mistake(f"the {entry.role} '{name}' {absent}", hint)
+
+
+def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield pairs of neighbours that do not agree which of them is the parent."""
+    for entry in members.entries.values():
+        name, other = entry.robot.name, entry.other
+        answer = members.entries.get((other, name))
+        if answer is None and other in members.files:
+            message = f"the {entry.role} '{other}' does not list '{name}' as its {entry.role.opposite}"
+            hint = f'add <agent name="{name}"> there, among the {entry.role.opposite} agents ({members.place(other)})'
+            yield entry.place.mistake(message, hint)
+        elif answer and answer.role is entry.role and name < other:
+            message = f"'{other}' is listed as {entry.role}, but lists '{name}' as {entry.role} itself"
+            yield entry.place.mistake(message, f"change it here or at {answer.place}")
+
+
+def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield cycles of parents. No two of them have a link in common."""
+    parents = {name: set(agreed) for name, agreed in members.agreed.items()}
+    while True:
+        try:
+            priority_order(parents)
+        except CycleError as error:
+            links = []
+            for parent, child in zip(error.cycle, (*error.cycle[1:], error.cycle[0]), strict=True):
+                parents[child].discard(parent)
+                links.append(members.entries[child, parent])
+            elsewhere = " or ".join(str(link.place) for link in links[1:])
+            hint = f"delete one of these parents: here, or at {elsewhere}"
+            yield links[0].place.mistake(f"the parents form a cycle: {error}", hint)
+        else:
+            return
+
+
+def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots that differ from most others in being a DisCSP or a DisWCSP."""
+    usual = Counter(robot.kind for robot in members.robots).most_common(1)
+    for robot in members.robots:
+        if robot.kind is not usual[0][0]:
+            other = next(other for other in members.robots if other.kind is usual[0][0])
+            message = f"the robot is a {robot.kind}, but '{other.name}' is a {other.kind}"
+            hint = f"a team has one kind of problem: change the type here or at {members.place(other.name)}"
+            yield members.place(robot.name).mistake(message, hint)
+
+
+def mixed_costs(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots whose objective, or unit of costs, differs from that of most others."""
+    usual = Counter((robot.costs.maximize, robot.costs.places) for robot in members.robots).most_common(1)
+    for robot in members.robots:
+        maximize, places = robot.costs.maximize, robot.costs.places
+        if (maximize, places) == usual[0][0]:
+            continue
+        other = next(one for one in members.robots if (one.costs.maximize, one.costs.places) == usual[0][0])
+        if maximize is not other.costs.maximize:
+            message = f"the robot {_objective(robot)} costs, but '{other.name}' {_objective(other)} them"
+            hint = f"a team has one objective: change it here or at {members.place(other.name)}"
+        else:
+            message = f"costs with {places} decimal places, but '{other.name}' has {other.costs.places}"
+            hint = "use one unit of costs for all robots of the team"
+        yield members.place(robot.name).mistake(message, hint)
+
+
+def _objective(robot: Robot) -> str:
+    return "maximizes" if robot.costs.maximize else "minimizes"
+
+
+def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield variables that several robots own."""
+    for variable, (first, *others) in members.owners.items():
+        for other in others:
+            message = f"the variable '{shortened(variable)}' belongs to '{first}' too"
+            hint = f"names of variables are unique in a team: rename it here or at {members.place(first, variable)}"
+            yield members.place(other, variable).mistake(message, hint)
+
+
+def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots that precede one of their parents in the order of a team that was built in Python."""
+    rank = {name: place for place, name in enumerate(members.order)}
+    if not members.ranks:
+        return  # the links themselves have a mistake
+    for name, parents in members.agreed.items() if rank else ():
+        late = next((parent for parent in parents if rank[parent] > rank[name]), None)
+        if late is not None:
+            message = f"the robot precedes its parent '{late}' in the team"
+            hint = "list robots in priority order, parents before their children"
+            yield members.place(name).mistake(message, hint)
 
 
 def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
@@ -129,98 +243,13 @@ def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
                     yield members.files[robot.name].places.neighbour(child).mistake(message, hint)
 
 
-def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield neighbours that the team lacks."""
-    known = dict.fromkeys([*members.files, *sorted(members.broken)])
-    for entry in members.entries.values():
-        if entry.other not in known:
-            name = shortened(entry.other)
-            absent, step = members.files[entry.robot.name].places.absent(name)
-            hint = f"{step}; {suggestion(name, known, 'robots')}"
-            yield entry.place.mistake(f"the {entry.role} '{name}' {absent}", hint)
-
-
-def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield pairs of neighbours that do not agree which of them is the parent."""
-    for entry in members.entries.values():
-        name, other = entry.robot.name, entry.other
-        answer = members.entries.get((other, name))
-        if answer is None and other in members.files:
-            message = f"the {entry.role} '{other}' does not list '{name}' as its {entry.role.opposite}"
-            hint = f'add <agent name="{name}"> there, among the {entry.role.opposite} agents ({members.place(other)})'
-            yield entry.place.mistake(message, hint)
-        elif answer and answer.role is entry.role and name < other:
-            message = f"'{other}' is listed as {entry.role}, but lists '{name}' as {entry.role} itself"
-            yield entry.place.mistake(message, f"change it here or at {answer.place}")
-
-
-def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield cycles of parents. No two of them have a link in common."""
-    parents = {name: set(agreed) for name, agreed in members.agreed.items()}
-    while True:
-        try:
-            priority_order(parents)
-        except CycleError as error:
-            links = []
-            for parent, child in zip(error.cycle, (*error.cycle[1:], error.cycle[0]), strict=True):
-                parents[child].discard(parent)
-                links.append(members.entries[child, parent])
-            elsewhere = " or ".join(str(link.place) for link in links[1:])
-            hint = f"delete one of these parents: here, or at {elsewhere}"
-            yield links[0].place.mistake(f"the parents form a cycle: {error}", hint)
-        else:
-            return
-
-
-def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots that differ from most others in being a DisCSP or a DisWCSP."""
-    usual = Counter(robot.kind for robot in members.robots).most_common(1)
-    for robot in members.robots:
-        if robot.kind is not usual[0][0]:
-            other = next(other for other in members.robots if other.kind is usual[0][0])
-            message = f"the robot is a {robot.kind}, but '{other.name}' is a {other.kind}"
-            hint = f"a team has one kind of problem: change the type here or at {members.place(other.name)}"
-            yield members.place(robot.name).mistake(message, hint)
-
-
-def mixed_costs(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots whose objective, or unit of costs, differs from that of most others."""
-    usual = Counter((robot.costs.maximize, robot.costs.places) for robot in members.robots).most_common(1)
-    for robot in members.robots:
-        maximize, places = robot.costs.maximize, robot.costs.places
-        if (maximize, places) == usual[0][0]:
-            continue
-        other = next(one for one in members.robots if (one.costs.maximize, one.costs.places) == usual[0][0])
-        if maximize is not other.costs.maximize:
-            message = f"the robot {_objective(robot)} costs, but '{other.name}' {_objective(other)} them"
-            hint = f"a team has one objective: change it here or at {members.place(other.name)}"
-        else:
-            message = f"costs with {places} decimal places, but '{other.name}' has {other.costs.places}"
-            hint = "use one unit of costs for all robots of the team"
-        yield members.place(robot.name).mistake(message, hint)
-
-
-def _objective(robot: Robot) -> str:
-    return "maximizes" if robot.costs.maximize else "minimizes"
-
-
-def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield variables that several robots own."""
-    for variable, (first, *others) in members.owners.items():
-        for other in others:
-            message = f"the variable '{shortened(variable)}' belongs to '{first}' too"
-            hint = f"names of variables are unique in a team: rename it here or at {members.place(first, variable)}"
-            yield members.place(other, variable).mistake(message, hint)
-
-
-def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots that precede one of their parents in the order of a team that was built in Python."""
-    rank = {name: place for place, name in enumerate(members.order)}
-    if not members.ranks:
-        return  # the links themselves have a mistake
-    for name, parents in members.agreed.items() if rank else ():
-        late = next((parent for parent in parents if rank[parent] > rank[name]), None)
-        if late is not None:
-            message = f"the robot precedes its parent '{late}' in the team"
-            hint = "list robots in priority order, parents before their children"
-            yield members.place(name).mistake(message, hint)
+def excessive_numbers(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield constraints whose expressions may reach numbers that are too large."""
+    domains = {variable.name: variable.domain for robot in members.robots for variable in robot.variables}
+    magnitudes = Magnitudes(domains, max((robot.costs.places for robot in members.robots), default=0))
+    for member in members.files.values():
+        for constraint in member.robot.constraints():
+            try:
+                magnitudes.check(constraint)
+            except MagnitudeError as error:
+                yield member.places.constraint(constraint).mistake(error.message, error.hint)

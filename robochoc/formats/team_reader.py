@@ -11,8 +11,9 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodabl
 from robochoc.formats.robot_reader import RobotFile, read_robot_file
 from robochoc.formats.scenario_reader import SCENARIO, has_scenario, places_of_scenario, read_scenario
 from robochoc.formats.symbols import SymbolTable
+from robochoc.formats.team_consistency import check_between_robots
 from robochoc.formats.team_members import TeamMembers
-from robochoc.formats.validation import check_between_robots, note_valid
+from robochoc.formats.validation import note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.model.symbols import with_table_everywhere

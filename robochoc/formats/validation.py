@@ -11,7 +11,6 @@ import weakref
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
-from itertools import islice
 from typing import TypeVar
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
@@ -24,29 +23,13 @@ from robochoc.formats.robot_rules import (
     check_constraint_of_added_robot,
 )
 from robochoc.formats.robot_validation import RobotValidator, repeated_robots
-from robochoc.formats.symbols import check_argument_types, different_tables, mistyped_constraints, symbolic_by_variable
-from robochoc.formats.team_consistency import (
-    cycles,
-    disagreements,
-    excessive_numbers,
-    misplaced_constraints,
-    misplaced_parts,
-    missing_robots,
-    missing_shown_variables,
-    mixed_costs,
-    mixed_kinds,
-    out_of_order,
-    shared_variables,
-)
+from robochoc.formats.symbols import check_argument_types, symbolic_by_variable
+from robochoc.formats.team_consistency import check_between_robots
 from robochoc.formats.team_members import TeamMember, TeamMembers
-from robochoc.formats.tkc_copies import differing_copies
 from robochoc.model.change import ExcessiveChangeError, apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
 from robochoc.model.team_edits import ChangeError
-
-MAX_BETWEEN = 1000
-"""The maximum number of mistakes between the robots of one team that are reported."""
 
 _NO_CHANGES = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
@@ -156,29 +139,6 @@ def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
     for mistake in found:
         seen[mistake] += 1
         yield mistake if seen[mistake] == 1 else replace(mistake, file=f"{mistake.file} (no. {seen[mistake]})")
-
-
-def check_between_robots(members: TeamMembers) -> list[Diagnostic]:
-    """Return the mistakes between the robots of a team."""
-    return list(islice(_between(members), MAX_BETWEEN))
-
-
-def _between(members: TeamMembers) -> Iterator[Diagnostic]:
-    yield from missing_robots(members)
-    yield from disagreements(members)
-    yield from cycles(members)
-    yield from out_of_order(members)
-    yield from mixed_kinds(members)
-    yield from mixed_costs(members)
-    yield from shared_variables(members)
-    yield from different_tables(members)
-    yield from mistyped_constraints(members)
-    scopes = list(misplaced_constraints(members))
-    yield from scopes
-    yield from misplaced_parts(members)
-    yield from missing_shown_variables(members)
-    yield from excessive_numbers(members)
-    yield from differing_copies(members, {mistake.file for mistake in scopes})
 
 
 def _team_mistakes(team: Team) -> list[Diagnostic]:

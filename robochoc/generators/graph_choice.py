@@ -32,67 +32,6 @@ READERS = {
 """The reader of networkx for each ending of a file's name."""
 
 
-def read_graph(path: Path) -> Graph:
-    """Return the graph in the file `path`. Directions, parallel edges and attributes of edges are ignored.
-
-    Nodes are numbered from 1: in the order of their numbers if all are integers, otherwise in that of the file.
-
-    Raises:
-        InvalidInputError: if the file is not a valid graph, or networkx is not installed.
-    """
-    reader = READERS.get(path.suffix.lower())
-    if reader is None:
-        raise _invalid(path, f"'{path.suffix}' is not a type of graph files", f"supported: {' '.join(READERS)}")
-    content = _content(path)
-    try:
-        import networkx as nx  # noqa: PLC0415 - an extra
-    except ImportError:
-        raise _invalid(path, "graph files require networkx", "run: pip install 'robochoc[graphs]'") from None
-    from io import BytesIO  # noqa: PLC0415 - start-up: only to read a graph
-
-    options = {"data": False} if reader == "read_edgelist" else {}
-    try:
-        graph = getattr(nx, reader)(BytesIO(content), **options)
-        nodes, edges = list(graph.nodes), [(one, other) for one, other, *_ in graph.edges]
-    except Exception as error:  # noqa: BLE001 - networkx raises what its parsers raise
-        raise _invalid(path, "networkx cannot read it", f"correct the file: {error}") from None
-    numbered = _numbered(nodes)
-    if not 1 <= len(nodes) <= MAX_NODES:
-        raise _invalid(path, f"the graph has {len(nodes)} nodes", f"it must have from 1 to {MAX_NODES}")
-    for one, other in edges:
-        if one == other:
-            raise _invalid(path, f"the node {one!s:.100} is linked to itself", "delete this edge")
-    known: list[Edge] = sorted({(min(pair), max(pair)) for pair in ((numbered[a], numbered[b]) for a, b in edges)})
-    label = re.sub(r"[^A-Za-z0-9_.]+", "-", path.stem)[:MAX_LABEL].strip("-.") or "graph"
-    return Graph(len(nodes), label, lambda _: list(known))
-
-
-def _content(path: Path) -> bytes:
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise _invalid(path, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
-    if len(content) > MAX_BYTES:
-        raise _invalid(path, "is too large", f"use a file of at most {MAX_BYTES:,} bytes")
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
-        raise _invalid(path, "defines entities", "delete the document type: GraphML and GEXF need none")
-    return content
-
-
-def _numbered(nodes: Iterable[Hashable]) -> dict[Hashable, int]:
-    """Return the number of each node."""
-    named = {node: str(node) for node in nodes}
-    if all(name.removeprefix("-").isdecimal() and len(name) < 20 for name in named.values()):  # noqa: PLR2004 - 64 bits
-        named = dict(sorted(named.items(), key=lambda node: int(node[1])))
-    return {node: number for number, node in enumerate(named, 1)}
-
-
-def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
-    hint = " ".join(chain.from_iterable(part.split() for part in hint.split("\n")))
-    return InvalidInputError([Diagnostic(str(path), 0, message, hint[:300])])
-
-
 KINDS = tuple(map(str, GraphKind))
 _KINDS_OF = {
     "links": (GraphKind.SCALE_FREE,),
@@ -181,3 +120,67 @@ class GraphChoice:
             raise ValueError(f"{dashes}graph {self.kind!r} is not one of {', '.join(KINDS)}, nor a file{hint}")
         if self.agents is not None:
             raise ValueError(f"{dashes}agents follows from the graph in the file; leave it out")
+
+
+# Graphs in files
+
+
+def read_graph(path: Path) -> Graph:
+    """Return the graph in the file `path`. Directions, parallel edges and attributes of edges are ignored.
+
+    Nodes are numbered from 1: in the order of their numbers if all are integers, otherwise in that of the file.
+
+    Raises:
+        InvalidInputError: if the file is not a valid graph, or networkx is not installed.
+    """
+    reader = READERS.get(path.suffix.lower())
+    if reader is None:
+        raise _invalid(path, f"'{path.suffix}' is not a type of graph files", f"supported: {' '.join(READERS)}")
+    content = _content(path)
+    try:
+        import networkx as nx  # noqa: PLC0415 - an extra
+    except ImportError:
+        raise _invalid(path, "graph files require networkx", "run: pip install 'robochoc[graphs]'") from None
+    from io import BytesIO  # noqa: PLC0415 - start-up: only to read a graph
+
+    options = {"data": False} if reader == "read_edgelist" else {}
+    try:
+        graph = getattr(nx, reader)(BytesIO(content), **options)
+        nodes, edges = list(graph.nodes), [(one, other) for one, other, *_ in graph.edges]
+    except Exception as error:  # noqa: BLE001 - networkx raises what its parsers raise
+        raise _invalid(path, "networkx cannot read it", f"correct the file: {error}") from None
+    numbered = _numbered(nodes)
+    if not 1 <= len(nodes) <= MAX_NODES:
+        raise _invalid(path, f"the graph has {len(nodes)} nodes", f"it must have from 1 to {MAX_NODES}")
+    for one, other in edges:
+        if one == other:
+            raise _invalid(path, f"the node {one!s:.100} is linked to itself", "delete this edge")
+    known: list[Edge] = sorted({(min(pair), max(pair)) for pair in ((numbered[a], numbered[b]) for a, b in edges)})
+    label = re.sub(r"[^A-Za-z0-9_.]+", "-", path.stem)[:MAX_LABEL].strip("-.") or "graph"
+    return Graph(len(nodes), label, lambda _: list(known))
+
+
+def _content(path: Path) -> bytes:
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise _invalid(path, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+    if len(content) > MAX_BYTES:
+        raise _invalid(path, "is too large", f"use a file of at most {MAX_BYTES:,} bytes")
+    if b"<!DOCTYPE" in content or b"<!ENTITY" in content:
+        raise _invalid(path, "defines entities", "delete the document type: GraphML and GEXF need none")
+    return content
+
+
+def _numbered(nodes: Iterable[Hashable]) -> dict[Hashable, int]:
+    """Return the number of each node."""
+    named = {node: str(node) for node in nodes}
+    if all(name.removeprefix("-").isdecimal() and len(name) < 20 for name in named.values()):  # noqa: PLR2004 - 64 bits
+        named = dict(sorted(named.items(), key=lambda node: int(node[1])))
+    return {node: number for number, node in enumerate(named, 1)}
+
+
+def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
+    hint = " ".join(chain.from_iterable(part.split() for part in hint.split("\n")))
+    return InvalidInputError([Diagnostic(str(path), 0, message, hint[:300])])

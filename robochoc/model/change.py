@@ -60,9 +60,9 @@ def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
             case AddAgent(robot):
                 team = _with_robot(team, robot)
             case RemoveValue(variable, value):
-                team = _with_domain(team, variable, _less(team, variable, value))
+                team = _with_domain(team, variable, _without_value(team, variable, value))
             case AddValue(variable, value):
-                team = _with_domain(team, variable, _more(team, variable, value))
+                team = _with_domain(team, variable, _with_value(team, variable, value))
             case AddConstraint(agent, parent, constraint):
                 team = _with_constraint(team, agent, parent, constraint)
             case RemoveConstraint(agent, parent, name):
@@ -231,7 +231,7 @@ def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:
     return keep_needed_interfaces(team)
 
 
-def _less(team: Team, variable: str, value: int) -> Domain:
+def _without_value(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value not in domain:
         ranges = (f"{part[0]}..{part[-1]}" if len(part) > 1 else f"{part[0]}" for part in domain.ranges)
@@ -245,7 +245,7 @@ def _less(team: Team, variable: str, value: int) -> Domain:
     return replace(domain, ranges=tuple(parts))
 
 
-def _more(team: Team, variable: str, value: int) -> Domain:
+def _with_value(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value in domain:
         raise ChangeError(
