@@ -60,7 +60,7 @@ def _body(report: PrivacyReport, measure: Measure) -> Iterator[str]:
     yield _systems(report)
     if report.kinds():
         yield (
-            "<h2>Who knows how much of whom</h2>"
+            "<h2>Losses between robots</h2>"
             f"<p>Loss by {measure}. Each row is a robot with secrets, each column an observer. Pairs without a cell"
             f" have no secrets.</p>{_legend()}"
         )

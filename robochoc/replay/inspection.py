@@ -108,7 +108,7 @@ class Inspector:
             fields["value"] = "withdraws"
         for name in VIEWS:
             if isinstance(fields.get(name), Mapping | list | tuple):
-                fields[name] = self._own.all(self._pairs(fields[name], self._part.order)) or "nobody has any value"
+                fields[name] = self._own.all(self._pairs(fields[name], self._part.order)) or "no robot has a value"
         told = {name: thing if isinstance(thing, str) else safe_repr(thing) for name, thing in fields.items()}
         return cut(", ".join(text if name == "value" else f"{name}: {text}" for name, text in told.items()))
 

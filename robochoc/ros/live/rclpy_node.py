@@ -275,7 +275,7 @@ class RclpySource(LiveSource):
 
 
 def _advice() -> str:
-    """Return what to do where rclpy cannot be imported."""
+    """Return a hint for users on whose machine rclpy cannot be imported."""
     ours = f"{sys.version_info.major}.{sys.version_info.minor}"
     for entry in sys.path:
         found = _PYTHON.search(entry)
