@@ -1,4 +1,7 @@
-"""The application's logs: messages in the terminal, and the error log (`error_log.log_errors_to`)."""
+"""The application's logs: messages in the terminal, and the error log (`error_log.log_errors_to`).
+
+This module is apart from `error_log`, since the processes of jobs use it, and must not load NiceGUI.
+"""
 
 from __future__ import annotations
 

@@ -110,7 +110,7 @@ def test_rules_that_are_in_the_way_are_clicked_away(browser: Browser, applicatio
         _told(tab, "There is no solution")
         tab.page.click("text=Which rules are in conflict")
         tab.page.wait_for_selector("text=This rule alone cannot hold")
-        tab.page.wait_for_selector(".found .trouble >> text=there are 2 values: somebody has to step aside")
+        tab.page.wait_for_selector(".found .trouble >> text=there are only 2 values: robots must step aside")
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         tab.page.click("button:has-text('Give it a cost')")
         _told(tab, "All 3 decide. It costs 14: proven the best.")

@@ -86,7 +86,7 @@ def test_runs_are_named_and_one_that_is_gone_is_told(
     earlier(teams, team, 2, "whatif", RunState.STOPPED)
     with app_page(browser, f"{application.url}team/{team}/fly?run=00042", {"width": 360, "height": 800}) as tab:
         page = tab.page
-        page.wait_for_selector("text=The run 00042 is not kept any more")
+        page.wait_for_selector("text=The run 00042 is not saved any more")
         page.wait_for_selector("[data-ready=true]")
         page.click(".fly-choice")
         options = page.locator(".q-menu .q-item")

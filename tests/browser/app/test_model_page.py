@@ -222,7 +222,7 @@ def test_what_is_wrong_is_told_where_it_is(browser: Browser, application: AppSer
         page.wait_for_selector(".entry .trouble >> text=level has no values")
         name = page.locator("article", has_text="Level: level").get_by_label("Name")
         name.fill("")
-        page.wait_for_selector("text='' cannot be a name")
+        page.wait_for_selector("text='' is not a valid name")
         page.get_by_label("Columns").fill("61")
         page.wait_for_selector("text=Choose a number from 1 to 60.")
     assert teams.load(team).now.area.columns == 8
@@ -341,14 +341,14 @@ def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
         page.wait_for_selector("text=Click the cells that the robots can choose.")
         page.wait_for_selector("button[aria-pressed=true]:has-text('Select')")  # a click adds no robot now
         click_cell(page, 0, 5)
-        page.wait_for_selector("[role=alert] >> text=That is the last cell that can be chosen for place.")
+        page.wait_for_selector("[role=alert] >> text=This is the last cell for place.")
         page.locator(".rule .sentence").nth(0).click()
         page.locator("[data-robot=Drone1]").click()
-        page.wait_for_selector("[role=alert] >> text=Drone1 is the last one that this rule names.")
+        page.wait_for_selector("[role=alert] >> text=Drone1 is the last robot of this rule.")
         page.get_by_role("button", name="Everybody").click()
         becomes(teams, team, lambda sketch: sketch.rules[0].robots == ())
         page.locator(".rule .sentence").nth(1).click()
-        page.wait_for_selector("text=Private is off: R1 costs something")
+        page.wait_for_selector("text=Private is not available: R1 has a cost")
         assert page.get_by_role("switch", name="Private").get_attribute("aria-disabled") == "true"
 
 
