@@ -25,7 +25,7 @@ FEWEST_PAIRS = 6
 
 
 @dataclass(frozen=True)
-class Interval:
+class MedianInterval:
     """A median, and its confidence interval with the level `CONFIDENCE`."""
 
     median: float
@@ -33,7 +33,7 @@ class Interval:
     high: float
 
 
-def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> Interval:
+def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> MedianInterval:
     """Return the median of `values` and its interval by the percentile bootstrap.
 
     Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3. Problems are drawn, each with all of
@@ -56,7 +56,7 @@ def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> In
     medians = weighted_medians(given, drawn[:, of_problem])
     rest = (1 - CONFIDENCE) / 2
     low, high = np.quantile(medians, [rest, 1 - rest])
-    return Interval(float(np.median(given)), float(low), float(high))
+    return MedianInterval(float(np.median(given)), float(low), float(high))
 
 
 def weighted_medians(values: Any, counts: Any) -> Any:  # noqa: ANN401 - arrays of numbers

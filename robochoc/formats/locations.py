@@ -70,7 +70,7 @@ class FileLocations:
         return Location(self.file, neighbour.line)
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return that the file of the neighbour is missing."""
+        """Return the message that the file of the neighbour is missing, and the hint."""
         missing = Path(self.file).parent / name
         return f"has no file: there is no {missing}.xml", "write that file or delete this agent"
 
@@ -103,7 +103,7 @@ class ObjectLocations:
         return self._part(what, name)
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return that there is no such robot."""
+        """Return the message that the team lacks the robot, and the hint."""
         return f"is not in the team: there is no robot '{name}'", "add that robot or leave this neighbour out"
 
     def _part(self, what: str, name: str) -> Location:

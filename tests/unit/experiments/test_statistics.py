@@ -107,7 +107,7 @@ def test_how_many_runs_reach_the_best_known_cost() -> None:
 
 
 def test_the_interval_of_a_median() -> None:
-    assert statistics.median_interval([7]) == statistics.Interval(7, 7, 7)
+    assert statistics.median_interval([7]) == statistics.MedianInterval(7, 7, 7)
     found = statistics.median_interval([float(value) for value in range(101)])
     assert found.median == 50
     # The binomial interval of the median of 101 values, from the 41st to the 61st, is 40 to 60 (Conover 1999).
