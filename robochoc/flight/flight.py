@@ -279,7 +279,7 @@ class Flight:
         who = leg_goals.who
         self._progress(f"planning routes of {len(who)} drones")
         if self._watch and floor_plan:
-            floor_plan = self._watch.with_ways(floor_plan, who, starts, leg_goals.places)
+            floor_plan = self._watch.with_routes(floor_plan, who, starts, leg_goals.places)
         try:
             return plan_routes(
                 starts[who],

@@ -73,19 +73,19 @@ class WallWatch:
         """Return the height of the floor below a place; None where only the ground is known, or in a wall."""
         return self._plan.floor(place) if isinstance(self._plan, VoxelPlan) else None
 
-    def with_ways(self, plan: WallPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> WallPlan:
+    def with_routes(self, plan: WallPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> WallPlan:
         """Return `plan`, or a plan with a smaller distance from walls if only that has routes for the drones `who`.
 
         Raises:
             ValueError: Walls leave no route for one of them from its start to its goal, which are given for all (N, 3).
         """
-        without = [number for number in who.tolist() if plan.way(starts[number], goals[number]) is None]
+        without = [number for number in who.tolist() if plan.route(starts[number], goals[number]) is None]
         if not without:
             return plan
         if plan.keep > _SHARE * self._radius:  # a door may be just as wide as the radius requires
             wider = (self._radius + spare for spare in _SPARES_M)
             less = next((keep for keep in wider if keep < plan.keep - _CLOSE_M), self._radius)
-            return self.with_ways(self._leaving(less), who, starts, goals)
+            return self.with_routes(self._leaving(less), who, starts, goals)
         ends = f"from {self._point_text(starts[without[0]])} to {self._point_text(goals[without[0]])}"
         has_heights = isinstance(self._plan, VoxelPlan)
         hint = "generate the team with a larger radius" if has_heights else "generate the team again"

@@ -63,7 +63,7 @@ def refused_way(seed: int, folder: Path) -> str:
         starts = homes
         for mission in missions:
             goals = _goals(mission)
-            watch.with_ways(watch.floor_plan(np.vstack((starts, goals))), np.arange(len(homes)), starts, goals)
+            watch.with_routes(watch.floor_plan(np.vstack((starts, goals))), np.arange(len(homes)), starts, goals)
             starts = goals
     except ValueError as refused:
         return str(refused)

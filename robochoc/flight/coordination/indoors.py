@@ -38,9 +38,9 @@ class IndoorSpace(Spacing):
     plan: VoxelPlan
     downwash: float = 1.0
 
-    def way(self, start: Array, goal: Array, points: Array) -> Array | None:
+    def path(self, start: Array, goal: Array, points: Array) -> Array | None:
         """Return a short path that keeps its distance from walls and from `points`; None if none is found."""
-        found = self.plan.way_among(self._unsquashed(start), self._unsquashed(goal), self._resting(points))
+        found = self.plan.route_among(self._unsquashed(start), self._unsquashed(goal), self._resting(points))
         if found is None:
             return None
         path = np.vstack((start, squashed(found[1:-1], self.downwash), goal))
@@ -90,7 +90,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         super().__init__(starts, goals, standing, space, delays)
         self._turns = turns
         self._standing = self.points[self.count :]
-        self._ways: dict[tuple[int, bytes], Array] = {}
+        self._routes: dict[tuple[int, bytes], Array] = {}
         self._attempts_left = 2 * self.count + 2
         self.away = {int(drone) for drone in np.flatnonzero((starts != goals).any(axis=1))}
 
@@ -109,19 +109,19 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         else:
             self.away.add(drone)
 
-    def _way(self, drone: int) -> Array:
+    def _path(self, drone: int) -> Array:
         """Return the path of a drone to its goal, ignoring other drones."""
         key = drone, self.rests[drone].tobytes()
-        if key not in self._ways:
-            found = self.space.way(self.rests[drone], self.goals[drone], self._standing)
+        if key not in self._routes:
+            found = self.space.path(self.rests[drone], self.goals[drone], self._standing)
             if found is None:
                 raise NoRouteError([drone], indoors=not len(self._standing))
-            self._ways[key] = found
-        return self._ways[key]
+            self._routes[key] = found
+        return self._routes[key]
 
     def _is_on_path(self, drone: int, points: Array) -> Flags:
         """Return which of `points` (P, 3) are on the path of a drone."""
-        way = self._way(drone)
+        way = self._path(drone)
         return np.asarray(self.space.near(way[:-1], way[1:], points).any(axis=0))
 
     def _by_precedence(self) -> list[int]:
@@ -136,13 +136,13 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         """Move a drone to its goal; return whether one moved."""
         ranks = [drone for drone in self._by_precedence() if self.goal_is_free(drone)]
         for drone in ranks:
-            if self.space.is_clear(self._way(drone), self.others(drone)):
-                self.move(drone, self._way(drone))
+            if self.space.is_clear(self._path(drone), self.others(drone)):
+                self.move(drone, self._path(drone))
                 return True
         return any(self._move_around(drone) for drone in ranks)
 
     def _move_around(self, drone: int) -> bool:
-        path = self.space.way(self.rests[drone], self.goals[drone], self.others(drone))
+        path = self.space.path(self.rests[drone], self.goals[drone], self.others(drone))
         if path is not None:
             self.move(drone, path)
         return path is not None
@@ -154,7 +154,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
             return False
         for drone in self._by_precedence():
             count, points, away = len(self.moves), self.points.copy(), set(self.away)
-            way = self._way(drone)
+            way = self._path(drone)
             others = [other for other in np.flatnonzero(self._is_on_path(drone, self.rests)).tolist() if other != drone]
             nearest = sorted(others, key=lambda other: (norms(way - self.rests[other]).argmin(), other))
             if (
@@ -177,7 +177,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
             spots = self.space.spots(self.rests[other], others, most)
             spots = spots[~self._is_on_path(drone, spots)][:_SPOTS]
             if len(spots):
-                path = self.space.way(self.rests[other], self._best(spots, {other, drone}), others)
+                path = self.space.path(self.rests[other], self._best(spots, {other, drone}), others)
                 if path is not None:
                     self.move(other, path)
                     return True

@@ -67,7 +67,7 @@ class OutdoorSpace(Spacing):
         """Return which straight lines (K,) lead through walls."""
         if self.floor_plan is None:
             return np.zeros(len(starts), dtype=bool)
-        return ~self.floor_plan.open(starts, goals)
+        return ~self.floor_plan.are_clear(starts, goals)
 
     def across(
         self, start: Array, goal: Array, first: Column | None = None, last: Column | None = None
@@ -79,7 +79,7 @@ class OutdoorSpace(Spacing):
         first, last = start[:2] if first is None else first, goal[:2] if last is None else last
         if self.floor_plan is None:
             return np.array([first, last])
-        way = self.floor_plan.way(start, goal)
+        way = self.floor_plan.route(start, goal)
         if way is None:
             return None
         ends = ([first] if (first != way[0]).any() else [], [last] if (last != way[-1]).any() else [])
@@ -91,7 +91,7 @@ class OutdoorSpace(Spacing):
         return np.array(columns)
 
     def _is_open(self, first: Column, second: Column) -> bool:
-        return self.floor_plan is None or bool(self.floor_plan.open(first[None], second[None])[0])
+        return self.floor_plan is None or bool(self.floor_plan.are_clear(first[None], second[None])[0])
 
     def by_lane(self, start: Array, goal: Array, points: Array) -> Array | None:
         """Return the path up or down to the best lane, across, and up or down; None if no lane is clear of `points`."""

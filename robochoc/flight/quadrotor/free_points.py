@@ -48,7 +48,7 @@ def free_point(
         spots = spots[spots[:, 2] >= min(ground + 2 * step, wish[2])]
     free: Mask = np.asarray((_distances(spots, taken) >= radii).all(1))
     if floor_plan is not None:
-        free[free] = floor_plan.open(np.broadcast_to(wish, spots[free].shape), spots[free])
+        free[free] = floor_plan.are_clear(np.broadcast_to(wish, spots[free].shape), spots[free])
     if free.any():
         return np.asarray(spots[free.argmax()])
     if floor_plan is not None:

@@ -44,30 +44,30 @@ class FloorPlan:
     frame: PixelFrame
     keep: float
     parts: int = 0
-    _ways: dict[bytes, Array | None] = field(default_factory=dict)
+    _routes: dict[bytes, Array | None] = field(default_factory=dict)
 
     def keeping(self, keep: float) -> FloorPlan:
         """Return the same walls and the same lattice for another distance."""
-        return self if keep == self.keep else replace(self, keep=keep, parts=self._parts, _ways={})
+        return self if keep == self.keep else replace(self, keep=keep, parts=self._parts, _routes={})
 
     def clearances(self, points: Array, most: float) -> Array:
         """Return the distance (K,) of each of `points` (K, 2) from the nearest wall, at most `most`."""
         size = self.frame.size
         return size * clearances(self.solid, self.frame.in_pixels(points), most / size)
 
-    def open(self, origins: Array, ends: Array) -> Flags:
+    def are_clear(self, origins: Array, ends: Array) -> Flags:
         """Return which straight lines (K,), seen from above, are clear of walls."""
         first, last = self.frame.in_pixels(origins), self.frame.in_pixels(ends)
         return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
 
-    def way(self, first: Array, second: Array) -> Array | None:
+    def route(self, first: Array, second: Array) -> Array | None:
         """Return a short route (K + 1, 2) between two points of the plane; None if there is none."""
         key = np.concatenate((first[:2], second[:2])).tobytes()
-        if key not in self._ways:
-            self._ways[key] = self._way(first[:2], second[:2])
-        return self._ways[key]
+        if key not in self._routes:
+            self._routes[key] = self._find_route(first[:2], second[:2])
+        return self._routes[key]
 
-    def _way(self, first: Array, second: Array) -> Array | None:
+    def _find_route(self, first: Array, second: Array) -> Array | None:
         ends = self.frame.in_pixels(np.array([first, second]))
         wish = self.keep + SPARE_M
         if (first == second).all() or self._sees(ends[0], ends[1], wish):

@@ -66,13 +66,13 @@ class VoxelPlan:
     frame: VoxelFrame
     keep: float
     _surfaces: list[VoxelSurface] = field(default_factory=list)
-    _ways: dict[bytes, tuple[int, Array] | None] = field(default_factory=dict)
+    _routes: dict[bytes, tuple[int, Array] | None] = field(default_factory=dict)
     _lattices: dict[int, Lattice] = field(default_factory=dict)
 
     def keeping(self, keep: float) -> VoxelPlan:
         """Return the same walls for another distance."""
         return (
-            self if keep == self.keep else replace(self, keep=keep, _surfaces=[self._surface], _ways={}, _lattices={})
+            self if keep == self.keep else replace(self, keep=keep, _surfaces=[self._surface], _routes={}, _lattices={})
         )
 
     def clearances(self, points: Array, most: float) -> Array:
@@ -80,7 +80,7 @@ class VoxelPlan:
         found = self._surface.distances(self.frame.in_voxels(points), most / self.frame.size)
         return np.asarray(np.minimum(self.frame.size * found, most))
 
-    def open(self, origins: Array, ends: Array) -> Flags:
+    def are_clear(self, origins: Array, ends: Array) -> Flags:
         """Return which straight lines (K,) are clear of walls."""
         first, last = self.frame.in_voxels(origins), self.frame.in_voxels(ends)
         return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
@@ -96,12 +96,12 @@ class VoxelPlan:
         below = np.flatnonzero(self.solid[:z, y, x])
         return self.frame.corner[2] + self.frame.size * (int(below[-1]) + 1 if len(below) else 0)
 
-    def way(self, first: Array, second: Array) -> Array | None:
+    def route(self, first: Array, second: Array) -> Array | None:
         """Return a short route (K + 1, 3) between two points; None if there is none."""
         found = self._known(first, second)
         return found and found[1]
 
-    def way_among(self, first: Array, second: Array, others: Resting) -> Array | None:
+    def route_among(self, first: Array, second: Array, others: Resting) -> Array | None:
         """Return a short route (K + 1, 3) between two points that avoids drones at rest, too; None if none is found."""
         known = self._known(first, second)
         if known is None:
@@ -109,7 +109,7 @@ class VoxelPlan:
         level, way = known
         if others.clear(way[:-1], way[1:]).all():
             return way
-        found = self._way(first, second, others, level)
+        found = self._find_route(first, second, others, level)
         return found and found[1]
 
     def reached(self, start: Array, others: Resting, most: float) -> Array:
@@ -125,11 +125,11 @@ class VoxelPlan:
 
     def _known(self, first: Array, second: Array) -> tuple[int, Array] | None:
         key = np.concatenate((first, second)).tobytes()
-        if key not in self._ways:
-            self._ways[key] = self._way(first, second)
-        return self._ways[key]
+        if key not in self._routes:
+            self._routes[key] = self._find_route(first, second)
+        return self._routes[key]
 
-    def _way(
+    def _find_route(
         self, first: Array, second: Array, others: Resting | None = None, last: int = len(_FINE) - 1
     ) -> tuple[int, Array] | None:
         """Return a route, and the number of the lattice, up to `last`, on which it was found."""

@@ -56,7 +56,7 @@ def test_lines_and_points_are_as_far_from_walls_as_all_pixels_say(maps: int) -> 
                 last[chance.randrange(2)] = first[chance.randrange(2)]
             apart = float(gaps(rows, side, along(np.array([first, last]))).min())
             if abs(apart - plan.keep) > 0.01 * side:
-                assert bool(plan.open(first[None], last[None])[0]) is (apart >= plan.keep), (seed, first, last)
+                assert bool(plan.are_clear(first[None], last[None])[0]) is (apart >= plan.keep), (seed, first, last)
             exact = gaps(rows, side, np.array([first, last]))
             assert plan.clearances(np.array([first, last]), 3 * side) == pytest.approx(np.minimum(exact, 3 * side))
 
@@ -99,7 +99,7 @@ def test_a_way_is_clear_of_walls_and_there_is_one_wherever_a_drone_gets(maps: in
         ends = np.array([start, goal])
         if gaps(rows, side, ends).min() < keep:
             continue
-        way = plan.way(*ends)
+        way = plan.route(*ends)
         there = reached(rows, side, keep, start)
         if way is None:
             # The lattice of this map may be coarser than the grid, but not by so much.
@@ -117,33 +117,36 @@ def test_a_way_is_clear_of_walls_and_there_is_one_wherever_a_drone_gets(maps: in
 
 def test_a_way_leads_through_the_door_and_is_taut() -> None:
     plan = plan_of(HALL, 0.5, 0.22)
-    way = plan.way(np.array([1.0, 1.0]), np.array([3.5, 1.0]))
+    way = plan.route(np.array([1.0, 1.0]), np.array([3.5, 1.0]))
     assert way is not None
     length = float(np.linalg.norm(np.diff(way, axis=0), axis=1).sum())
     # Around both corners of the door, as near as the drone may come to them, it would be 2.96 m.
     assert 2.9 < length < 3.05
     assert len(way) <= 4
-    assert plan.way(np.array([1.0, 1.0]), np.array([1.0, 1.0])) is not None
-    assert plan_of(HALL, 0.5, 0.26).way(np.array([1.0, 1.0]), np.array([3.5, 1.0])) is None  # the door is 0.5 m wide
-    assert plan_of([WALL * 3] * 3).way(np.array([0.1, 0.1]), np.array([1.0, 1.0])) is None
+    assert plan.route(np.array([1.0, 1.0]), np.array([1.0, 1.0])) is not None
+    assert plan_of(HALL, 0.5, 0.26).route(np.array([1.0, 1.0]), np.array([3.5, 1.0])) is None  # the door is 0.5 m wide
+    assert plan_of([WALL * 3] * 3).route(np.array([0.1, 0.1]), np.array([1.0, 1.0])) is None
 
 
 def test_a_plan_is_moved_scaled_and_turned_with_its_ways() -> None:
     plan = plan_of(HALL, 0.5, 0.22)
-    way = plan.way(np.array([1.0, 1.0]), np.array([3.5, 1.0]))
+    way = plan.route(np.array([1.0, 1.0]), np.array([3.5, 1.0]))
     assert way is not None
     moved = FloorPlan(plan.solid, plan.frame.moved((10.0, -3.0), 2.0), 2 * plan.keep)
-    there = moved.way(np.array([12.0, -1.0]), np.array([17.0, -1.0]))
+    there = moved.route(np.array([12.0, -1.0]), np.array([17.0, -1.0]))
     assert there is not None
     assert len(there) >= 3
     assert moved.clearances(np.array([[12.0, -1.0]]), 5.0)[0] == pytest.approx(1.0)
     turn = np.array([[0.8, -0.6], [0.6, 0.8]])
     turned = FloorPlan(plan.solid, replace(plan.frame, yaw=math.atan2(0.6, 0.8)), plan.keep)
     ends = np.array([[1.0, 1.0], [3.5, 1.0]]) @ turn.T
-    same = turned.way(*ends)
+    same = turned.route(*ends)
     assert same is not None
     assert same == pytest.approx(way @ turn.T)
-    assert turned.open(ends[:1], ends[1:]).tolist() == plan.open(np.array([[1.0, 1]]), np.array([[3.5, 1]])).tolist()
+    assert (
+        turned.are_clear(ends[:1], ends[1:]).tolist()
+        == plan.are_clear(np.array([[1.0, 1]]), np.array([[3.5, 1]])).tolist()
+    )
 
 
 def test_routes_of_many_drones_through_one_door_keep_from_walls_and_from_each_other() -> None:

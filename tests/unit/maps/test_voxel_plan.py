@@ -56,7 +56,7 @@ def test_lines_and_points_are_as_far_from_walls_as_all_voxels_say(maps: int) -> 
                 last[chance.randrange(3)] = first[chance.randrange(3)]
             apart = float(gaps_in_space(voxels, side, along(np.array([first, last]), side / 100)).min())
             if abs(apart - plan.keep) > 0.02 * side:
-                assert bool(plan.open(first[None], last[None])[0]) is (apart >= plan.keep), (seed, first, last)
+                assert bool(plan.are_clear(first[None], last[None])[0]) is (apart >= plan.keep), (seed, first, last)
             ends = np.array([first, last])
             for most in (0.4 * side, 3 * side):
                 exact = np.minimum(gaps_in_space(voxels, side, ends), most)
@@ -92,7 +92,7 @@ def test_a_way_is_clear_and_is_found_where_there_is_one(maps: int) -> None:
         places = [(np.array(chance.choice(free)) + 0.5) * side for _ in range(4)]
         places = [place for place in places if gaps_in_space(voxels, side, place[None])[0] >= keep]
         for first, last in pairwise(places):
-            way = plan.way(first, last)
+            way = plan.route(first, last)
             if way is not None:
                 assert (way[0] == first).all()
                 assert (way[-1] == last).all()
@@ -117,7 +117,7 @@ def test_a_way_keeps_from_drones_at_rest_too(maps: int) -> None:
         near = np.linalg.norm((np.array([first, last])[:, None] - np.array(others)) / squash, axis=2)
         if near.min() < resting.distance:
             continue
-        way = plan.way_among(first, last, resting)
+        way = plan.route_among(first, last, resting)
         if way is not None:
             found += 1
             points = along(way)
@@ -167,7 +167,7 @@ def test_small_voxels_are_flown_among_on_a_coarser_lattice(tmp_path: Path) -> No
     plan = VoxelPlan(~grid.free, VoxelFrame(0.05, (-0.05, -0.05, -0.05)), 0.15)
     assert tuple(map(float, grid.origin)) == plan.frame.corner
     first, last = np.array([0.2, 0.2, 0.2]), np.array([0.9, 0.2, 0.2])
-    way = plan.way(first, last)
+    way = plan.route(first, last)
     assert way is not None
     assert gaps_in_space(voxels, 0.05, along(way)).min() >= 0.15 - 1e-6
-    assert plan.keeping(0.2).way(first, last) is None
+    assert plan.keeping(0.2).route(first, last) is None
