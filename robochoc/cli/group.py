@@ -30,6 +30,7 @@ COMMANDS = {
     "compare": ("compare", "Compare protocols on problems: a table, a picture."),
     "compile": ("compile_team", "Compile the robots' local problems and show their sizes."),
     "completion": ("completion", "Print the completion script for bash, zsh or fish."),
+    "demo": ("demo", "Solve a first problem and show the flight, without files."),
     "directory": ("directory", "List the agents of a running master, and their services."),
     "experiment": ("experiment", "Run studies of protocols and report their results."),
     "export": ("export", "Write a team's problem for other tools, or as a graph."),
