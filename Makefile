@@ -14,7 +14,7 @@ LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
-	@echo "Installing robochoc into $(VENV): about 340 MB, a third of it Java for the solver ACE."
+	@echo "Installing robochoc into $(VENV): about 300 MB, a third of it Java for the solver ACE. This takes half a minute."
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/$(PIP) --quiet --no-deps --no-compile $(LOCKED) requirements/run.txt
 	$(BIN)/$(PIP) --quiet --no-index --no-deps --no-build-isolation --editable .
@@ -25,7 +25,7 @@ $(READY): $(RUN) requirements/dev.txt
 	$(BIN)/$(PIP) --quiet $(LOCKED) requirements/dev.txt
 	@touch $@
 
-demo: $(RUN)  ## 16 robots, no solution, the others fly: out/queens3d-4.html
+demo: $(RUN)  ## robochoc demo: 16 robots, no solution, the others fly: out/queens3d-4.html
 	@mkdir -p out
 	@$(BIN)/robochoc demo --html out/queens3d-4.html --no-open
 
