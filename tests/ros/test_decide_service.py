@@ -323,8 +323,9 @@ def test_the_command_answers_whoever_asks() -> None:
     lines = told.splitlines()
     assert lines[0] == f"domain {domain} of DDS: /robochoc/decide (robochoc_msgs/srv/Decide)"
     assert lines[1] == f"domain {domain} of DDS: /robochoc/hangar/decide (std_srvs/srv/Trigger)"
-    assert lines[2] == "/robochoc/decide: solution, 1 epoch"
-    assert len(lines) == 5
+    assert lines[2] == f"domain {domain} of DDS: /robochoc/cancel (std_srvs/srv/Trigger)"
+    assert lines[3] == "/robochoc/decide: solution, 1 epoch"
+    assert len(lines) == 6
 
 
 @pytest.mark.slow
