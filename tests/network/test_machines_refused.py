@@ -31,11 +31,11 @@ def test_tokens_that_do_not_work(site: Deployment) -> None:
 
     def refused(file: Path, token: str, *words: object) -> str:
         robot = site.robot(file, "--token", token, *words)
-        assert robot.status() == (1 if "no token" in robot.errors else 4), robot.errors
+        assert robot.status() == (1 if "token is incomplete" in robot.errors else 4), robot.errors
         return one_line(robot)
 
     assert "not for this name" in refused(files / "RA.xml", tokens["RB"])
-    assert "no token" in refused(files / "RA.xml", tokens["RA"][:20])
+    assert "token is incomplete" in refused(files / "RA.xml", tokens["RA"][:20])
     assert "expired" in refused(site.folder / "other" / "Late.xml", expired)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
     master.wait_to_say("RA has registered")
