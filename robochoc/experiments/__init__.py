@@ -11,16 +11,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from robochoc.system.lazy_names import lazy_names
+
 if TYPE_CHECKING:
     from robochoc.experiments.results import read as read
 
 __all__ = ["read"]
 
-
-def __getattr__(name: str) -> object:
-    """Import `read` on demand, as `robochoc experiment --help` must not wait for the database."""
-    if name == "read":
-        from robochoc.experiments.results import read  # noqa: PLC0415 - start-up
-
-        return read
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+__getattr__, __dir__ = lazy_names(__name__, {"read": "robochoc.experiments.results"})

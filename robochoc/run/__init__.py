@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+from robochoc.system.lazy_names import lazy_names
+
 TYPE_CHECKING = False  # without an import of `typing`
 if TYPE_CHECKING:
     from robochoc.run.defaults import CENTRAL
@@ -13,18 +15,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CENTRAL", "OnLoss", "Options", "Runtime", "ScheduleName", "Withdrawal", "solve"]
 
-
-def __getattr__(name: str) -> object:
-    if name == "solve":
-        from robochoc.run.orchestrator import solve  # noqa: PLC0415 - see above
-
-        return solve
-    if name == "CENTRAL":
-        from robochoc.run.defaults import CENTRAL  # noqa: PLC0415 - see above
-
-        return CENTRAL
-    if name in __all__:
-        from robochoc.run import options  # noqa: PLC0415 - see above
-
-        return getattr(options, name)
-    raise AttributeError(f"module 'robochoc.run' has no attribute {name!r}")
+_OPTIONS = dict.fromkeys(("OnLoss", "Options", "Runtime", "ScheduleName", "Withdrawal"), "robochoc.run.options")
+__getattr__, __dir__ = lazy_names(
+    __name__, {**_OPTIONS, "CENTRAL": "robochoc.run.defaults", "solve": "robochoc.run.orchestrator"}
+)

@@ -26,14 +26,8 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.model.outcome import Verdict
-from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.message import Message, Value
-from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.traits import Traits
-from robochoc.protocols.wording import Wording
-from robochoc.solver.local_problem import LocalProblem
+from robochoc import Verdict
+from robochoc.protocols import Act, LocalProblem, Message, Performative, PriorityOrder, Protocol, Traits, Value, Wording
 from robochoc.system.plain_text import counted
 
 Nogood = tuple[int, str, tuple[tuple[str, Value], ...]]

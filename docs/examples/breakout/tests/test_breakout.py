@@ -9,32 +9,14 @@ import pytest
 from graphs import colouring, soluble
 from robochoc_breakout import Breakout, Improve, Ok
 
-from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
-from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.outcome import Verdict
+from robochoc import Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.message import Message
-from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.agent_problem import agent_problems
-from robochoc.solver.local_problem import LocalProblem
-from robochoc.verification.checker import violations
+from robochoc.protocols import Message
+from robochoc.testing import Concurrent, RandomChannels, Schedule, Simulation, deliver, protocol_objects, violations
 
 
 def agents(team: Team) -> dict[str, Breakout]:
-    """The protocol objects of all robots, by name, not yet started."""
-    order = PriorityOrder(team.order)
-    known = agent_problems(team, shared_scopes=Breakout.traits.shared_scopes)
-    return {name: Breakout(LocalProblem(part), order) for name, part in known.items()}
-
-
-def deliver(team: dict[str, Breakout]) -> list[tuple[str, str, Message]]:
-    """Deliver all sent messages; return them with their senders and receivers."""
-    sent = [(name, receiver, message) for name, agent in team.items() for receiver, message in agent.outbox]
-    for agent in team.values():
-        agent.outbox.clear()
-    for sender, receiver, message in sent:
-        team[receiver].receive(sender, message)
-    return sent
+    return protocol_objects(team, Breakout)
 
 
 def answers(agent: Breakout, *received: tuple[str, Message]) -> list[tuple[str, Message]]:
