@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Self
+from typing import TYPE_CHECKING
 
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
@@ -28,6 +28,7 @@ from robochoc.run.option_values import (
     texts_by_name,
 )
 from robochoc.solver.compile import CompileLimits
+from robochoc.system.deprecation import warn_deprecated
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
@@ -64,11 +65,6 @@ class Withdrawal(StrEnum):
 
     MINIMUM = "minimum"
     MAXIMAL = "maximal"
-
-    @classmethod
-    def _missing_(cls, value: object) -> Self | None:
-        """Return the member for the spelling of an earlier version."""
-        return cls("minimum") if value == "fewest" else None
 
 
 class Preprocess(StrEnum):
@@ -200,10 +196,12 @@ class Options:
 
 
 def _withdrawal(name: str, value: object) -> object:
-    """Convert the name of a withdrawal; True is `minimum`, None and False are none."""
+    """Convert the name of a withdrawal; True, and the former name `fewest`, are `minimum`; None and False are none."""
     if value is None or value is False:
         return None
-    return Withdrawal.MINIMUM if value is True else one_of(Withdrawal)(name, value)
+    if value == "fewest":
+        warn_deprecated("withdraw='fewest'", "'minimum'", removed_in="2.0", stacklevel=6)
+    return Withdrawal.MINIMUM if value in {True, "fewest"} else one_of(Withdrawal)(name, value)
 
 
 _CONVERTERS = MappingProxyType(

@@ -51,7 +51,7 @@ def test_load_and_solve() -> None:
     assert list(outcome.chosen) == ["protocol", "order"]
 
 
-def test_processes_if_nothing_is_said() -> None:
+def test_the_simulator_if_nothing_is_said() -> None:
     outcome = robochoc.load(SCOUTS).solve()
     assert (outcome.verdict, outcome.runtime, outcome.verified) == (Verdict.SOLUTION, "processes", True)
     assert outcome.assignment.keys() == {"V1", "V2", "V3"}
@@ -61,7 +61,7 @@ def test_options_are_those_of_the_command_line() -> None:
     told: list[AnyEvent] = []
     problem = robochoc.load(FOUR)
     outcome = problem.solve(
-        "afc-ng", "simulator", order="random", withdraw="fewest", seed=3, delay=5, observer=told.append
+        "afc-ng", "simulator", order="random", withdraw="minimum", seed=3, delay=5, observer=told.append
     )
     assert (outcome.verdict, outcome.protocol, outcome.seed) == (Verdict.OPTIMAL, "afc-ng", 3)
     assert len(outcome.withdrawn_alive) == 6

@@ -51,7 +51,6 @@ def test_every_member_may_be_given_as_a_text() -> None:
     for name, choices in ENUMS.items():
         for member in choices:
             assert getattr(options(**{name: str(member)}), name) is member
-    assert options(withdraw="fewest").withdraw is Withdrawal.MINIMUM
 
 
 def test_an_unknown_text_is_refused_with_the_nearest_name() -> None:
