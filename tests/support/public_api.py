@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import sys
 from collections.abc import Iterator
 from dataclasses import fields, is_dataclass
 
@@ -70,7 +71,7 @@ def _parameters(value: object) -> str:
         return ""
     words = []
     for one in inspect.signature(value).parameters.values():
-        prefix = {one.VAR_POSITIONAL: "*", one.VAR_KEYWORD: "**"}.get(one.kind, "")
+        prefix = "*" if one.kind is one.VAR_POSITIONAL else "**" if one.kind is one.VAR_KEYWORD else ""
         if one.kind is one.KEYWORD_ONLY and not any(word.startswith("*") for word in words):
             words.append("*")
         words.append(f"{prefix}{one.name}{'' if one.default is one.empty else '='}")
@@ -78,4 +79,4 @@ def _parameters(value: object) -> str:
 
 
 if __name__ == "__main__":
-    print(*public_api(), sep="\n")
+    sys.stdout.writelines(f"{line}\n" for line in public_api())

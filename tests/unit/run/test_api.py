@@ -53,7 +53,7 @@ def test_load_and_solve() -> None:
 
 def test_the_simulator_if_nothing_is_said() -> None:
     outcome = robochoc.load(SCOUTS).solve()
-    assert (outcome.verdict, outcome.runtime, outcome.verified) == (Verdict.SOLUTION, "processes", True)
+    assert (outcome.verdict, outcome.runtime, outcome.verified) == (Verdict.SOLUTION, "simulator", True)
     assert outcome.assignment.keys() == {"V1", "V2", "V3"}
 
 
