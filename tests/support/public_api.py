@@ -69,7 +69,7 @@ def _parameters(value: object) -> str:
     """Return the names of the parameters, in order; `=` marks those with a default."""
     if not callable(value):
         return ""
-    words = []
+    words: list[str] = []
     for one in inspect.signature(value).parameters.values():
         prefix = "*" if one.kind is one.VAR_POSITIONAL else "**" if one.kind is one.VAR_KEYWORD else ""
         if one.kind is one.KEYWORD_ONLY and not any(word.startswith("*") for word in words):
