@@ -15,6 +15,7 @@ from robochoc import __version__
 from robochoc.cli.group import cli
 from robochoc.cli.reports.protocols import print_protocols, rows
 from robochoc.protocols.satisfaction import abt
+from robochoc.run.purposes import PURPOSES
 from robochoc.run.registry import (
     UnknownProtocolError,
     installed_protocol,
@@ -128,18 +129,40 @@ def test_the_long_list_has_all_traits() -> None:
 
 
 @pytest.mark.usefixtures("package")
-def test_the_list_can_be_of_one_kind_of_problem() -> None:
-    kinds = {
-        kind: {line.split()[0] for line in run("--for", kind).stdout.splitlines()[1:]}
-        for kind in ("satisfaction", "costs", "asymmetric")
-    }
-    assert {"abt", "dba", "disfc"} <= kinds["satisfaction"]
-    assert {"dpop", "mgm", "syncabb", "central"} <= kinds["costs"]
-    assert {"acls", "syncabb"} <= kinds["asymmetric"] < kinds["costs"]
-    assert "mgm" not in kinds["asymmetric"]
-    working = {name for name, one in objects(run("--json")).items() if "broken" not in one}
-    assert sorted([*kinds["satisfaction"], *kinds["costs"]]) == sorted(working)
-    assert set(objects(run("--for", "asymmetric", "--json"))) == kinds["asymmetric"]
+def test_the_list_can_be_of_one_purpose() -> None:
+    listed = {name: {line.split()[0] for line in run("--for", name).stdout.splitlines()[1:]} for name in PURPOSES}
+    assert {"abt", "dba", "disfc"} <= listed["satisfaction"]
+    assert {"dpop", "mgm", "syncabb", "central"} <= listed["costs"]
+    assert {"dpop", "sfb", "central"} <= listed["optimum"] < listed["costs"]
+    assert {"acls", "syncabb"} <= listed["asymmetric"] < listed["costs"]
+    assert "mgm" not in listed["asymmetric"]
+    assert {"abt", "cocoa", "dsa", "maxsum"} <= listed["large-teams"]
+    assert listed["large-teams"].isdisjoint({"dpop", "duct", "ssi"})
+    assert listed["privacy"] == {"disfc", "p-dpop", "p2-dpop", "p32-dpop"}
+    assert {"dynabt", "s-dpop"} <= listed["change"]
+    assert "abt" not in listed["change"]
+    assert listed["counting"] == {"count-dpop", "list-dpop", "central"}
+    assert listed["tasks"] == {"cbaa", "cbba", "grape", "ssi"}
+    assert listed["comparison"] == {"adopt", "afc", "awc", "sbt", "syncbb"}
+    working = {name: one for name, one in objects(run("--json")).items() if "broken" not in one}
+    assert sorted([*listed["satisfaction"], *listed["costs"]]) == sorted(working)
+    for name, one in working.items():
+        assert one["purposes"] == [purpose for purpose, names in listed.items() if name in names], name
+    assert set(objects(run("--for", "asymmetric", "--json"))) == listed["asymmetric"]
+
+
+@pytest.mark.usefixtures("package")
+def test_all_purposes_are_listed_with_their_protocols() -> None:
+    blocks = re.findall(r"^([\w-]+): (.+)\n((?:  .+\n)+)", run("--for", "all").stdout, re.MULTILINE)
+    assert {name: text for name, text, _ in blocks} == {name: each.description for name, each in PURPOSES.items()}
+    for name, _, members in blocks:
+        assert {*re.split(r",\s+", members.strip())} == {*objects(run("--for", name, "--json"))}
+    assert {*objects(run("--for", "all", "--json"))} == {*objects(run("--json"))}
+
+
+def test_the_help_names_every_purpose() -> None:
+    text = " ".join(run("--help").stdout.split())
+    assert f"Purposes: {', '.join(PURPOSES)}." in text
 
 
 def test_one_protocol_is_not_asked_for_by_kind() -> None:
@@ -207,6 +230,7 @@ def test_json_is_an_object_a_line() -> None:
         **{key: value for key, value in traits.items() if key not in {"shared_scopes", "writes_to_non_neighbours"}},
         **renamed,
         "concludes": ["no-solution"],
+        "purposes": ["satisfaction", "large-teams"],
         "settings": {},
     }
     assert found["central"]["distributed"] is False

@@ -7,13 +7,20 @@ import click
 from robochoc.cli.options.value_types import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
 from robochoc.run.defaults import AUTO
+from robochoc.run.purposes import PURPOSES
 
-PURPOSES = ("satisfaction", "costs", "asymmetric")
+EVERY = "all"
 
 
 @click.command()
 @click.argument("name", required=False, type=ProtocolName())
-@click.option("--for", "purpose", type=click.Choice(PURPOSES), help="List only protocols for one kind of problem.")
+@click.option(
+    "--for",
+    "purpose",
+    metavar="PURPOSE",
+    type=click.Choice([*PURPOSES, EVERY]),
+    help="List only protocols for one purpose; all: the purposes, each with its protocols.",
+)
 @click.option("--long", is_flag=True, help="List more traits: constraints, privacy, paper.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
 def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: bool) -> None:
@@ -28,22 +35,35 @@ def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: boo
     dynamic       continues when the problem changes (--long)
     privacy       information hidden from neighbours (--long)
 
+    Purposes: satisfaction, costs, optimum, asymmetric, large-teams, privacy, change, lost-messages, counting, tasks,
+    comparison. A protocol can have several.
+
     \b
-    robochoc protocols --for satisfaction    any solution, no costs
-    robochoc protocols --for costs           minimum or low cost; without costs any solution
-    robochoc protocols --for asymmetric      as costs, with a cost for each robot of a constraint
+    robochoc protocols --for all            the purposes, each with its protocols
+    robochoc protocols --for costs          minimum or low cost; without costs any solution
+    robochoc protocols --for large-teams    hundreds of robots or more
     """  # noqa: D301 - \\b keeps click from wrapping the lines
-    from robochoc.cli.reports.protocols import ProtocolRow, print_protocols, protocol_text, protocols_json, rows
+    from robochoc.cli.reports.protocols import (
+        ProtocolRow,
+        print_protocols,
+        print_purposes,
+        protocol_text,
+        protocols_json,
+        rows,
+    )
     from robochoc.formats import on_one_line
     from robochoc.run.registry import unknown_protocol
 
     if name is not None and purpose is not None:
         raise Failure(USAGE, "--for selects rows of the list and cannot be used with NAME: remove one")
-    found = [row for row in rows() if purpose is None or row.is_for(purpose)]
+    found = [row for row in rows() if purpose in {None, EVERY} or purpose in row.purposes]
     if name == AUTO:
         from robochoc.cli.reports.choice import rules_text
 
         click.echo(rules_text())
+        return
+    if purpose == EVERY and not as_json:
+        print_purposes(found)
         return
     if name is None:
         click.echo(protocols_json(found), nl=False) if as_json else print_protocols(found, long=long)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import inspect
+import shutil
 import sys
+import textwrap
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 
@@ -16,6 +18,7 @@ from robochoc.formats import on_one_line
 from robochoc.protocols.settings import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import CENTRAL
+from robochoc.run.purposes import PURPOSES, purposes_of
 from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver import central
 from robochoc.system.compiled_core import docstring
@@ -38,16 +41,10 @@ class ProtocolRow:
     settings: Settings = NO_SETTINGS
     """The protocol's settings, with the defaults."""
 
-    def is_for(self, purpose: str) -> bool:
-        """Return whether the protocol is for `satisfaction`, `costs` or `asymmetric` costs; a broken one for none."""
-        if self.traits is None:
-            return False
-        kinds = {
-            "satisfaction": not self.traits.costs,
-            "costs": self.traits.costs,
-            "asymmetric": self.traits.costs and self.traits.asymmetric,
-        }
-        return kinds[purpose]
+    @property
+    def purposes(self) -> tuple[str, ...]:
+        """Return the purposes that the protocol's traits imply; none for a broken one."""
+        return purposes_of(self.traits) if self.traits else ()
 
 
 def rows() -> list[ProtocolRow]:
@@ -83,6 +80,15 @@ def print_protocols(found: Sequence[ProtocolRow], *, long: bool = False) -> None
             click.echo(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"))
     if not long and sys.stdout.isatty():
         click.echo("next: robochoc protocols NAME explains a protocol, 'auto' the choice; --long shows more columns")
+
+
+def print_purposes(found: Sequence[ProtocolRow]) -> None:
+    """Print each purpose with its description and the names of its protocols."""
+    for name, purpose in PURPOSES.items():
+        click.echo(f"{name}: {purpose.description}")
+        names = ", ".join(row.name for row in found if name in row.purposes)
+        for line in textwrap.wrap(names, min(shutil.get_terminal_size().columns, 100) - 2, break_on_hyphens=False):
+            click.echo(f"  {line}")
 
 
 def protocol_text(row: ProtocolRow) -> str:
@@ -158,6 +164,7 @@ def _central_solver() -> ProtocolRow:
 def _object(row: ProtocolRow, *, explain: bool) -> dict[str, object]:
     traits = {_KEYS.get(name, name): value for name, value in asdict(row.traits).items()} if row.traits else {}
     known = {"name": row.name, "place": row.place, "package": row.package, "distributed": row.name != CENTRAL, **traits}
+    known["purposes"] = row.purposes
     known["settings"] = msgspec.structs.asdict(row.settings)
     if row.broken:
         known["broken"] = row.broken

@@ -239,7 +239,7 @@ class CoCoA(Protocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
-        use_when="costs, few messages: each robot chooses one value, once",
+        use_when="costs, large team, few messages: one value each, once",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
