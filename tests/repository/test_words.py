@@ -12,18 +12,18 @@ from collections import Counter
 from tests.support.program import ROOT
 
 MOST = {
-    r"\bReturns? (what|who|whether or not)\b": 76,
-    r'"""(What|Who|Whoever|Whatever|So many|Of these)\b': 42,
-    r"\b(the|an) own\b": 166,
-    r"\b(is|are) no (?!longer|more|less|way|one|need|such|use\b|different|other)[a-z]+": 289,
-    r"\b[Ww]hoever\b": 16,
-    r"\banew\b": 75,
-    r"\bgo(es)? with(?!out)\b": 16,
-    r"\b(is|are|was|were) told\b": 47,
-    r"\bheard\b": 84,
-    r"\bstands? (for|beside|there|once)\b": 67,
-    r"\bso many\b": 52,
-    r"\bstrangers?\b": 14,
+    r"\bReturns? (what|who|whether or not)\b": 1,
+    r'"""(What|Who|Whoever|Whatever|So many|Of these)\b': 2,
+    r"\b(the|an) own\b": 4,
+    r"(?<![Tt]here )\b(is|are) no (?!longer|more|less|way|one|need|such|use\b|different|other)[a-z]+": 10,
+    r"\b[Ww]hoever\b": 0,
+    r"\banew\b": 45,
+    r"\bgo(es)? with(?!out)\b": 3,
+    r"\b(is|are|was|were) told\b": 1,
+    r"\bheard\b": 17,
+    r"\bstands? (for|beside|there|once)\b": 7,
+    r"\bso many\b": 6,
+    r"\bstrangers?\b": 3,
     r"\b[Tt]he house's\b|\bof this house\b": 0,
 }
 """The highest number of places in the package, in code, comments and texts."""
