@@ -20,7 +20,10 @@ def tree_text(outcome: Outcome) -> str:
     """
     nodes = outcome.tree
     if not nodes and (outcome.verdict != Verdict.UNKNOWN or not _builds_tree(outcome.protocol)):
-        return f"  {outcome.protocol} builds no pseudo-tree"
+        if outcome.protocol == CENTRAL:
+            return "  the central solver builds no pseudo-tree"
+        look = "to see its messages and decisions, add --sniff, or --journal FILE for 'robochoc replay FILE'"
+        return f"  {outcome.protocol} builds no pseudo-tree; {look}"
     if not nodes or any(node.parent not in nodes for node in nodes.values() if node.parent is not None):
         return "  the run ended before the robots had built a pseudo-tree"
     below = _children(nodes)

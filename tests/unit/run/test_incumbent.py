@@ -291,9 +291,12 @@ def test_a_tree_that_is_not_finished_is_not_drawn(places: dict[str, PseudoTreeNo
     assert tree_text(outcome) == "  the run ended before the robots had built a pseudo-tree"
 
 
-def test_who_builds_no_tree_says_so() -> None:
-    for name, verdict in (("abt", Verdict.SOLUTION), ("abt", Verdict.UNKNOWN), ("central", Verdict.UNKNOWN)):
-        assert (
-            tree_text(Outcome(verdict, team="team", protocol=name, runtime="simulator", seed=0))
-            == f"  {name} builds no pseudo-tree"
+def test_a_protocol_without_a_tree_says_where_to_look() -> None:
+    def text(name: str, verdict: Verdict) -> str:
+        return tree_text(Outcome(verdict, team="team", protocol=name, runtime="simulator", seed=0))
+
+    for verdict in (Verdict.SOLUTION, Verdict.UNKNOWN):
+        assert text("abt", verdict).startswith(
+            "  abt builds no pseudo-tree; to see its messages and decisions, add --sniff"
         )
+    assert text("central", Verdict.UNKNOWN) == "  the central solver builds no pseudo-tree"
