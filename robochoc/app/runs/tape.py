@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from robochoc.app.sketch.sketch import Value
+from robochoc.app.texts import catalogue, say
 from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Began, Decided, Received, Sent, Settled
 from robochoc.journal.reader import Follower
@@ -41,7 +42,9 @@ class MessageWords(NamedTuple):
 
 
 def in_words(sent: Sent, spoken: JournalSentences) -> MessageWords:
-    """Return a message in words, without the name of its sender; long texts are shortened."""
+    """Return a message in words for everyone, without the name of its sender; long texts are shortened."""
+    if (key := f"message.{sent.type}") in catalogue():
+        return MessageWords(sent.sender, sent.receiver, sent.type, say(key))
     words = spoken.sentence(sent).removeprefix(f"{sent.sender} says: ").removeprefix(f"{sent.sender} says ")
     short = words if len(words) <= MOST_LETTERS else f"{words[: MOST_LETTERS - 1]}…"
     return MessageWords(sent.sender, sent.receiver, sent.type, short)

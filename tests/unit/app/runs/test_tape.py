@@ -5,18 +5,22 @@ from __future__ import annotations
 from contextlib import suppress
 from pathlib import Path
 from random import Random
+from typing import get_args
 
 import msgspec
 import pytest
 
 from robochoc.app.runs.player import LARGE_S, LEAST_S, MOST_S, Frames, Player
-from robochoc.app.runs.tape import MOST_MOMENTS, WORDS_SAVED, Tape, recorded
+from robochoc.app.runs.tape import MOST_MOMENTS, WORDS_SAVED, Tape, in_words, recorded
+from robochoc.app.texts import catalogue, say
 from robochoc.journal.entries import JournalEntry, JournalError
 from robochoc.journal.events import Began, Decided, Sent
 from robochoc.journal.journal import Header, JournalRecorder
+from robochoc.protocols.optimization.sfb import SFB
 from robochoc.run import Options, Runtime
 from robochoc.run.options import Withdrawal
 from robochoc.sniffer.growing_file import NoFileError
+from robochoc.sniffer.sentences import JournalSentences
 from tests.support.cases import looped
 from tests.support.recorded_journals import record
 from tests.support.small_teams import triangle
@@ -227,3 +231,11 @@ def test_that_a_large_team_is_drawn_now_and_then_while_it_is_played() -> None:
     assert 9 <= len(drawn) * LARGE_S <= 10
     assert large.is_due(ticks[-1], large=True, playing=False)
     assert all(still.is_due(tick, large=True, playing=False) for tick in ticks)
+
+
+def test_messages_of_sfb_are_in_words_for_everyone() -> None:
+    sfb = {kind.__name__ for kind in get_args(SFB.messages)}
+    assert {key.removeprefix("message.") for key in catalogue() if key.startswith("message.")} == sfb
+    for kind in sfb:
+        sent = msgspec.structs.replace(SENT, type=kind)
+        assert in_words(sent, JournalSentences()) == ("A", "B", kind, say(f"message.{kind}"))
