@@ -102,5 +102,5 @@ def test_the_picture_of_the_architecture_shows_the_layers() -> None:
 
 def test_the_readme_is_short_and_shows_where_to_read_on() -> None:
     readme = ROOT / "README.md"
-    assert readme.stat().st_size <= 6_000
+    assert readme.stat().st_size <= 5_000
     assert {f"docs/{place}/index.md" for place in ("tutorials", "guides")} <= {*links_of(readme)}
