@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
+.PHONY: demo demo-11 docs test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom release audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -179,6 +179,10 @@ sbom: $(TOOLS)/.ready  ## what robochoc consists of, with its extras network and
 	@$(TOOLS)/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible -o out/sbom.cdx.json $(VENV)/sbom
 	@rm -rf $(VENV)/sbom
 	@echo out/sbom.cdx.json
+
+# hatchling and mypyc are those of the compiled core's environment.
+release: $(TOOLS)/.ready $(COMPILED)/.ready sbom  ## sdist and wheels, checked and tried, and the SBOM: out/release; publishes nothing
+	PYTHONPATH=. $(COMPILED)/bin/python -m tests.support.release --twine $(TOOLS)/bin/twine --sbom out/sbom.cdx.json -o out/release
 
 audit: $(TOOLS)/.ready  ## known vulnerabilities of what is locked, as PyPI's service knows them
 	@$(PYTHON) tests/support/audit.py $(TOOLS)/bin/pip-audit requirements/*.txt
