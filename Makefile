@@ -172,11 +172,13 @@ lock: $(TOOLS)/.ready  ## requirements/*.txt from pyproject.toml: make lock NEWE
 	$(subst pyproject.toml,,$(LOCK)) --group tools -c requirements/build.txt -o requirements/tools.txt
 
 # An environment that has nothing else says licences and what needs what, which a lock does not.
+VERSION = $(shell sed -n 's/^__version__ = "\(.*\)"/\1/p' robochoc/__init__.py)
 sbom: $(TOOLS)/.ready  ## what robochoc consists of, with its extras network and ros, in CycloneDX: out/sbom.cdx.json
 	@mkdir -p out && rm -rf $(VENV)/sbom
 	@$(PYTHON) -m venv --without-pip $(VENV)/sbom
 	@$(TOOLS)/bin/uv pip install --quiet --python $(VENV)/sbom/bin/python --require-hashes --no-build -r requirements/extras.txt
-	@$(TOOLS)/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible -o out/sbom.cdx.json $(VENV)/sbom
+	@sed 's/^dynamic = \["version"\].*/version = "$(VERSION)"/' pyproject.toml >$(VENV)/sbom/pyproject.toml
+	@$(TOOLS)/bin/cyclonedx-py environment --pyproject $(VENV)/sbom/pyproject.toml --output-reproducible -o out/sbom.cdx.json $(VENV)/sbom
 	@rm -rf $(VENV)/sbom
 	@echo out/sbom.cdx.json
 

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 import re
 import tomllib
+import zipfile
+from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
 from robochoc import __version__
 from tests.support.program import ROOT
+from tests.support.release import NEEDED, faults_of, package_files, too_large
 
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
@@ -36,3 +40,52 @@ def test_the_citation_has_what_its_format_requires() -> None:
     assert citation["title"].startswith("robochoc")
     assert citation["authors"] == [{"name": author["name"]} for author in PROJECT["project"]["authors"]]
     assert citation["license"] == PROJECT["project"]["license"]
+
+
+# `make release`
+
+PURE, COMPILED = "robochoc-1.0.0-py3-none-any.whl", "robochoc-1.0.0-cp311-cp311-linux_x86_64.whl"
+TRACKED = ["tests/conftest.py", "robochoc/__init__.py", "robochoc/abt.py", "xsd/robot.xsd", *NEEDED]
+
+
+def wheel_with(name: str, version: str, folder: Path, *files: str) -> Path:
+    with zipfile.ZipFile(folder / name, "w") as packed:
+        for file in files:
+            packed.writestr(file, "")
+        packed.writestr(f"robochoc-{version}.dist-info/METADATA", f"Version: {version}\n")
+    return folder / name
+
+
+def test_a_wheel_has_all_that_is_in_git_and_nothing_else(tmp_path: Path) -> None:
+    expected = package_files(TRACKED)
+    assert "robochoc/xsd/robot.xsd" in expected
+    assert "tests/conftest.py" not in expected
+    assert [*faults_of(wheel_with(PURE, __version__, tmp_path, *expected), expected)] == []
+    module = "robochoc/abt.cpython-311-x86_64-linux-gnu.so"
+    assert [*faults_of(wheel_with(COMPILED, __version__, tmp_path, *expected, module), expected)] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "version", "without", "with_", "fault"),
+    [
+        (PURE, __version__, "robochoc/py.typed", "", "robochoc/py.typed is missing"),
+        (PURE, __version__, "", "tests/conftest.py", "tests/conftest.py should not be in it"),
+        (PURE, __version__, "", "robochoc/abt.py.orig", "robochoc/abt.py.orig should not be in it"),
+        (PURE, __version__, "", "robochoc/abt.so", "1 compiled modules"),
+        (COMPILED, __version__, "", "", "0 compiled modules"),
+        (PURE, "0.1.0", "", "", "its version is 0.1.0"),
+    ],
+)
+def test_a_wheel_that_is_not_as_it_should_be(
+    name: str, version: str, without: str, with_: str, fault: str, tmp_path: Path
+) -> None:
+    files = (package_files(TRACKED) | {with_}) - {without, ""}
+    (found,) = faults_of(wheel_with(name, version, tmp_path, *files), package_files(TRACKED))
+    assert fault in found
+
+
+def test_a_wheel_that_has_grown_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tests.support.release.MOST_BYTES", {"wheel": 500, "sdist": 1_000})
+    wheel = wheel_with(PURE, __version__, tmp_path, "robochoc/__init__.py")
+    assert [*too_large([wheel])] == []
+    assert [*too_large([wheel_with(PURE, __version__, tmp_path, *"abcdefgh")])] != []

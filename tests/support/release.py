@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import hashlib
+import itertools
 import os
 import shutil
 import subprocess
@@ -100,7 +101,10 @@ def pythons() -> list[Path]:
     versions = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     found = []
     for version in PYTHONS:
-        places = [shutil.which(f"python{version}"), *sorted(versions.glob(f"{version}.*/bin/python{version}"))]
+        places = [
+            shutil.which(f"python{version}"),
+            *map(str, sorted(versions.glob(f"{version}.*/bin/python{version}"))),
+        ]
         for place in filter(None, places):
             asked = [place, "-c", "import sys, venv; print('%d.%d' % sys.version_info[:2])"]
             done = subprocess.run(asked, capture_output=True, text=True, check=False)
@@ -113,7 +117,7 @@ def pythons() -> list[Path]:
 def tried(python: Path, wheel: Path) -> str:
     """Install the wheel in a new environment, and run the program there, far from the sources; return a line."""
     readme = blocks_of((ROOT / "README.md").read_text(encoding="utf-8"))
-    example, printed = next((a, b) for a, b in zip(readme, readme[1:], strict=False) if a.kind == "python")
+    example, printed = next((a, b) for a, b in itertools.pairwise(readme) if a.kind == "python")
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place)
         run(python, "-m", "venv", folder / "venv")
@@ -133,8 +137,9 @@ def tried(python: Path, wheel: Path) -> str:
             raise ReleaseError(f"{python}: robochoc demo wrote an empty page")
         size = sum(file.stat().st_size for file in (folder / "venv").rglob("*") if file.is_file())
         packages = run(bin_ / "pip", "list", "--disable-pip-version-check", "--format=freeze").splitlines()
-    return f"{version}, Python {python.name.removeprefix('python')}: installed in {seconds:.0f} s" + (
-        f" ({len(packages)} packages, {size / 1e6:.0f} MB); README's example and robochoc demo work"
+    return (
+        f"{version}, Python {python.name.removeprefix('python')}: installed in {seconds:.0f} s ({len(packages)}"
+        f" packages, {size / 1e6:.0f} MB); README's example and robochoc demo work"
     )
 
 
