@@ -81,10 +81,8 @@ def test_a_gap_is_told_once_a_search_of_each() -> None:
     assert transport.heard_of(LostFrames) == [LostFrames("RA", 5), LostFrames("RA", 2), LostFrames("RC", 1)]
 
 
-def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)") -> SharedRecord:
-    return SharedRecord(
-        "RC<RB:C", "C", PredicateRecord("p", ("X", "Y"), body), scope, scope, ConstraintModel.TKC, INFINITE
-    )
+def copy(scope: tuple[str, ...] = ("B", "C"), body: str = "ne(X, Y)", cost: float = INFINITE) -> SharedRecord:
+    return SharedRecord("RC<RB:C", "C", PredicateRecord("p", ("X", "Y"), body), scope, scope, ConstraintModel.TKC, cost)
 
 
 def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived:
@@ -97,6 +95,8 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
         ([copies("RC", copy(body="ne(X,"))], "the definition 'p'"),
         ([copies("RC", copy(body="(" * 9000))], "the definition 'p'"),
         ([copies("RC", copy(scope=("B", "B", "C")))], "3 arguments where 2"),
+        ([copies("RC", copy(cost=-1.0))], "the cost -1.0 of 'C' must be 0 or more"),
+        ([copies("RC", copy(cost=float("nan")))], "the cost nan of 'C' must be 0 or more"),
         ([copies("RC", copy(scope=("B", "Z")))], "RC has sent 'C', whose scope is not allowed"),
         ([copies("RC", copy(scope=("A", "C")))], "RC has sent 'C', whose scope is not allowed"),
         ([copies("RC", copy(scope=("A", "B")))], "RC has sent 'C', whose scope is not allowed"),

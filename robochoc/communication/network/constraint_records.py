@@ -97,7 +97,9 @@ def known_of(record: SharedRecord) -> KeyedConstraint:
         raise SharedConstraintError(f"the scope of {shortened(record.name)!r} is invalid")
     definition = _definition(record.definition)
     arity = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
-    if arity != len(record.parameters) or not record.cost >= 0:
+    if not record.cost >= 0:
+        raise SharedConstraintError(f"the cost {record.cost!r} of {shortened(record.name)!r} must be 0 or more")
+    if arity != len(record.parameters):
         raise SharedConstraintError(
             f"{shortened(record.name)!r} has {len(record.parameters)} arguments where {arity} are needed"
         )

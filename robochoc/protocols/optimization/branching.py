@@ -285,7 +285,7 @@ class BranchingProtocol(TreeProtocol):
     def store_subtree(self, child: str, result: Result) -> None:
         """Store the robots in the subtree of `child`, from its first assignment."""
         if child not in result.values or self.problem.agent in result.values:
-            raise ValueError(f"{child} returns the values of other robots")
+            raise ValueError(f"{child} sent an assignment without its own value, or with that of {self.problem.agent}")
         self._below.setdefault(child, tuple(result.values))
 
     def send_lower_limits(self) -> None:

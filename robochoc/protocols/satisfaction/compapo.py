@@ -450,7 +450,7 @@ class CompAPO(Protocol):
             if not reply.tables or not all(
                 sender in table.robots and {*table.robots} <= {*self.order.names} for table in reply.tables
             ):
-                raise ValueError(f"{sender} sends constraints that it is not part of")
+                raise ValueError(f"{sender} sent no constraints, or constraints without it or with unknown robots")
             self.tables[sender] = reply.tables
         self.replies[sender] = reply
 
