@@ -131,10 +131,25 @@ COUNT ?= 100
 mutate: $(READY)  ## all packages, changed in one place each: do the tests notice? make mutate SEED=1 COUNT=100 FILES=...
 	$(BIN)/python -m tests.mutation --count $(COUNT) --seed $(SEED) --jobs $(JOBS) $(FILES)
 
-lint: $(READY)
+# Tools in an environment of their own: their versions and the project's cannot be in each other's way.
+TOOLS := $(VENV)/tools
+$(TOOLS)/.ready: requirements/build.txt requirements/tools.txt
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/$(PIP) --quiet $(LOCKED) requirements/tools.txt
+	@touch $@
+
+# Workflows, issue forms and CITATION.cff by their schemas; workflows also for what makes them unsafe.
+CHECK = $(TOOLS)/bin/check-jsonschema --quiet --builtin-schema
+lint: $(READY) $(TOOLS)/.ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
+	$(CHECK) vendor.github-workflows .github/workflows/*.yml
+	$(CHECK) vendor.github-issue-forms .github/ISSUE_TEMPLATE/bug.yml .github/ISSUE_TEMPLATE/protocol.yml
+	$(CHECK) vendor.github-issue-config .github/ISSUE_TEMPLATE/config.yml
+	$(CHECK) vendor.dependabot .github/dependabot.yml
+	$(CHECK) vendor.citation-file-format CITATION.cff
+	$(TOOLS)/bin/zizmor --offline --quiet .github
 	@git ls-files 'robochoc/*.py' | xargs wc -l | awk '$$1 > 700 && $$2 != "total" {print "warning: " $$2 " has " $$1 " lines: does it have one subject?"}'
 
 type: $(READY)
@@ -151,13 +166,6 @@ bench: $(READY)  ## figures into benchmarks/RESULTS.md
 
 journals: $(READY)  ## rewrite the golden journals: a changed one is a changed protocol
 	$(BIN)/python -m tests.support.golden
-
-# Tools in an environment of their own: their versions and the project's cannot be in each other's way.
-TOOLS := $(VENV)/tools
-$(TOOLS)/.ready: requirements/build.txt requirements/tools.txt
-	$(PYTHON) -m venv $(TOOLS)
-	$(TOOLS)/bin/$(PIP) --quiet $(LOCKED) requirements/tools.txt
-	@touch $@
 
 # Versions stay where they still fit pyproject.toml; NEWEST=1 takes the newest. The index is not written down: it is the
 # one that uv is set to here. docs.txt has most, and the others keep to its versions.

@@ -45,7 +45,8 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
             if _asked():
                 raise RuntimeError(f"mypyc or the C compiler has failed:\n{failure}\n{NEXT}")
             return
-        made = [*self._folder.glob("*.so"), *self._folder.glob("robochoc/**/*.so")]
+        places = [f"{folder}*.{suffix}" for folder in ("", "robochoc/**/") for suffix in ("so", "pyd")]
+        made = [path for place in places for path in self._folder.glob(place)]
         build_data["force_include"].update({str(path): str(path.relative_to(self._folder)) for path in made})
         build_data.update(pure_python=False, infer_tag=True)
 
@@ -69,7 +70,9 @@ def may_compile() -> bool:
 
 def _compiled(root: Path, folder: Path, modules: list[str]) -> str:
     """Compile the modules in a copy of the package; return what went wrong, or nothing."""
-    shutil.copytree(root / "robochoc", folder / "robochoc", ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    shutil.copytree(
+        root / "robochoc", folder / "robochoc", ignore=shutil.ignore_patterns("__pycache__", "*.so", "*.pyd")
+    )
     words = [sys.executable, __file__, *modules]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - ourselves
     return "" if done.returncode == 0 else done.stdout + done.stderr

@@ -42,6 +42,34 @@ def test_the_citation_has_what_its_format_requires() -> None:
     assert citation["license"] == PROJECT["project"]["license"]
 
 
+def test_workflows_run_targets_that_exist_and_actions_of_known_owners() -> None:
+    targets = {*re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)}
+    used, actions = set(), set()
+    for file in (ROOT / ".github" / "workflows").glob("*.yml"):
+        workflow = yaml.safe_load(file.read_text())
+        assert workflow["permissions"] == {"contents": "read"}, file  # more is granted to single jobs
+        for job in workflow["jobs"].values():
+            assert job["timeout-minutes"] <= 120, file
+            actions |= {step["uses"].partition("/")[0] for step in job["steps"] if "uses" in step}
+            runs = [step["run"] for step in job["steps"] if "run" in step]
+            used |= {
+                word
+                for run in runs
+                for words in re.findall(r"^make (.+)$", run, re.MULTILINE)
+                for word in words.split()
+            }
+    assert {"lint", "type", "test", "docs", "release"} <= used <= targets
+    assert actions == {"actions", "pypa"}
+
+
+def test_only_the_job_that_publishes_may_publish() -> None:
+    workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "release.yml").read_text())
+    allowed = {name: job.get("permissions") for name, job in workflow["jobs"].items()}
+    assert allowed == {"sdist": None, "wheels": None, "publish": {"id-token": "write", "attestations": "write"}}
+    assert {*workflow["jobs"]["publish"]["needs"]} == {"sdist", "wheels"}
+    assert workflow["jobs"]["publish"]["environment"]["name"] == "pypi"
+
+
 # `make release`
 
 PURE, COMPILED = "robochoc-1.0.0-py3-none-any.whl", "robochoc-1.0.0-cp311-cp311-linux_x86_64.whl"
