@@ -5,7 +5,7 @@
     >>> outcome.verdict
     <Verdict.NO_SOLUTION: 'no-solution'>
 
-Both are thin, and on the same code as the command line.
+Both are thin layers over the code that the command line uses.
 """
 
 from __future__ import annotations
@@ -38,14 +38,15 @@ class Problem(Solvable):
     """A constraint problem that a team of robots can solve.
 
     Attributes:
-        team: The robots, their variables and constraints: from files, a generator, or built in Python.
-        names: The original names of robots and variables, by the team's, where it is from a file of another tool.
-            Solutions speak in these.
-        notes: The changes made on reading the file, as `robochoc import` reports them: pairs of keyword and sentence.
-        ordered: Whether somebody has given the robots their priority order. Files of other tools give none.
+        team: The robots, their variables and constraints, read from files, generated, or built in Python.
+        names: For a problem in a file of another tool: the original names of robots and variables, by their names in
+            the team. Solutions use the original names.
+        notes: The changes made while reading the file, as `robochoc import` reports them: pairs of keyword and
+            sentence.
+        ordered: Whether the priority order of the robots was given. Files of other tools give no order.
 
     Raises:
-        InvalidInputError: if the team is invalid. It lists every mistake.
+        InvalidInputError: if the team is invalid. The error lists every mistake.
     """
 
     team: Team
@@ -75,15 +76,15 @@ class Problem(Solvable):
 
 
 def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner: str | None = None) -> Problem:
-    """Return the problem of the team whose files are in a folder, or the problem in a file of another tool.
+    """Return the problem in a team's folder, or in a file of another tool.
 
     Args:
         path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time; or a file
             of FRODO, DisChoco, pyDCOP, XCSP3 or toulbar2.
         *more: Further files of the same problem, such as pyDCOP's distribution and scenario.
-        infinity: Of such a file: costs of at least so much forbid. None: none do.
-        owner: Of such a file: a regular expression; variables whose names have the same match, or first group, belong
-            to one robot. None: each variable has its own robot.
+        infinity: For files of other tools: costs of this value or more forbid. None: no cost forbids.
+        owner: For files of other tools: a regular expression. Variables whose names have the same match (or the same
+            first group) belong to one robot. None: each variable has its own robot.
 
     Raises:
         InvalidInputError: if the files are invalid. It lists every mistake with its file and line.
@@ -99,7 +100,7 @@ def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner
 
 @dataclass
 class AgentsContainer:
-    """The agents that run on one of several machines: the master, or robots. The paper's Figures 3 and 4 in Python.
+    """The agents on one of several machines: the master, or robots (Figures 3 and 4 of the paper, in Python).
 
     The master's machine (Figure 3):
 
@@ -116,7 +117,7 @@ class AgentsContainer:
         container.set_main_container("192.168.1.14")
         container.run()
 
-    The second part of the type names the protocol: by its class (`MasterAFCng`), or by its installed name.
+    The second part of the type is the protocol: the name of its class (`MasterAFCng`), or its installed name.
     """
 
     _type: str = ""
@@ -127,13 +128,13 @@ class AgentsContainer:
     _identities: dict[str, tuple[Path | None, str | None]] = field(default_factory=dict)
 
     def set_agent_type(self, kind: str) -> None:
-        """Say whether this container runs the master or robots, and name the protocol.
+        """Set whether this container runs the master or robots, and their protocol.
 
         Args:
-            kind: `Master` or `Agent`, and the protocol: `MasterABT`, `AgentABT`.
+            kind: `Master` or `Agent`, followed by the protocol: `MasterABT`, `AgentABT`.
 
         Raises:
-            ValueError: if `kind` begins otherwise.
+            ValueError: if `kind` does not begin with `Master` or `Agent`.
             UnknownProtocolError: if no such protocol is installed.
         """
         if not kind.startswith((_MASTER, _AGENT)):
@@ -146,32 +147,32 @@ class AgentsContainer:
 
         Args:
             name: The name of the robot or the master.
-            file: The robot's XML file. The master has none.
+            file: The robot's XML file. The master has no file.
             sniff: Whether the sniffer at the master shows the messages that the agent sends and receives.
         """
         self._agents[name] = (None if file is None else Path(file), sniff)
 
     def set_main_container(self, place: str) -> None:
-        """Set the address of the master, for a robot.
+        """Set the address of the master, on a robot's machine.
 
         Args:
             place: `HOST` or `HOST:PORT`.
 
         Raises:
-            AddressError: if it is not an address.
+            AddressError: if `place` is not an address.
         """
         from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
         self._main = Address.parse(place)
 
     def set_listen(self, place: str) -> None:
-        """Set the address at which the master listens. The default is this machine alone (loopback).
+        """Set the address at which the master listens. By default only this machine can connect (loopback).
 
         Args:
             place: `HOST` or `HOST:PORT`.
 
         Raises:
-            AddressError: if it is not an address.
+            AddressError: if `place` is not an address.
         """
         from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
@@ -182,27 +183,27 @@ class AgentsContainer:
         self._authority = Path(folder)
 
     def set_identity(self, name: str, folder: Path | str | None = None, token: str | None = None) -> None:
-        """Set where the robot `name` finds its identity.
+        """Set the folder or the token with which the robot `name` proves its identity.
 
         Args:
             name: The robot's name.
-            folder: The folder with its key and certificate. The default is in the user's data folder.
-            token: The token by which it enrols, if it has no certificate yet.
+            folder: The folder with the robot's key and certificate. The default is in the user's data folder.
+            token: The token with which the robot enrols if it has no certificate yet.
         """
         self._identities[name] = (None if folder is None else Path(folder), token)
 
     def run(self, observer: Observer | None = None, **plan: Any) -> Outcome | dict[str, Ending]:  # noqa: ANN401
-        """Run the agents of this container until the run is over.
+        """Run the agents of this container until the run ends.
 
         Args:
-            observer: It is called with every event that the master sees.
+            observer: Called with every event that the master receives.
             **plan: Other fields of `robochoc.run.networked.master_run.Plan`, for the master.
 
         Returns:
-            On the master's machine the outcome; on a robots' machine how each robot ended, by its name.
+            On the master's machine, the outcome; on a machine of robots, how each robot ended, by name.
 
         Raises:
-            ValueError: if the container has no type, or a robot no file or no master.
+            ValueError: if the container has no type, or a robot has no file or no master.
         """
         if not self._type:
             raise ValueError("say first what this container is: set_agent_type('MasterABT') or ('AgentABT')")
@@ -244,7 +245,7 @@ class AgentsContainer:
 
 
 def protocol_called(word: str) -> str:
-    """Return the installed name of the protocol that the paper's type names: `ABT` is `abt`.
+    """Return the installed name of the protocol in a type of the paper: `abt` for `ABT`.
 
     Raises `UnknownProtocolError`.
     """

@@ -1,1 +1,1 @@
-"""Models in Python: a problem in a few lines, from which the robots' knowledge follows (`robochoc.Model`)."""
+"""Models in Python (`robochoc.Model`): a problem in a few lines, from which each robot's knowledge is derived."""

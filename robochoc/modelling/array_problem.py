@@ -1,6 +1,6 @@
-"""Problems of very many robots as numpy arrays: no files, no objects, one variable for each robot.
+"""Problems with very many robots, stored as numpy arrays, without files or objects. Each robot has one variable.
 
-They are solved by the runtime `arrays` (docs/guides/arrays.md).
+The runtime `arrays` solves them (docs/guides/arrays.md).
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError
 
 _TABLE = _PAIR = 2
-"""The axes of one table; the robots of an edge."""
+"""The number of axes of one table, and the number of robots on an edge."""
 MOST_ROBOTS = 1 << 31
-"""The square of their number fits into 64 bits."""
+"""The most robots: the square of this number fits into 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -44,11 +44,11 @@ class ArraySolution:
     """The result of a run on arrays.
 
     Attributes:
-        verdict: `solution`, or `no-solution`, or `unknown`: every cycle violates a hard constraint.
-        values: The values of the cheapest cycle, by robot. None: every cycle violates a hard constraint.
-        cost: The cost of the values. None: there are none.
-        costs: The cost of every cycle, from 0; `inf` where a hard constraint is violated.
-        metrics: Messages by type, bytes, checks, NCCCs (0 if not counted), as in the simulator.
+        verdict: `solution`, `no-solution`, or `unknown` if every cycle violates a hard constraint.
+        values: The values in the cheapest cycle, by robot. None: every cycle violates a hard constraint.
+        cost: The cost of `values`. None: there are no values.
+        costs: The cost of every cycle, starting with cycle 0; `inf` if the cycle violates a hard constraint.
+        metrics: The messages by type, bytes, checks and NCCCs (0 if not counted), as in the simulator.
     """
 
     verdict: Verdict
@@ -66,18 +66,18 @@ class ArraySolution:
 
 
 class ArrayProblem:
-    """A team of robots with one variable each, whose values are 0, 1, ..., and costs between pairs of robots.
+    """A team of robots with one variable each, whose values are 0, 1, ..., and with costs between pairs of robots.
 
-    Robots are numbers from 0, the highest in the priority order.
+    Robots are numbered from 0, the highest in the priority order.
 
     Args:
         robots: The number of robots.
         values: The number of values of each variable.
-        edges: The pairs of robots with a table of costs, one row for each pair.
-        tables: The costs of pairs of values: row and column are the values of an edge's first and second robot. One
-            table for all edges, or one for each, or several from which `which` chooses. Integers of 0 or more,
-            and `inf` for forbidden pairs.
-        which: The number of the table of each edge.
+        edges: The pairs of robots that share a table of costs, one row for each pair.
+        tables: The costs for pairs of values: the row is the value of an edge's first robot, the column that of its
+            second. One table for all edges, one for each edge, or several from which `which` chooses. Costs are
+            integers of 0 or more, and `inf` for forbidden pairs.
+        which: The index of each edge's table.
         charges: The unary costs of the values, one row for each robot.
         names: The names of the robots, which determine their random numbers. None: R0, R1, ...
 
@@ -124,24 +124,24 @@ class ArrayProblem:
         ncccs: bool = True,
         **settings: object,
     ) -> ArraySolution:
-        """Solve the problem by a protocol that supports arrays, and check the answer with the tables.
+        """Solve the problem by a protocol that supports arrays, and check the cost of the answer.
 
         Args:
             protocol: The protocol: dsa, mgm, mgm2 or maxsum.
             seed: The seed of the robots' random numbers.
-            timeout: A limit in seconds, checked after each cycle.
+            timeout: A time limit in seconds, checked after each cycle.
             ncccs: Whether to count NCCCs, which takes up to a fifth of the time.
             **settings: The protocol's settings, such as `cycles` or `variant`.
 
         Returns:
-            The cheapest cycle (anytime), and the metrics of the run.
+            The values in the cheapest cycle (anytime), and the metrics of the run.
 
         Raises:
             UnknownProtocolError: if no such protocol is installed.
             UnsupportedError: if the protocol does not support arrays, a setting is not allowed, or costs are too large.
-            RefutedError: if the cost of the answer differs from the run's.
-            ValueError: if an option has a value that is not allowed.
-            TypeError: if an option has a value of a wrong type.
+            RefutedError: if the cost of the answer differs from the cost that the run reported.
+            ValueError: if the value of an option is not allowed.
+            TypeError: if the value of an option has the wrong type.
         """
         limit_s = Options(timeout=timeout).timeout
         began = time.monotonic()
@@ -153,7 +153,7 @@ class ArrayProblem:
         return self._solution(run, time.monotonic() - began)
 
     def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
-        """Return an unstarted run, for callers that need each cycle (`cycles_of`). Arguments as in `solve`."""
+        """Return an unstarted run, for callers that need each cycle (`cycles_of`). See `solve` for the arguments."""
         options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
         kind = protocol_named(options.protocol)
         refuse_settings(options.protocol, kind, options.settings)
@@ -165,7 +165,7 @@ class ArrayProblem:
         return form(self.layout, chosen, options.seed, clocks=ncccs)
 
     def cost(self, values: ArrayLike) -> float:
-        """Return the cost of the values of all robots. Raise `ValueError` if a value is missing or invalid."""
+        """Return the cost of an assignment to all robots. Raises `ValueError` if a value is missing or invalid."""
         values = _whole("values", values)
         if values.shape != (self.robots,) or not _within(values, self.values):
             raise ValueError(f"expected a value from 0 to {self.values - 1:,} for each of {self.robots:,} robots")
@@ -177,7 +177,7 @@ class ArrayProblem:
 
     @cached_property
     def layout(self) -> ArrayLayout:
-        """The arrays of the runtime; computed once."""
+        """The arrays for the runtime, computed once."""
         return ArrayLayout(self._described())
 
     def __repr__(self) -> str:
@@ -201,7 +201,7 @@ class ArrayProblem:
         )
 
     def _held(self) -> KnownConstraints:
-        """Return the constraints of both robots of each edge."""
+        """Return the constraints as each of an edge's two robots knows them."""
         first, second = self.edges.T
         turned = self.tables.swapaxes(1, 2)
         alike = bool((turned == self.tables).all())
@@ -227,14 +227,14 @@ class ArrayProblem:
         )
 
     def _tables_of_edges(self, which: ArrayLike | None) -> Integers:
-        """Return the number of the table of each edge."""
+        """Return the index of each edge's table."""
         if which is not None:
             return _whole("which", which)
         several = len(self.tables) > 1
         return np.arange(len(self.tables)) if several else np.zeros(len(self.edges), np.int64)
 
     def _check_shapes(self) -> None:
-        """Raise `ValueError` for invalid numbers and shapes, with which `_check` compares others."""
+        """Raise `ValueError` if the sizes, with which `_check` compares the arrays, are invalid."""
         shape = (self.values, self.values)
         _refuse_first(
             {
@@ -265,7 +265,7 @@ class ArrayProblem:
 
 
 def _refuse_first(faults: Mapping[str, bool]) -> None:
-    """Raise `ValueError` with the first violated rule."""
+    """Raise `ValueError` for the first violated rule."""
     for rule, broken in faults.items():
         if broken:
             raise ValueError(f"invalid arrays: {rule}")
@@ -279,10 +279,10 @@ def _index(name: str, given: int) -> int:
 
 
 def _numbers(name: str, given: ArrayLike) -> NDArray[Any]:
-    """Return `given` as an array. Raise `ValueError` unless it contains only real numbers."""
+    """Return `given` as an array. Raises `ValueError` unless it contains only real numbers."""
     try:
         found = np.asarray(given)
-    except (ValueError, TypeError):  # rows of several lengths
+    except (ValueError, TypeError):  # rows of different lengths
         raise ValueError(f"{name} are not an array of numbers") from None
     if found.dtype.kind not in "biuf":
         raise ValueError(f"{name} are not an array of numbers: numpy converts them to {found.dtype}")
@@ -290,7 +290,7 @@ def _numbers(name: str, given: ArrayLike) -> NDArray[Any]:
 
 
 def _whole(name: str, given: ArrayLike) -> Integers:
-    """Return `given` as an array of integers. Raise `ValueError` unless it contains only integers."""
+    """Return `given` as an array of integers. Raises `ValueError` unless it contains only integers."""
     found = _numbers(name, given)
     if found.dtype.kind == "b" or not (np.isfinite(found) & (np.floor(found) == found)).all():
         raise ValueError(f"{name} are not an array of integers")
@@ -311,7 +311,7 @@ def _are_costs(costs: Floats) -> bool:
 
 
 class _Names(Sequence[str]):
-    """R0, R1, ... without a string for each."""
+    """The names R0, R1, ..., computed on demand."""
 
     def __init__(self, many: int) -> None:
         self._many = many

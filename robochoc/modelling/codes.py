@@ -1,7 +1,8 @@
-"""Domains of users' values as domains of integers, and back.
+"""Conversion of domains between users' values and integers.
 
-The code of a number is the number times the least factor that makes all values integers; the code of a member of an
-`IntEnum` or of a truth value is its integer. All other values become symbols: code 2 is the model's third symbol.
+The code of a number is the number multiplied by the least factor that makes all values integers. The code of a truth
+value or of a member of an `IntEnum` is its integer. All other values become symbols: code 2 is the model's third
+symbol.
 """
 
 from __future__ import annotations
@@ -54,14 +55,14 @@ def kind_of(value: object) -> ValueKind:
 
 @dataclass(frozen=True)
 class DomainCodes:
-    """A domain as integers (codes), and the user's value of each.
+    """A domain as integers (codes), with the user's value for each code.
 
     Attributes:
-        kind: The kind of its values.
-        ranges: The integers.
+        kind: The kind of the values.
+        ranges: The codes.
         scale: For numbers: code = value * scale.
         user_values: The user's values by code. None: the codes are the values.
-        later: DomainCodes of values that events add.
+        later: The codes of values that events add.
     """
 
     kind: ValueKind
@@ -79,25 +80,25 @@ class DomainCodes:
 
     @property
     def symbolic(self) -> bool:
-        """Whether the codes are those of symbols."""
+        """Whether the codes are codes of symbols."""
         return self.kind not in {NUMBER, BOOLEAN}
 
     def value(self, code: int) -> object:
-        """Return the user's value of a code."""
+        """Return the user's value for a code."""
         return code if self.user_values is None else self.user_values.get(code, code)
 
     @property
     def ever(self) -> tuple[int, ...]:
-        """The codes of the domain, and those that events add."""
+        """The codes in the domain, and those that events add."""
         return (*self, *(code for code in self.later if not any(code in part for part in self.ranges)))
 
     @property
     def ends(self) -> tuple[int, int]:
-        """The least and the greatest code of `ever`."""
+        """The least and the greatest code in `ever`."""
         return min([self.ranges[0][0], *self.later]), max([self.ranges[-1][-1], *self.later])
 
     def code(self, value: object) -> int | None:
-        """Return the code of a user's value. None: the domain never has this value."""
+        """Return the code of a user's value, or None if the domain never contains the value."""
         if self.symbolic:
             return self._by_value.get(value)
         if not is_number(value):
@@ -107,10 +108,10 @@ class DomainCodes:
         return int(scaled) if known else None
 
     def with_value(self, value: Hashable, symbols: Symbols) -> tuple[DomainCodes, int]:
-        """Return the domain extended by a value that an event adds, and the value's code.
+        """Return the domain extended by a value that an event adds, and the code of that value.
 
         Raises:
-            ModelError: if the value is of another kind, or not a multiple of the domain's unit.
+            ModelError: if the value has another kind, or is not a multiple of the domain's unit.
         """
         if kind_of(value) != self.kind:
             raise ModelTypeError(f"{value!r} is {kind_of(value)}, and the domain has {self.kind}")
@@ -138,18 +139,18 @@ class Symbols:
         return tuple(self._codes)
 
     def add(self, word: str) -> int:
-        """Return the code of a symbol; a new symbol is added."""
+        """Return the code of a symbol, which is added if it is new."""
         return self._codes.setdefault(word, len(self._codes))
 
     def code(self, value: Hashable) -> int:
-        """Return the code of a user's value; a new value is added."""
+        """Return the code of a user's value, which is added if it is new."""
         kind = kind_of(value)
         if (kind, value) not in self._words:
             self._words[kind, value] = self._word(kind, value)
         return self.add(self._words[kind, value])
 
     def _word(self, kind: ValueKind, value: object) -> str:
-        """Return a free symbol for a value: its text or member name, adapted where it is not a valid symbol."""
+        """Return an unused symbol for a value: its text or member name, adapted if that is not a valid symbol."""
         text = value.name if isinstance(value, Enum) else str(value)
         word = text if _is_symbol(text) else "_".join(re.findall(r"[A-Za-z0-9.]+", text))[:80]
         word = word if _is_symbol(word) else f"v{word}"
@@ -176,7 +177,7 @@ def codes_of(domain: object, symbols: Symbols, place: SourceLine) -> DomainCodes
         ModelError: if the domain is invalid.
     """
     if isinstance(domain, range) and domain.step == 1:
-        _check_size(max(0, domain.stop - domain.start), place)  # `len` is limited to 64 bits
+        _check_size(max(0, domain.stop - domain.start), place)  # `len` fails beyond 64 bits
         return _integers([domain], place)
     if domain is bool:
         domain = (False, True)

@@ -1,4 +1,4 @@
-"""Constraints of a model, as `Model.add` and `ModelRobot.knows` return them."""
+"""The constraints of a model, which `Model.add` and `ModelRobot.knows` return."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class ModelConstraint:
-    """A constraint of a model, the result of `Model.add`.
+    """A constraint of a model, returned by `Model.add`.
 
     Attributes:
-        name: Its name.
+        name: The constraint's name.
         term: The condition.
-        cost: The cost of violating it. None: it is hard.
-        place: The line that added it.
-        when_absent: Its meaning when a robot of its scope is absent. None: as its form implies.
+        cost: The cost of violating the constraint. None: the constraint is hard.
+        place: The line that added the constraint.
+        when_absent: The constraint's meaning when a robot in its scope is absent. None: the default for its form.
     """
 
     name: str
@@ -37,7 +37,7 @@ class ModelConstraint:
         return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {shown(self.cost)}'}>"
 
     def drafts(self) -> Iterator[Draft]:
-        """Yield the drafts of this rule. Raises `ModelError` if `restate` is not possible."""
+        """Yield the drafts of this constraint. Raises `ModelError` if `restate` is not possible."""
         from robochoc.modelling.drafts import conditions, soft_condition  # noqa: PLC0415 - they need the formats
 
         if self.cost is None:
@@ -53,7 +53,7 @@ def conditions_in(given: object, place: SourceLine) -> list[Term]:
     """Return the conditions in `given`: a condition, or a nested list of conditions.
 
     Raises:
-        ModelError: if an element is not a condition, or is Python's `False`, such as `x is y`.
+        ModelError: if an element is not a condition, or is Python's `False`, as from `x is y`.
     """
     if isinstance(given, Iterable) and not isinstance(given, (Term, str)):
         return [term for one in given for term in conditions_in(one, place)]
@@ -67,7 +67,7 @@ def conditions_in(given: object, place: SourceLine) -> list[Term]:
 
 
 def check_owned(term: Term, known: Mapping[str, ModelVariable], place: SourceLine, event: object = None) -> None:
-    """Raise `ModelError` unless the model has the variables of `term`, already at the time of `event`."""
+    """Raise `ModelError` unless the model contains the variables of `term`, and already does when `event` happens."""
     for variable in term.variables:
         if known.get(variable.name) is not variable:
             message = f"{variable!r}, created at {variable.place}, is not a variable of this model"
@@ -78,12 +78,12 @@ def check_owned(term: Term, known: Mapping[str, ModelVariable], place: SourceLin
 
 
 def exact_or_none(cost: object) -> Exact | None:
-    """Return the exact cost of a constraint; None: it is hard."""
+    """Return the exact cost of a constraint, or None for a hard constraint."""
     return None if cost is None else exact(cost)
 
 
 def absence_or_none(when_absent: WhenAbsent | str | None, place: SourceLine) -> WhenAbsent | None:
-    """Return the meaning of a constraint when a robot is absent; None: as its form implies. Raises `ModelError`."""
+    """Return a valid meaning of a constraint when a robot is absent; None: the default. Raises `ModelError`."""
     try:
         return None if when_absent is None else WhenAbsent(when_absent)
     except ValueError:

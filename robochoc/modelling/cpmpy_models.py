@@ -1,8 +1,8 @@
-"""`robochoc.from_cpmpy`: a model of CPMpy (https://cpmpy.readthedocs.io), split over robots. An extra: `cpmpy`.
+"""`robochoc.from_cpmpy`: distributes a CPMpy model (https://cpmpy.readthedocs.io) over robots. Extra: `cpmpy`.
 
-Operators of CPMpy become predicates and cost functions; `AllDifferent`, `Element`, `Table`, `Cumulative` and some more
-are split here, without further variables. CPMpy decomposes other global constraints: the further variables of a
-decomposition belong to the robot of the constraint's first variable.
+CPMpy's operators become predicates and cost functions. `AllDifferent`, `Element`, `Table`, `Cumulative` and some others
+are split here, without auxiliary variables. CPMpy decomposes other global constraints: the auxiliary variables of a
+decomposition belong to the robot with the constraint's first variable.
 """
 
 from __future__ import annotations
@@ -39,10 +39,10 @@ def from_cpmpy(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
     """Return a CPMpy model as a problem for a team of robots.
 
     Args:
-        model: The model: integer and Boolean variables, constraints, and an objective or none. The objective is split
-            into a cost function for each scope of its terms.
-        owner: The robot of each variable: a mapping from names of variables, or a function of them. None: each
-            variable has a robot of its own. The robots' priorities follow the order of their first variables.
+        model: The model: integer and Boolean variables, constraints, and optionally an objective. The objective is
+            split into a cost function for each scope of its terms.
+        owner: The robot of each variable: a mapping from variable names, or a function of a variable name. None: each
+            variable has its own robot. The robots' priorities follow the order of their first variables.
         name: The name of the team.
 
     Returns:
@@ -64,7 +64,7 @@ def from_cpmpy(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
 
 
 def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmpy") -> Team:
-    """Return the team of `from_cpmpy`."""
+    """Return a CPMpy model as a team; see `from_cpmpy`."""
     try:
         import cpmpy  # noqa: PLC0415 - an extra
         from cpmpy.transformations.get_variables import get_variables  # noqa: PLC0415 - the same
@@ -101,7 +101,7 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
 
 
 class _Robots:
-    """The robots of variables: of the model's, and of the further ones in CPMpy's decompositions.
+    """The robots that own the model's variables, and the auxiliary variables in CPMpy's decompositions.
 
     Args:
         owned: The robot of each variable of the model.
@@ -114,11 +114,11 @@ class _Robots:
         self._owner = ""
 
     def owner_of_further(self, variables: Sequence[Any]) -> None:
-        """Assign further variables, from now on, to the robot of the first of `variables`."""
+        """Assign the auxiliary variables created from now on to the robot that owns the first of `variables`."""
         self._owner = self._owned[variables[0].name] if variables else next(iter(self._owned.values()))
 
     def add(self, variable: Any, posting: Posting) -> Expression:  # noqa: ANN401 - CPMpy's expressions
-        """Add a further variable to `posting`, and return it."""
+        """Add an auxiliary variable to `posting`, and return it."""
         made = posting.add_variable(
             self.names.allowed(_pretty(variable.name)), _values(variable), "part of a decomposition"
         )
@@ -172,7 +172,7 @@ def _as_range(values: Sequence[int]) -> range:
 
 
 def _posting(own: Mapping[str, Any], names: NameMap) -> Posting:
-    """Return the variables of a CPMpy model, without constraints."""
+    """Return a posting with the variables of a CPMpy model, without constraints."""
     values = {name: _values(variable) for name, variable in own.items()}
     pretty = {name: _pretty(name) for name in own}
     clear = len(set(pretty.values())) == len(pretty)
@@ -182,7 +182,7 @@ def _posting(own: Mapping[str, Any], names: NameMap) -> Posting:
 
 
 def _post_with_definitions(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
-    """Post a constraint that must hold, and the definitions of the further variables in it."""
+    """Post a constraint that must hold, and the definitions of its auxiliary variables."""
     _post(constraint, translation)
     _post_definitions(translation)
 
@@ -198,7 +198,7 @@ def _post_definitions(translation: Translation) -> None:
 
 
 def _post(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
-    """Post a constraint that must hold: tables and tasks directly, all others as predicates."""
+    """Post a constraint that must hold: tables and cumulatives directly, all others as predicates."""
     if _post_as_such(constraint, translation):
         return
     if hasattr(constraint, "decompose") and constraint.name not in TRANSLATED:
@@ -214,7 +214,7 @@ def _post(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - 
 
 
 def _post_as_such(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
-    """Post a table, a cumulative or the comparison of an element directly. Return whether that is possible."""
+    """Post a table, a cumulative or a comparison with an element directly. Return whether that is possible."""
     kind = getattr(constraint, "name", "")
     with translation.context() as conditions:
         match kind:
@@ -242,7 +242,7 @@ def _post_table(constraint: Any, translation: Translation) -> bool:  # noqa: ANN
 
 
 def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
-    """Post a comparison with an element of an array, on either side."""
+    """Post a comparison with an element of an array on either side."""
     left, right = constraint.args
     operator = COMPARISONS[constraint.name]
     if not _is_element(left):
@@ -255,7 +255,7 @@ def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: A
 
 
 def _is_element(term: Any) -> bool:  # noqa: ANN401 - CPMpy's expressions
-    """Return whether `term` is an element with distinct variables as indexes, of an array without terms."""
+    """Return whether `term` is an element of an array without terms, whose indexes are distinct variables."""
     if getattr(term, "name", "") not in {"element", "nd_element"}:
         return False
     array, *indexes = term.args

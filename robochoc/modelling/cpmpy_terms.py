@@ -1,9 +1,9 @@
-"""Translates CPMpy's expressions. CPMpy's operators are recognised by name; CPMpy is never imported.
+"""Translates CPMpy's expressions. CPMpy's operators are recognised by name, so CPMpy is not imported.
 
-A partial function (a quotient, an element of an array) has CPMpy's relational semantics: the nearest Boolean expression
-around it is false where it has no value. `Translation.boolean` attaches that condition, and nothing rewrites a CPMpy
-expression before it gets there: negations stay where the user wrote them, and a global constraint without a counterpart
-is decomposed at its own node.
+A partial function (a quotient, an element of an array) has CPMpy's relational semantics: where it is undefined, the
+nearest enclosing Boolean expression is false. `Translation.boolean` adds that condition. No CPMpy expression is
+rewritten before: negations stay where the user wrote them, and a global constraint without a counterpart is decomposed
+at its own node.
 """
 
 from __future__ import annotations
@@ -38,11 +38,11 @@ COMPARISONS = {"==": "eq", "!=": "ne", "<": "lt", "<=": "le", ">": "gt", ">=": "
 
 
 class VariableDefinition(NamedTuple):
-    """A constraint that defines a further variable of a decomposition.
+    """A constraint that defines an auxiliary variable of a decomposition.
 
     Attributes:
         constraint: CPMpy's constraint.
-        defined: The condition under which the arguments of the decomposed expression have values.
+        defined: The condition under which the arguments of the decomposed expression are defined.
     """
 
     constraint: Any
@@ -50,7 +50,7 @@ class VariableDefinition(NamedTuple):
 
 
 def integer_of(value: object) -> int:
-    """Return an integer of Python or NumPy. Raises `MistakeError` for anything else."""
+    """Return an integer of Python or NumPy as a Python integer. Raises `MistakeError` for any other value."""
     if isinstance(value, numbers.Integral):
         return int(value)
     if type(value).__name__ == "bool_":
@@ -61,20 +61,20 @@ def integer_of(value: object) -> int:
 
 
 def is_variable(term: object) -> bool:
-    """Return whether `term` is a variable of CPMpy, not a negation."""
+    """Return whether `term` is a CPMpy variable, and not a negation."""
     return hasattr(term, "lb") and hasattr(term, "ub") and not hasattr(term, "_bv")
 
 
 class Translation:
-    """Translates expressions over the variables of `posting`.
+    """Translates CPMpy expressions over the variables in `posting`.
 
     Args:
         posting: The variables.
-        add_variable: Adds a variable of a decomposition to `posting`, and returns it.
+        add_variable: Adds an auxiliary variable of a decomposition to `posting`, and returns it.
 
     Attributes:
         posting: The variables.
-        definitions: The definitions of further variables that are not posted yet.
+        definitions: The definitions of auxiliary variables that have not been posted yet.
     """
 
     def __init__(self, posting: Posting, add_variable: Callable[[Any], Expression]) -> None:
@@ -87,7 +87,7 @@ class Translation:
 
     @contextmanager
     def context(self) -> Iterator[list[Expression]]:
-        """Collect the conditions under which the integers translated inside have values."""
+        """Collect the conditions under which the integers translated in this context are defined."""
         outside, self._conditions = self._conditions, []
         try:
             yield self._conditions
@@ -95,7 +95,7 @@ class Translation:
             self._conditions = outside
 
     def integer(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
-        """Return `term` as an integer. Raises `MistakeError` if it has no counterpart."""
+        """Return `term` as an integer expression. Raises `MistakeError` if it has no counterpart."""
         if not hasattr(term, "name"):
             return Constant(integer_of(term))
         if is_variable(term):
@@ -111,11 +111,11 @@ class Translation:
         return as_integer(self.boolean(term))
 
     def integers(self, terms: Iterable[Any]) -> list[Expression]:
-        """Return all of `terms` as integers."""
+        """Return all `terms` as integer expressions."""
         return [self.integer(term) for term in (terms.flat if hasattr(terms, "flat") else terms)]
 
     def boolean(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
-        """Return `term` as a Boolean, which is false where an integer in it has no value.
+        """Return `term` as a Boolean expression, which is false where an integer in it is undefined.
 
         Raises:
             MistakeError: for an expression without a counterpart.
@@ -125,7 +125,7 @@ class Translation:
         return _guarded(conditions, found)
 
     def parts(self, term: Any) -> list[Expression]:  # noqa: ANN401 - CPMpy's expressions
-        """Return Booleans whose conjunction is `term`: for a constraint that must hold."""
+        """Return Boolean expressions whose conjunction is `term`, for a constraint that must hold."""
         with self.context() as conditions:
             found = self._unguarded(term)
         return [*conditions, found]
@@ -144,17 +144,17 @@ class Translation:
         raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "rewrite it with other operators")
 
     def booleans(self, terms: Iterable[Any]) -> list[Expression]:
-        """Return all of `terms` as Booleans."""
+        """Return all `terms` as Boolean expressions."""
         return [self.boolean(term) for term in (terms.flat if hasattr(terms, "flat") else terms)]
 
     def decomposed(self, term: Any, *, must_hold: bool = False) -> Any:  # noqa: ANN401 - CPMpy's expressions
         """Return CPMpy's decomposition of a global constraint or function, and record its definitions.
 
-        The conditions under which its arguments have values become those of the expression around it.
+        The conditions under which the arguments are defined become conditions of the enclosing expression.
 
         Args:
             term: The global constraint or function.
-            must_hold: Whether it is a constraint that must hold: its decomposition may be smaller.
+            must_hold: Whether `term` is a constraint that must hold. Its decomposition may then be smaller.
         """
         for argument in _leaves(term.args):
             self.integer(argument)
@@ -184,7 +184,7 @@ class Translation:
         return bounds(expression, {name: Interval(min(one), max(one)) for name, one in ends.items()})
 
     def has_value_if(self, condition: Expression) -> None:
-        """Record a condition under which the current expression has a value."""
+        """Record a condition under which the current expression is defined."""
         if condition not in self._conditions:
             self._conditions.append(condition)
 
@@ -204,7 +204,7 @@ class Translation:
         return Apply("pow", (base, exponent))
 
     def element(self, terms: Sequence[Any]) -> Expression:
-        """Return the element at the given indexes of an array."""
+        """Return the element of an array at the given indexes."""
         indexes, cells = self.cells(terms)
         chosen = []
         for place, cell in cells.items():
@@ -213,7 +213,7 @@ class Translation:
         return total([part for part in chosen if part != Constant(0)])
 
     def cells(self, terms: Sequence[Any]) -> tuple[list[Expression], dict[tuple[int, ...], Expression]]:
-        """Return the indexes of an element, and the elements of its array by position."""
+        """Return the indexes of an element, and the elements of the array by position."""
         array, *others = terms
         shape = array.shape if hasattr(array, "shape") else (len(array),)
         members, indexes = self.integers(array), self.integers(others)
@@ -224,7 +224,7 @@ class Translation:
         return indexes, dict(zip(itertools.product(*map(range, shape)), members, strict=True))
 
     def table(self, terms: Sequence[Any]) -> Expression:
-        """Return the condition that a list of terms equals a row of a table."""
+        """Return the condition that a list of terms equals one of a table's rows."""
         members = self.integers(terms[0])
         rows = [[Constant(integer_of(value)) for value in row] for row in terms[1]]
         return disjunction(
@@ -232,7 +232,7 @@ class Translation:
         )
 
     def pairs(self, terms: Iterable[Any]) -> Iterable[tuple[Expression, Expression]]:
-        """Return all pairs of elements of a list."""
+        """Return all pairs of elements in a list."""
         return itertools.combinations(self.integers(terms), 2)
 
 
@@ -246,9 +246,10 @@ def _leaves(arguments: Any) -> Iterator[Any]:  # noqa: ANN401 - CPMpy's expressi
 
 
 def _guarded(conditions: Sequence[Expression], found: Expression) -> Expression:
-    """Return `found`, or false where a condition does not hold; `found` is not evaluated there.
+    """Return `found`, or false where a condition does not hold. `found` is not evaluated there.
 
-    A condition may be defined only where the previous conditions hold. Those always defined are evaluated together.
+    A condition may be undefined unless all previous conditions hold. Conditions that are always defined are evaluated
+    together.
     """
     if not conditions:
         return found
@@ -323,4 +324,4 @@ _BOOLEANS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
 }
 
 TRANSLATED = frozenset((*_INTEGERS, *_BOOLEANS))
-"""CPMpy's names of the translated operators, global constraints and functions."""
+"""CPMpy's names for the translated operators, global constraints and functions."""

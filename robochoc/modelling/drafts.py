@@ -1,4 +1,4 @@
-"""Drafts: constraints and cost functions of a model before the unit of the team's costs is known."""
+"""Drafts: a model's constraints and cost functions before the unit of the team's costs is known."""
 
 from __future__ import annotations
 
@@ -37,18 +37,18 @@ class Draft:
     """A constraint whose costs have no unit yet.
 
     Attributes:
-        name: Its name.
-        scope: Its variables. Empty: its truth or cost is constant (`model/assembly.py`).
-        place: Where it was made.
-        body: The expression of a condition or of a cost, over `X0`, `X1`, ... for the variables.
-        rows: The rows of a table, if it is a table.
-        semantics: The meaning of the rows. None: `body` is a condition, or its value the cost.
+        name: The constraint's name.
+        scope: The constraint's variables. Empty: its truth or cost is constant (`model/assembly.py`).
+        place: The line that created it.
+        body: The expression for a condition or a cost, in which `X0`, `X1`, ... are the variables.
+        rows: The rows, if the constraint is a table.
+        semantics: The meaning of the rows. None: `body` is a condition or a cost.
         is_cost: Whether the value of `body` is a cost.
-        cost: The cost of violating a condition. None: it is hard.
-        default: The cost of rows that a soft table does not list.
-        is_penalty: Whether the costs of a soft table are costs of violating a condition: they count against a sum
-            that is maximised.
-        when_absent: Its meaning when a robot is absent. None: as its form implies.
+        cost: The cost of violating a condition. None: the condition is hard.
+        default: The cost of rows that are not listed in a soft table.
+        is_penalty: Whether the costs in a soft table are costs of violating a condition, which are subtracted from a
+            sum that is maximised.
+        when_absent: The constraint's meaning when a robot is absent. None: the default for its form.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Draft:
     when_absent: WhenAbsent | None = None
 
     def with_when_absent(self, when_absent: WhenAbsent | None) -> Draft:
-        """Return this draft with the meaning `when_absent`. Raises `ModelError` if it cannot be restated."""
+        """Return this draft with `when_absent` set. Raises `ModelError` if the constraint cannot be restated."""
         if when_absent == WhenAbsent.RESTATE:
             names = tuple(variable.name for variable in self.scope)
             formals = tuple(f"X{number}" for number in range(len(names)))
@@ -78,20 +78,20 @@ class Draft:
 
     @property
     def soft(self) -> bool:
-        """Whether it has costs."""
+        """Whether the draft has costs."""
         return self.is_cost or self.cost is not None or self.semantics == Semantics.SOFT
 
     @property
     def places(self) -> int:
-        """The number of decimal places of its costs. Raises `ModelError` if there are too many."""
+        """The number of decimal places of the costs. Raises `ModelError` if there are too many."""
         found = [one for one in {*self.rows.values(), self.default, self.cost or 0} if not isinstance(one, float)]
         return max(places_of(one, self.place) for one in found) if self.soft else 0
 
 
 def conditions(term: Term, name: str, place: SourceLine, *, in_pairs: bool = True) -> Iterator[Draft]:
-    """Yield the drafts of a hard constraint: one for each part of a conjunction, and for each pair of `all_different`.
+    """Yield the drafts of a hard constraint: one for each part of a conjunction, and for each pair in `all_different`.
 
-    Without `in_pairs`, `all_different` is one constraint.
+    If `in_pairs` is false, `all_different` stays one constraint.
     """
     if isinstance(term, Operation) and term.operator == "and":
         for part in term.arguments:
@@ -108,9 +108,9 @@ def conditions(term: Term, name: str, place: SourceLine, *, in_pairs: bool = Tru
 
 
 def soft_condition(term: Term, cost: Exact, name: str, place: SourceLine) -> Draft:
-    """Return the draft of a soft constraint, which costs `cost` where `term` does not hold."""
+    """Return the draft of a soft constraint, which costs `cost` if `term` does not hold."""
     body = _body(term)
-    if body is not None and (cost >= 0 or not may_be_undefined(body)):  # where it is undefined, it is broken as well
+    if body is not None and (cost >= 0 or not may_be_undefined(body)):  # where `body` is undefined, it is violated too
         return Draft(name, term.variables, place, body, cost=cost)
     holds, fails = truths(term, place)
     few = 0 < len(fails) <= len(holds) or not holds
@@ -120,13 +120,13 @@ def soft_condition(term: Term, cost: Exact, name: str, place: SourceLine) -> Dra
 
 
 class ObjectiveTerm(NamedTuple):
-    """A term of a sum that is minimised or maximised.
+    """A term in a sum that is minimised or maximised.
 
     Attributes:
-        factor: Its factor.
+        factor: The factor of the term.
         term: The term.
-        place: The line that added it.
-        places: The decimal places to which costs are rounded. None: they are exact.
+        place: The line that added the term.
+        places: The number of decimal places to which costs are rounded. None: costs are exact.
     """
 
     factor: Exact
@@ -136,7 +136,7 @@ class ObjectiveTerm(NamedTuple):
 
 
 def costs_of(parts: Iterable[ObjectiveTerm], name: str) -> list[Draft]:
-    """Return the cost functions of a sum: one draft for all terms with the same variables and rounding."""
+    """Return the cost functions for a sum: one draft for all terms with the same variables and rounding."""
     groups: dict[tuple[frozenset[str], int | None], list[ObjectiveTerm]] = {}
     for part in parts:
         key = frozenset(one.name for one in part.term.variables), part.places
@@ -145,7 +145,7 @@ def costs_of(parts: Iterable[ObjectiveTerm], name: str) -> list[Draft]:
 
 
 def split(term: Term, place: SourceLine, places: int | None = None) -> tuple[list[ObjectiveTerm], Exact]:
-    """Return the terms of a sum with their factors, and its constant."""
+    """Return the terms of a sum with their factors, and the constant of the sum."""
     if isinstance(term, Linear):
         return [ObjectiveTerm(factor, one, place, places) for factor, one in term.parts], rounded(term.constant, places)
     return [ObjectiveTerm(1, term, place, places)], 0
@@ -183,7 +183,7 @@ def _table(
     name: str, scope: tuple[ModelVariable, ...], place: SourceLine, rows: Mapping[Row, Price], default: Price
 ) -> Draft:
     listed = {row: price for row, price in rows.items() if price != default}
-    listed = listed or {_first_row(scope): default}  # readers infer the columns of symbols from the rows
+    listed = listed or {_first_row(scope): default}  # readers infer from the rows which columns contain symbols
     return Draft(name, scope, place, rows=listed, semantics=Semantics.SOFT, default=default)
 
 
@@ -192,7 +192,7 @@ def _scaled(value: object, factor: Exact, places: int | None) -> Price:
 
 
 def _condition(term: Term, name: str, place: SourceLine) -> Draft | None:
-    """Return a hard constraint. None: it always holds."""
+    """Return the draft of a hard constraint, or None if the constraint always holds."""
     if isinstance(term, TableTerm) and (listed := listed_rows(term)) is not None:
         return _listed(term, listed, name, place)
     body = _body(term)
@@ -209,7 +209,7 @@ def _condition(term: Term, name: str, place: SourceLine) -> Draft | None:
 
 
 def _listed(term: TableTerm, listed: Mapping[Row, object], name: str, place: SourceLine) -> Draft | None:
-    """Return the draft of a table of allowed or forbidden rows. None: it forbids nothing."""
+    """Return the draft of a table of allowed or forbidden rows, or None if the table forbids nothing."""
     rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
     if not rows:
         return None if term.default else _never(name, term.variables[0], place)
@@ -239,7 +239,7 @@ def _formals(scope: Sequence[ModelVariable]) -> dict[ModelVariable, str]:
 
 
 class Definitions:
-    """Names of definitions: equal definitions share a name, and no name is in `taken`."""
+    """Names for definitions: equal definitions share a name, and no name is in `taken`."""
 
     def __init__(self, taken: Iterable[str]) -> None:
         self._taken = set(taken)
@@ -256,8 +256,8 @@ class Definitions:
 
         Args:
             draft: The draft.
-            places: The decimal places of the team's costs.
-            sign: -1 if the sum is maximised: violations then count against it.
+            places: The number of decimal places of the team's costs.
+            sign: -1 if the sum is maximised: the costs of violations are then subtracted.
         """
         unit = 10**places
         names = tuple(variable.name for variable in draft.scope)
@@ -310,7 +310,7 @@ def _units(price: Price, factor: int) -> float:
 
 
 def _predefined(body: Expression, names: Mapping[str, str]) -> tuple[Predicate, tuple[Actual, ...]] | None:
-    """Return the predefined predicate that compares two terms, and the terms. None: there is none."""
+    """Return the predefined predicate that compares two terms, and the two terms, or None if there is none."""
     if not isinstance(body, Apply) or body.operator not in PREDEFINED:
         return None
     terms: list[Actual] = []

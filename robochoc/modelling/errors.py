@@ -22,7 +22,7 @@ class SourceLine(NamedTuple):
 
 
 class ModelError(RobochocError, ValueError):
-    """A model is invalid. The message names the line of the user's program."""
+    """A model is invalid. The message contains the line of the user's program."""
 
     def __init__(self, message: str, hint: str = "", place: SourceLine | None = None) -> None:
         super().__init__(f"{place or calling_line()}: {message}" + (f" ({hint})" if hint else ""))
@@ -33,7 +33,7 @@ class ModelTypeError(ModelError, TypeError):
 
 
 class UnknownNameError(ModelError, KeyError):
-    """A model or a solution has no robot or variable of that name."""
+    """A model or a solution has no robot or variable with that name."""
 
     def __str__(self) -> str:
         return str(self.args[0])

@@ -1,4 +1,4 @@
-"""Events of a model: what changes over time (docs/reference/format.md, "Changes over time")."""
+"""The events of a model: changes over time (docs/reference/format.md, "Changes over time")."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Removal:
-    """The removal of one constraint, or of all with a name, and the line of the user's code."""
+    """The removal of one constraint, or of all constraints with a name, and the line of the user's program."""
 
     def __init__(self, removed: ModelConstraint | str, place: SourceLine) -> None:
         self.removed, self.place = removed, place
@@ -29,11 +29,11 @@ class Removal:
 
 
 Step = RemoveAgent | RemoveValue | AddValue | ModelRobot | ModelConstraint | Removal
-"""A change of an event."""
+"""A change made by an event."""
 
 
 class ModelEvent:
-    """Simultaneous changes. `Model.after_solution` and `Model.after_messages` create events."""
+    """Simultaneous changes, created by `Model.after_solution` and `Model.after_messages`."""
 
     def __init__(self, model: Model, after: int | None, place: SourceLine) -> None:
         self.after, self.place = after, place
@@ -49,21 +49,21 @@ class ModelEvent:
         return f"<event with {len(self.steps)} change{'s' * (len(self.steps) != 1)}>"
 
     def remove_robot(self, robot: ModelRobot | str) -> None:
-        """Remove a robot with its variables. Constraints that it shares are restated or dropped."""
+        """Remove a robot with its variables. The constraints that it shares are restated or dropped."""
         name = robot.name if isinstance(robot, ModelRobot) else robot
         if name not in self._model.robots:
             raise UnknownNameError(f"there is no robot {name!r}", did_you_mean(name, self._model.robots))
         self._add(RemoveAgent(name))
 
     def robot(self, name: str, *, weight: int = 1) -> ModelRobot:
-        """Add a robot with the lowest priority. Its constraints are added by this event's `add`."""
+        """Add a robot with the lowest priority. Constraints for it are added by this event's `add`."""
         made = self._model.add_robot(check_robot(name, self._model.robots, weight), 0, weight, calling_line())
         made.joins = self
         self._add(made)
         return made
 
     def remove_value(self, variable: ModelVariable, value: object) -> None:
-        """Remove a value of a variable's domain."""
+        """Remove a value from a variable's domain."""
         code = variable.codes.code(value)
         if code is None:
             raise ModelError(f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain[:1000]))
@@ -81,7 +81,7 @@ class ModelEvent:
         name: str | None = None,
         when_absent: WhenAbsent | str | None = None,
     ) -> ModelConstraint:
-        """Add constraints, each between variables of several robots. See `Model.add`."""
+        """Add constraints, each between variables of several robots, as `Model.add` does."""
         rule = self._model.rule(constraints, cost, name, self, when_absent)
         self._add(rule)
         return rule
@@ -90,8 +90,8 @@ class ModelEvent:
         """Remove a constraint between robots.
 
         Args:
-            constraint: A result of `add`: only this constraint is removed. Or a name: all constraints between robots
-                with this name are removed.
+            constraint: A constraint returned by `add`, to remove only this constraint; or a name, to remove all
+                constraints between robots with this name.
 
         Raises:
             ModelError: if the model has no such constraint.

@@ -1,4 +1,4 @@
-"""All solutions of a model, one after the other; and the reason why a model has none."""
+"""Finds all solutions of a model one by one, or the reason why a model has no solution."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from robochoc.modelling.solution import Solution
 
 Test = Callable[[Collection[int]], bool]
-"""Returns whether the constraints at these places can hold together."""
+"""Returns whether the constraints with these indices can hold together."""
 
 
 def solutions_of(model: Model, protocol: str, limit: int | None, options: dict[str, object]) -> Iterator[Solution]:
-    """Yield different solutions of a model: after each, a constraint excludes its values."""
+    """Yield the distinct solutions of a model: after each solution, a constraint excludes its values."""
     rest = copy.copy(model)
     number = 0
     while limit is None or number < limit:
@@ -39,13 +39,13 @@ def solutions_of(model: Model, protocol: str, limit: int | None, options: dict[s
 
 
 class ConflictTimeoutError(RobochocError):
-    """The search for a conflict has reached its time limit."""
+    """The search for a conflict reached its time limit."""
 
 
 def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, ...] | None:
-    """Return a minimal set of hard constraints that cannot hold together; None if all can.
+    """Return a minimal set of hard constraints that cannot hold together, or None if all can.
 
-    Algorithm QuickXplain (Junker, AAAI 2004); the central solver tests sets.
+    The algorithm is QuickXplain (Junker, AAAI 2004); the central solver tests whether sets can hold together.
 
     Raises:
         ConflictTimeoutError: if the time limit was reached.
@@ -74,7 +74,7 @@ def _constraints(model: Model) -> list[ModelConstraint]:
 
 
 def _with_only(model: Model, places: Collection[int]) -> Model:
-    """Return a copy of a model without costs, with only the constraints at these places."""
+    """Return a copy of a model without costs, and with only the constraints at these indices."""
     smaller = copy.copy(model)
     smaller.clear_objective()
     for place, constraint in enumerate(_constraints(smaller)):
@@ -84,9 +84,9 @@ def _with_only(model: Model, places: Collection[int]) -> Model:
 
 
 def _minimal(given: Sequence[int], open_: Sequence[int], can_hold: Test, *, test: bool) -> list[int]:
-    """Return a minimal subset of `open_` that cannot hold together with `given`, while all of `open_` cannot.
+    """Return a minimal subset of `open_` that cannot hold together with `given`. All of `open_` cannot.
 
-    `test`: whether `given` alone may be in conflict.
+    `test` is true if `given` alone may already be in conflict.
     """
     if test and not can_hold(given):
         return []

@@ -1,4 +1,4 @@
-"""Terms without an operator: all different, tables, elements of arrays, resources, Python functions."""
+"""Functions that return terms: all different, tables, elements of arrays, resources, and Python functions."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from robochoc.modelling.terms import (
 
 
 def all_different(*terms: object) -> Term:
-    """Return the condition that no two of `terms`, given one by one or as one list, are equal.
+    """Return the condition that all `terms` differ pairwise. They are given one by one, or as one list.
 
-    A hard constraint is split into one for each pair, which all protocols support.
+    As a hard constraint, it is split into a constraint for each pair, which all protocols support.
 
     Raises:
-        ModelTypeError: if they are of different kinds.
+        ModelTypeError: if the terms are of different kinds.
     """
     found = _several(terms)
     kinds = {term.kind for term in found} - {None}
@@ -39,24 +39,24 @@ def all_different(*terms: object) -> Term:
 
 
 def minimum(*terms: object) -> Term:
-    """Return the least of numbers, given one by one or as one list."""
+    """Return the minimum of numbers, given one by one or as one list."""
     return _extreme("min", terms)
 
 
 def maximum(*terms: object) -> Term:
-    """Return the greatest of numbers, given one by one or as one list."""
+    """Return the maximum of numbers, given one by one or as one list."""
     return _extreme("max", terms)
 
 
 def if_then_else(test: object, then: object, otherwise: object) -> Term:
-    """Return a number: `then` where the condition `test` holds, else `otherwise`."""
+    """Return a number: `then` if the condition `test` holds, otherwise `otherwise`."""
     return Operation("if", condition(test), number(then), number(otherwise))
 
 
 def element(array: Iterable[object], index: object) -> Term:
-    """Return the number at `index` (from 0) in `array`, whose elements are numbers or terms.
+    """Return the element at `index` (from 0) of `array`, whose elements are numbers or terms.
 
-    A constraint is violated where the index is outside the array. Negative indices are outside.
+    A constraint is violated if the index is outside the array. Negative indices are outside.
     """
     found = [number(one) for one in array]
     if not found:
@@ -71,7 +71,7 @@ def cumulative(
 
     Args:
         starts: The start of each task.
-        durations: The duration of each task, which runs until just before start + duration.
+        durations: The duration of each task, which ends just before start + duration.
         demands: The demand of each task while it runs.
         capacity: The capacity of the resource.
 
@@ -92,7 +92,7 @@ def allowed(terms: object, rows: Iterable[object]) -> Term:
     """Return the condition that the values of `terms` are in `rows`.
 
     Args:
-        terms: The terms, or one.
+        terms: The terms, or a single term.
         rows: Tuples of values; for a single term, values.
     """
     scope = _scope(terms)
@@ -109,9 +109,9 @@ def costs(terms: object, table: Mapping[Any, object], default: object = 0) -> Te
     """Return the entry of a table for the values of `terms`.
 
     Args:
-        terms: The terms, or one.
-        table: Numbers by tuples of values; for a single term, by values. `math.inf` forbids a row.
-        default: The number for all other rows; `math.inf` forbids them.
+        terms: The terms, or a single term.
+        table: Numbers by tuples of values; for a single term, by values. `math.inf` forbids the values.
+        default: The number for all other values; `math.inf` forbids them.
     """
     scope = _scope(terms)
     single = isinstance(terms, Term)
@@ -125,12 +125,13 @@ def costs(terms: object, table: Mapping[Any, object], default: object = 0) -> Te
 def function(function: Callable[..., object], *terms: object) -> Term:
     """Return a term whose value a Python function computes from the values of `terms`.
 
-    A function that returns truth values is a condition; one that returns numbers can be minimised; `math.inf` forbids.
-    It is called with all combinations of values when the problem is solved or saved; robots receive the table.
+    A function that returns truth values is a condition; a function that returns numbers can be minimised, and
+    `math.inf` forbids the values. The function is called with all combinations of values when the problem is solved or
+    saved, and robots receive the resulting table.
 
     Args:
         function: The function. It receives the values in the order of `terms`, and must be deterministic.
-        *terms: Variables, or terms of them.
+        *terms: Variables, or terms over them.
     """
     return FunctionCall(function, tuple(map(term_of, terms)), calling_line())
 
@@ -176,7 +177,7 @@ def _rows(scope: tuple[Term, ...], rows: Iterable[object]) -> list[tuple[object,
 
 
 def _is_value(scope: tuple[Term, ...], row: object) -> bool:
-    """Return whether `row` is a value of the only term of `scope`, not a tuple with that value."""
+    """Return whether `row` is a value of the only term in `scope`, and not a tuple with that value."""
     if len(scope) > 1:
         return False
     if scope[0].kind == kind_of(()):
@@ -188,7 +189,7 @@ def _check_value(term: Term, value: object) -> None:
     if is_number(value) and term.kind in {NUMBER, None}:
         return
     if isinstance(term, ModelVariable) or not is_number(value):
-        _ = term == value  # raises if the kinds differ, or the variable does not have the value
+        _ = term == value  # raises if the kinds differ, or the value is not in the variable's domain
 
 
 def _is_cost(value: object) -> bool:

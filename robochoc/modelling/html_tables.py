@@ -1,4 +1,4 @@
-"""Tables in HTML. All texts are escaped, since they may come from foreign files."""
+"""Tables in HTML. All texts are escaped, since they may come from other people's files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from html import escape
 from robochoc.system.plain_text import printable
 
 MAX_ROWS = 40
-"""The maximum number of rows of a table; for further rows, their number is shown."""
+"""The maximum number of rows in a table. If there are more, the number of hidden rows is shown."""
 MAX_TEXT = 200
 """The maximum number of characters in a cell."""
 
@@ -16,19 +16,19 @@ _CELL = "text-align:left;vertical-align:top;padding:.15rem .6rem"
 
 
 def text(value: object) -> str:
-    """Return the text of `value` escaped for HTML, and cut after `MAX_TEXT` characters."""
+    """Return `value` as text escaped for HTML, cut after `MAX_TEXT` characters."""
     shown = printable(str(value))
     return escape(shown if len(shown) <= MAX_TEXT else f"{shown[: MAX_TEXT - 1]}…")
 
 
 def heading(words: str, details: str = "") -> str:
-    """Return a heading: words in bold, and details."""
+    """Return a heading with `words` in bold, followed by `details`."""
     more = f' <span style="opacity:.7">{text(details)}</span>' if details else ""
     return f'<p style="margin:.3rem 0"><b>{text(words)}</b>{more}</p>'
 
 
 def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Return a table with a title for each column; empty without rows."""
+    """Return a table with a title for each column, or an empty text without rows."""
     listed = list(rows)
     if not listed:
         return ""

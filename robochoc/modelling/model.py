@@ -1,4 +1,4 @@
-"""`robochoc.Model`: a problem for a team of robots, in Python.
+"""`robochoc.Model`: a problem for a team of robots, written in Python.
 
     >>> import robochoc
     >>> model = robochoc.Model("charging")
@@ -10,7 +10,7 @@
     >>> outcome.cost
     2
 
-Each robot knows the content of its file. Shared constraints, parents and children follow from the model.
+Each robot knows only the content of its own file. Shared constraints, parents and children are derived from the model.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Model(Solvable):
 
     @classmethod
     def load(cls, folder: Path | str) -> Model:
-        """Return the model of the team whose files are in `folder`. It can be extended.
+        """Return a model of the team whose files are in `folder`. The model can be extended.
 
         Raises:
             InvalidInputError: if the files are invalid.
@@ -73,7 +73,7 @@ class Model(Solvable):
 
     @classmethod
     def of(cls, team: Team) -> Model:
-        """Return the model of a team. It can be extended."""
+        """Return a model of a team. The model can be extended."""
         model = cls(team.name)
         model.given = contents_of(team)
         units = model.given.units
@@ -87,7 +87,7 @@ class Model(Solvable):
                 added.add_variable(variable.name, made)
         return model
 
-    # Read-only views: changes of them would not reach the team.
+    # Read-only views: a change made through them would not reach the team.
 
     @property
     def name(self) -> str:
@@ -111,7 +111,7 @@ class Model(Solvable):
 
     @property
     def constraints(self) -> tuple[ModelConstraint, ...]:
-        """The constraints, without removed ones, in the order in which they were added."""
+        """The constraints in the order in which they were added, without the removed ones."""
         return tuple(self._constraints)
 
     @property
@@ -121,19 +121,19 @@ class Model(Solvable):
 
     @property
     def objective(self) -> tuple[ObjectiveTerm, ...]:
-        """The terms of the sum that is minimised or maximised: factor, term, and the line that added it."""
+        """The terms of the minimised or maximised sum: each with its factor and the line that added it."""
         return tuple(self._objective)
 
     def robot(self, name: str, *, priority: float = 0, weight: int = 1) -> ModelRobot:
         """Add a robot.
 
         Args:
-            name: Its name.
+            name: The robot's name.
             priority: Robots with a higher priority come first; robots with the same priority, in the order of creation.
-            weight: The weight of its withdrawal: one robot of weight 3 counts as much as three of weight 1.
+            weight: The weight of the robot's withdrawal: a robot of weight 3 counts as much as three of weight 1.
 
         Raises:
-            ModelError: if the name is invalid, or another robot has it.
+            ModelError: if the name is invalid, or already used by another robot.
         """
         return self.add_robot(check_robot(name, self.robots, weight), priority, weight, calling_line())
 
@@ -149,7 +149,7 @@ class Model(Solvable):
         self.changed()
 
     def __getitem__(self, name: str) -> ModelVariable:
-        """Return the variable that is called `name` in the team, such as `drone3.slot`."""
+        """Return the variable named `name` in the team, such as `drone3.slot`."""
         if name not in self.variables:
             raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
         return self.variables[name]
@@ -161,18 +161,19 @@ class Model(Solvable):
         name: str | None = None,
         when_absent: WhenAbsent | str | None = None,
     ) -> ModelConstraint:
-        """Add constraints. Constraints over variables of one robot are private: no other robot learns them.
+        """Add constraints. Constraints between variables of a single robot are private: no other robot learns them.
 
         Args:
             *constraints: Conditions, or lists of them.
-            cost: The cost if they do not all hold. It counts against a sum that is
-                maximised. None: they must hold.
-            name: A name, by which an event can remove the constraints.
-            when_absent: Their meaning when a robot of their scopes withdraws, is lost or leaves: `restate` them for the
-                others, `drop` them, or `fail`. None: as their form implies (docs/reference/absence.md).
+            cost: The cost if the constraints do not all hold. It is subtracted from a sum that is maximised. None: the
+                constraints are hard.
+            name: A name by which an event can remove the constraints.
+            when_absent: The meaning of the constraints when a robot in their scopes withdraws, is lost or leaves:
+                `restate` them for the other robots, `drop` them, or `fail`. None: the default for their form
+                (docs/reference/absence.md).
 
         Returns:
-            The constraint, under one name.
+            One constraint that stands for all of them.
 
         Raises:
             ModelError: if a constraint is not a condition over variables of this model, or cannot be restated.
@@ -183,10 +184,10 @@ class Model(Solvable):
         return rule
 
     def remove(self, constraint: ModelConstraint) -> None:
-        """Remove a constraint, a result of `add` or of a robot's `knows`. Other constraints of its name stay.
+        """Remove a constraint that `add` or a robot's `knows` returned. Other constraints with the same name remain.
 
         Raises:
-            ModelError: if the model does not contain the constraint. Constraints added by events do not count.
+            ModelError: if the model does not contain the constraint, for instance because an event adds it.
         """
         if any(one is constraint for one in self._constraints):
             self._constraints.remove(constraint)
@@ -204,15 +205,15 @@ class Model(Solvable):
         return self
 
     def minimize(self, costs: object, *, places: int | None = None) -> None:
-        """Minimise a sum of terms. Repeated calls add up.
+        """Minimise a sum of terms. The sums of repeated calls are added up.
 
-        Terms over the same variables become one cost function. Integers, `Decimal` and `Fraction`
-        are exact; a float has the value of its text, 0.1 one tenth.
+        Terms over the same variables become one cost function. Integers, `Decimal` and `Fraction` are exact; a float
+        has the value of its decimal text, so 0.1 is one tenth.
 
         Args:
             costs: The sum.
-            places: The decimal places to which each cost is rounded, 0 to 9: for distances and other real numbers.
-                None: costs are exact, and costs with more than 9 places are rejected.
+            places: The number of decimal places (0 to 9) to which each cost is rounded, for distances and other real
+                numbers. None: costs are exact, and costs with more than 9 places are rejected.
 
         Raises:
             ModelError: if the sum is not a number, or another sum of the model is maximised.
@@ -220,7 +221,7 @@ class Model(Solvable):
         self._optimize(costs, places, maximize=False)
 
     def maximize(self, utilities: object, *, places: int | None = None) -> None:
-        """Maximise a sum of terms. See `minimize`; costs of soft constraints count against it."""
+        """Maximise a sum of terms, as `minimize`; the costs of violated soft constraints are subtracted."""
         self._optimize(utilities, places, maximize=True)
 
     def _optimize(self, given: object, places: int | None, *, maximize: bool) -> None:
@@ -259,13 +260,13 @@ class Model(Solvable):
 
     @property
     def rules(self) -> tuple[ModelConstraint, ...]:
-        """All constraints: those of the model, the parts that robots know, and those that events add."""
+        """All constraints: the model's constraints, the parts known by robots, and the constraints added by events."""
         parts = [part for robot in self._robots.values() for part in robot.parts]
         later = [step for event in self._events for step in event.steps if isinstance(step, ModelConstraint)]
         return (*self._constraints, *parts, *later)
 
     def free_prefix(self, prefix: str) -> str:
-        """Return `prefix`, with `_` appended until no constraint's name begins with it."""
+        """Return `prefix`, extended by `_` until no constraint's name begins with it."""
         taken = {rule.name for rule in self.constraints} | (self.given.names if self.given else set())
         while any(name.startswith(prefix) for name in taken):
             prefix += "_"
@@ -277,11 +278,11 @@ class Model(Solvable):
         return f"C{self._named}"
 
     def after_solution(self) -> ModelEvent:
-        """Add an event: changes made once the problem before it is solved."""
+        """Add an event whose changes happen when the problem before it is solved."""
         return self._event(None)
 
     def after_messages(self, count: int) -> ModelEvent:
-        """Add an event: changes made after `count` messages, or once the problem before it is solved."""
+        """Add an event whose changes happen after `count` messages, or earlier if the problem before it is solved."""
         whole = whole_number(count)
         if whole is None or whole < 0:
             raise ModelTypeError(f"{count!r} is not a number of messages", "expected an integer, 0 or more")
@@ -304,17 +305,17 @@ class Model(Solvable):
         return self._team
 
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
-        """Return the user's values for the integers of an assignment, such as that of an event or an epoch."""
+        """Return the user's values for the integers in an assignment, such as that of an event or an epoch."""
         return UserValues(self._variables, None)(assignment)
 
     def solutions(self, protocol: str = CENTRAL, *, limit: int | None = None, **options: Any) -> Iterator[Solution]:  # noqa: ANN401 - those of `solve`
-        """Yield all solutions, one after the other; where costs are minimised, the cheapest first.
+        """Yield all solutions one by one, the cheapest first if costs are minimised.
 
         Each search starts when the next solution is requested. Solutions differ in at least one value.
 
         Args:
-            protocol: The protocol, or `central`: one solver with the constraints of all robots.
-            limit: The largest number of solutions. None: all.
+            protocol: The protocol, or `central`: a single solver that knows the constraints of all robots.
+            limit: The maximum number of solutions. None: all solutions.
             **options: The other options of `solve`.
 
         Example:
@@ -328,9 +329,9 @@ class Model(Solvable):
         return solutions_of(self, protocol, limit, options)
 
     def conflict(self, *, timeout: float | None = None) -> tuple[ModelConstraint, ...] | None:
-        """Return constraints that cannot hold together, and could without any one of them.
+        """Return a minimal set of constraints that cannot hold together: without any one of them, the others could.
 
-        Empty: a robot has a variable without values. None: all hard constraints can hold together.
+        The set is empty if a robot has a variable without values. None: all hard constraints can hold together.
 
         Args:
             timeout: A time limit, in seconds. None: no limit.
@@ -343,15 +344,15 @@ class Model(Solvable):
         return conflict_of(self, timeout)
 
     def clear_objective(self) -> None:
-        """Remove all costs that were added by `minimize` or `maximize`."""
+        """Remove all costs added by `minimize` or `maximize`."""
         self._objective.clear()
         self.changed()
 
     def save(self, folder: Path | str, *, replace: bool = False) -> None:
-        """Write the robots' files, and `scenario.xml` if there are events: all of the files, or none.
+        """Write the robots' files, and `scenario.xml` if there are events. Either all files are written, or none.
 
         Args:
-            folder: The folder to write. Its name is the team's name when the files are read.
+            folder: The folder to write. Its name becomes the team's name when the files are read.
             replace: Whether to replace an existing team.
 
         Raises:

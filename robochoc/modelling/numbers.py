@@ -1,4 +1,4 @@
-"""Exact numbers: the numbers of users as integers or fractions."""
+"""Exact numbers: the user's numbers as integers or fractions."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from robochoc.model.cost_units import MAX_PLACES
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 
 Exact = int | Fraction
-"""An exact number; a `Fraction` only if it is not an integer."""
+"""An exact number: an integer, or a `Fraction` if it is not an integer."""
 
 _FAR = 400
-"""Decimals beyond this power of ten are rejected: fractions of them would fill the memory."""
+"""The largest power of ten in decimals, positive or negative: larger ones make fractions that fill the memory."""
 
 
 def is_number(value: object) -> bool:
-    """Return whether `value` is a number of Python or NumPy, a truth value included."""
+    """Return whether `value` is a number of Python or NumPy, including truth values."""
     if isinstance(value, (Real, Decimal)) or is_truth(value):
         return True
-    return hasattr(value, "__index__") and not hasattr(value, "__len__")  # which arrays have
+    return hasattr(value, "__index__") and not hasattr(value, "__len__")  # arrays have `__len__`
 
 
 def is_truth(value: object) -> bool:
@@ -31,20 +31,20 @@ def is_truth(value: object) -> bool:
 
 
 def whole_number(value: object) -> int | None:
-    """Return an integer of Python or NumPy as Python's; None for anything else."""
+    """Return an integer of Python or NumPy as a Python integer, or None for any other value."""
     return int(value) if isinstance(value, Integral) else None
 
 
 def is_infinite(value: object) -> bool:
-    """Return whether `value` is an infinite float: the cost that forbids."""
+    """Return whether `value` is an infinite float, the cost that forbids."""
     return isinstance(value, Real) and not isinstance(value, Rational) and math.isinf(value)
 
 
 def exact(value: object) -> Exact:
-    """Return the number `value` exactly. A float has the value of its text: 0.1 is one tenth.
+    """Return `value` as an exact number. A float has the value of its decimal text: 0.1 is one tenth.
 
     Raises:
-        ModelError: if it is not a finite number, or too large or too small.
+        ModelError: if `value` is not a finite number, or is too large or too small.
     """
     if is_truth(value):
         return 1 if value else 0
@@ -72,10 +72,10 @@ def places_of(value: Exact, place: SourceLine | None = None) -> int:
 
     Args:
         value: A cost.
-        place: The line that created it.
+        place: The line that created the cost.
 
     Raises:
-        ModelError: if it has more than nine places.
+        ModelError: if the cost has more than nine places.
     """
     places = _places(value)
     if places is not None:
@@ -86,7 +86,7 @@ def places_of(value: Exact, place: SourceLine | None = None) -> int:
 
 
 def check_places(places: object) -> int | None:
-    """Return the number of decimal places to which costs are rounded; None: costs are exact. Raises `ModelError`."""
+    """Return the valid number of decimal places for costs, or None for exact costs. Raises `ModelError`."""
     whole = whole_number(places)
     if places is not None and (whole is None or not 0 <= whole <= MAX_PLACES):
         raise ModelTypeError(f"invalid places={places!r}", f"expected an integer from 0 to {MAX_PLACES}")
@@ -99,12 +99,12 @@ def rounded(value: Exact, places: int | None) -> Exact:
 
 
 def shown(value: Exact) -> str:
-    """Return the text of a number: a decimal if it has few enough places for a cost, otherwise a fraction."""
+    """Return a number as text: as a decimal if it has few enough places for a cost, otherwise as a fraction."""
     places = _places(value)
     return str(value) if places is None else f"{Decimal(int(value * 10**places)).scaleb(-places):f}"
 
 
 def _places(value: Exact) -> int | None:
-    """Return the number of decimal places. None: more than a cost may have."""
+    """Return the number of decimal places, or None if there are too many for a cost."""
     denominator = Fraction(value).denominator
     return next((places for places in range(MAX_PLACES + 1) if 10**places % denominator == 0), None)

@@ -1,4 +1,4 @@
-"""The operators of terms: their values, in exact numbers, and their text."""
+"""The operators in terms: how to compute and print them."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ MAX_BITS = 4096
 
 
 class UndefinedTermError(RobochocError, ArithmeticError):
-    """A term has no value for this assignment, such as a division by zero."""
+    """A term is undefined for this assignment, as in a division by zero."""
 
 
 class TermOperator(NamedTuple):
-    """An operator of terms.
+    """An operator in terms.
 
     Attributes:
-        gives: The kind of its values.
+        gives: The kind of the resulting values.
         compute: Computes a value from the arguments' values.
-        shown: Its name or symbol.
-        lazy: The same from functions that return the arguments' values, for operators that do not need all of them.
+        shown: The operator's name or symbol.
+        lazy: As `compute`, but receives functions that return the arguments' values, for operators that do not need
+            all.
     """
 
     gives: ValueKind
@@ -35,7 +36,7 @@ class TermOperator(NamedTuple):
     lazy: Callable[..., object] | None = None
 
     def text(self, arguments: Sequence[str]) -> str:
-        """Return the operation on `arguments` as a user would write it."""
+        """Return the operator applied to `arguments`, as a user would write it."""
         if self.shown.isidentifier():
             return f"{self.shown}({', '.join(arguments)})"
         if len(arguments) == 1:
@@ -120,4 +121,4 @@ OPERATORS: dict[str, TermOperator] = {
 }
 
 PARTIAL = frozenset(("floordiv", "mod", "pow", "element"))
-"""The operators that may be undefined."""
+"""The operators whose value may be undefined."""

@@ -1,7 +1,7 @@
-"""The names of the options of a run in Python, for messages that name those of the command line.
+"""Python names for the options of a run, so that messages suit users of the library.
 
-The layers below know one name of each option, that of `robochoc solve`. `in_python` is applied where a message leaves
-for a user of the library: "add --runtime simulator" becomes "add runtime='simulator'".
+Lower layers know only the option names of `robochoc solve`. `in_python` converts a message before a user of the library
+sees it: "add --runtime simulator" becomes "add runtime='simulator'".
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _ARGUMENTS = {
     "local-timeout": "local",
     "no-cache": "cache",
 }
-"""Options whose argument in Python has another name; of all others it is the option's, with underscores."""
+"""Options whose Python argument has another name. All other arguments have the option's name, with underscores."""
 _WORDS = {
     "runtime": "processes|simulator|network|arrays",
     "schedule": "concurrent|one-by-one|cycles|random",
@@ -33,19 +33,19 @@ _WORDS = {
     "protocol": r"[a-z][a-z0-9-]*",
     "set": r"\w+=\S+",
 }
-"""The words after an option that are its value. Others continue the sentence."""
+"""The words that can be the value of the option before them. Other words continue the sentence."""
 _NUMBER = re.compile(r"[\d.]+(e[+-]?\d+)?|[A-Z]+")
-"""A number, or a placeholder for one."""
+"""A number, or a placeholder for a number."""
 _ADJACENT = re.compile(r"(=(?:'[^']*'|\{[^}]*\}|\d+)) (?=[a-z_]+=)")
 _OPTION = re.compile(r"(?<![\w-])--(?P<name>[a-z][a-z-]*)(?:[ =](?P<value>[\w=+-]+(?:\.\w+)*))?")
 
 
 def in_python(text: str, arguments: Collection[str]) -> str:
-    """Return `text` with the options of `robochoc solve` in it as arguments in Python.
+    """Return `text` with each option of `robochoc solve` replaced by its Python argument.
 
     Args:
         text: A message.
-        arguments: The names of the arguments. Options without one are not changed.
+        arguments: The names of the Python arguments. Options without an argument are not changed.
     """
 
     def argument(found: re.Match[str]) -> str:
@@ -67,7 +67,7 @@ def in_python(text: str, arguments: Collection[str]) -> str:
 
 @contextmanager
 def errors_in_python(arguments: Collection[str]) -> Iterator[None]:
-    """Give the exceptions of robochoc raised inside the context a text with arguments in Python."""
+    """Rewrite the messages of robochoc exceptions raised inside the context with the names of Python arguments."""
     try:
         yield
     except RobochocError as error:

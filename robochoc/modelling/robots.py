@@ -22,11 +22,11 @@ if TYPE_CHECKING:
 
 
 class ModelRobot:
-    """A robot of a model. `Model.robot` creates it.
+    """A robot of a model, created by `Model.robot`.
 
     Attributes:
-        place: The line that created it.
-        joins: The event with which it joins. None: it belongs to the team from the beginning.
+        place: The line that created the robot.
+        joins: The event with which the robot joins. None: it belongs to the team from the beginning.
     """
 
     def __init__(self, model: Model, name: str, priority: float, weight: int, place: SourceLine) -> None:
@@ -59,12 +59,12 @@ class ModelRobot:
 
     @property
     def parts(self) -> tuple[ModelConstraint, ...]:
-        """The robot's parts of shared constraints, the results of `knows`."""
+        """The robot's parts of shared constraints, which `knows` returned."""
         return tuple(self._parts)
 
     @property
     def topics(self) -> tuple[Topic, ...]:
-        """The topics it publishes."""
+        """The topics that the robot publishes."""
         return tuple(self._topics)
 
     def add_topics(self, *topics: Topic) -> None:
@@ -96,17 +96,18 @@ class ModelRobot:
         """Add a variable: a decision of the robot.
 
         Args:
-            name: The name. In the team, the variable is called ROBOT.NAME, such as `drone3.slot`.
-            domain: A range, an `Enum`, `bool`, or a list of values of one kind: numbers, texts, tuples, anything
-                hashable. Numbers support arithmetic; all other values can be compared by `==` and `!=`, and listed in
-                tables.
-            qualified: False: the variable is called `name` in the team too; it must be unique there.
+            name: The variable's name. In the team, the variable is called ROBOT.NAME, such as `drone3.slot`.
+            domain: A range, an `Enum`, `bool`, or a list of values of one kind: numbers, texts, tuples, or other
+                hashable values. Numbers support arithmetic; all other values can be compared by `==` and `!=`, and
+                listed in tables.
+            qualified: Whether the variable's name in the team begins with the robot's name. False: it is `name`, which
+                must be unique in the team.
 
         Returns:
-            The variable: a term for constraints and costs, and the key to its value in a solution.
+            The variable: a term in constraints and costs, and the key to its value in a solution.
 
         Raises:
-            ModelError: if there is a variable of that name, or the domain is invalid.
+            ModelError: if the robot has a variable with this name, or the domain is invalid.
         """
         place = calling_line()
         whole = f"{self.name}.{name}" if qualified else name
@@ -121,21 +122,21 @@ class ModelRobot:
         return made
 
     def boolean(self, name: str) -> ModelVariable:
-        """Add a variable that is true or false: usable as a condition, and as 0 or 1 where a number is expected."""
+        """Add a variable that is true or false. It is a condition, and counts as 0 or 1 where a number is expected."""
         return self.variable(name, bool)
 
     def knows(self, *constraints: object, cost: object = None, name: str | None = None) -> ModelConstraint:
-        """Add this robot's part of a constraint shared with another robot, which never learns the part.
+        """Add this robot's part of a constraint shared with another robot, which never learns this part.
 
-        Values are allowed if the parts of both robots allow them (a partially known constraint, PKC).
+        Two values are allowed if both robots' parts allow them (a partially known constraint, PKC).
 
         Args:
-            *constraints: Conditions over variables of this robot and of one other.
-            cost: The cost for this robot if they do not hold. None: they must hold.
+            *constraints: Conditions over variables of this robot and of one other robot.
+            cost: The cost for this robot if the conditions do not hold. None: they must hold.
             name: The constraint's name.
 
         Raises:
-            ModelError: if the scope is not this robot and exactly one other.
+            ModelError: if the scope does not consist of variables of this robot and exactly one other robot.
         """
         rule = self._model.rule(constraints, cost, name)
         owners = dict.fromkeys(variable.owner for variable in rule.term.variables)
@@ -159,17 +160,17 @@ class ModelRobot:
         z: object = None,
         type: str = Topic.type,  # noqa: A002 - ROS calls it so
     ) -> None:
-        """Publish the waypoint that follows from the robot's decision.
+        """Publish a waypoint that depends on the robot's decision.
 
         Args:
             name: The topic's name.
-            x: The waypoint's position: a number, or a term over this robot's variables. None: not published.
-            y: The same.
-            z: The same.
-            type: The type of its messages.
+            x: The waypoint's x-coordinate: a number, or a term over this robot's variables. None: not published.
+            y: The y-coordinate, likewise.
+            z: The z-coordinate, likewise.
+            type: The type of the topic's messages.
 
         Raises:
-            ModelError: if a term is over other variables, or files cannot express it.
+            ModelError: if a term contains other robots' variables, or files cannot express it.
         """
         axes = {axis: self._axis(value) for axis, value in (("x", x), ("y", y), ("z", z))}
         self.add_topics(Topic(name, type, **axes))
@@ -190,7 +191,7 @@ class ModelRobot:
 
 
 def check_robot(name: object, robots: Mapping[str, ModelRobot], weight: object) -> str:
-    """Return the name of a new robot. Raises `ModelError` if it is invalid or taken, or the weight invalid."""
+    """Return the name of a new robot. Raises `ModelError` if the name is invalid or taken, or the weight is invalid."""
     if not isinstance(name, str) or not is_name(name) or name == RESERVED or len(name) > MAX_NAME:
         raise ModelError(f"invalid robot name {name!r}", "a letter, then letters, digits, '.' and '_'")
     if name in robots:

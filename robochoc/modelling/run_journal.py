@@ -1,4 +1,4 @@
-"""The journal of a run that is started from Python."""
+"""The journal of a run started from Python."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def recorded(path: Path | str | None, run: PreparedRun) -> Iterator[JournalRecorder | None]:
-    """Give a recorder that writes the journal of `run` to `path` during the run; None without a path.
+    """Provide a recorder that writes the journal of `run` to `path` during the run, or None if no path is given.
 
     Raises:
         OSError: if the file cannot be written.
@@ -32,9 +32,9 @@ def recorded(path: Path | str | None, run: PreparedRun) -> Iterator[JournalRecor
     try:
         yield recorder
     except BaseException:
-        if not recorder.is_empty:  # a run that was refused does not overwrite an older journal
+        if not recorder.is_empty:  # a rejected run must not overwrite an older journal
             recorder.close()
-        with suppress(OSError):  # the error that ended the run matters more
+        with suppress(OSError):  # the error that ended the run is more important
             file.close()
         raise
     recorder.close()

@@ -1,4 +1,4 @@
-"""The scene of a solution, as a page of its own or in a notebook."""
+"""The scene of a solution, as a separate page or in a notebook."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from robochoc.view.scene import scene_of
 
 
 class ScenePage:
-    """A scene: the drones fly to the positions that the team decided. Notebooks display it.
+    """A scene in which the drones fly to the positions that the team decided. Notebooks display it.
 
     Attributes:
         html: The self-contained page.
-        height: Its height in a notebook, in pixels.
+        height: The height of the scene in a notebook, in pixels.
     """
 
     def __init__(self, outcome: Outcome, team: Team | None, *, height: int = 520) -> None:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class NamedValues(dict[str, object]):
-    """Values by the names of variables. Calling it returns only the values, like `values()` of other mappings."""
+    """Values by variable name. A call returns only the values, as the method `values()` of other mappings does."""
 
     def __call__(self) -> ValuesView[object]:
         """Return the values without names."""
@@ -49,16 +49,16 @@ class SolutionEpoch(EpochOutcome):
 class Solution(Outcome, Mapping[str, object]):
     """An outcome with the user's values.
 
-    It maps the names of variables to their values, and is true if there is an assignment.
-    `solution[x]` is the value of a variable, of a term of variables, or of the variable named `x`.
+    A solution maps variable names to values, and is true if there is an assignment. `solution[x]` is the value of a
+    variable, of a term, or of the variable named `x`.
 
-    `assignment` of the outcome, of its `epochs` and of its `optima` contains the integers with which robots compute:
-    codes of symbols, multiples of a common unit. `values` contains the user's values.
+    In the outcome, `assignment`, `epochs` and `optima` contain the integers with which robots compute: codes of
+    symbols, and multiples of a common unit. `values` contains the user's values.
 
     Attributes:
-        epochs: The epochs, if there were several, each with its `values`.
+        epochs: The epochs, each with its `values`, if there were several epochs.
         variables: The variables of the model, by name; empty for a problem from files.
-        problem: The team that solved it. None: unknown.
+        problem: The team that solved the problem. None: unknown.
     """
 
     epochs: tuple[SolutionEpoch, ...] = ()
@@ -82,11 +82,11 @@ class Solution(Outcome, Mapping[str, object]):
 
     @cached_property
     def listed(self) -> tuple[NamedValues, ...]:
-        """The values of each optimum or solution listed by a protocol such as `list-dpop`."""
+        """The values of each optimum or solution that a protocol such as `list-dpop` lists."""
         return tuple(map(self.values_of, self.optima.assignments)) if self.optima else ()
 
     def values_of(self, assignment: Mapping[str, int]) -> NamedValues:
-        """Return the user's values for the integers of an assignment, such as that of an event."""
+        """Return the user's values for the integers in an assignment, such as the assignment of an event."""
         return UserValues(self.variables, self.problem)(assignment)
 
     def __bool__(self) -> bool:
@@ -98,12 +98,12 @@ class Solution(Outcome, Mapping[str, object]):
         return len(self.assignment)
 
     def __getitem__(self, what: Term | str) -> object:
-        """Return the value of a variable or a term, or of the variable of that name.
+        """Return the value of a variable, of a term, or of the variable with this name.
 
         Variables of a copy of the model, such as one solved in another process, count as variables of this solution.
 
         Raises:
-            UnknownNameError: if it has no value: there is no solution, or its robot is withdrawn.
+            UnknownNameError: if the variable has no value: there is no solution, or its robot is withdrawn.
             ModelTypeError: if the key is neither a term nor a name.
         """
         if isinstance(what, ModelVariable):
@@ -125,7 +125,7 @@ class Solution(Outcome, Mapping[str, object]):
         return self.values[name]
 
     def __contains__(self, what: object) -> bool:
-        """Return whether a variable, a term, or the variable of that name has a value."""
+        """Return whether a variable, a term, or the variable with this name has a value."""
         try:
             return isinstance(what, Term | str) and (self[what], True)[1]
         except UnknownNameError:
@@ -165,10 +165,10 @@ class Solution(Outcome, Mapping[str, object]):
         return f"<{self.team}: {describe_outcome(self, robots)}; {self.protocols}, {self.runtime}>"
 
     def scene(self, *, height: int = 520) -> ScenePage:
-        """Return the scene of the drones' flight, in calm air, to the positions that the team decided.
+        """Return a scene in which the drones fly, in calm air, to the positions that the team decided.
 
         Args:
-            height: Its height in a notebook, in pixels.
+            height: The height of the scene in a notebook, in pixels.
         """
         from robochoc.modelling.scene_page import ScenePage  # noqa: PLC0415 - numpy and the viewer: start-up
 
@@ -195,14 +195,14 @@ class Solution(Outcome, Mapping[str, object]):
 
 
 class UserValues:
-    """Converts the integers of assignments into the user's values, by a model's variables or a team's domains."""
+    """Converts the integers in assignments into the user's values, using a model's variables or a team's domains."""
 
     def __init__(self, variables: Mapping[str, ModelVariable], team: Team | None) -> None:
         self._variables = variables
         self._known = team.variables if team else {}
 
     def __call__(self, assignment: Mapping[str, int]) -> NamedValues:
-        """Return the values by the names of the variables."""
+        """Return the values by variable name."""
         return NamedValues((name, self._value(name, code)) for name, code in assignment.items())
 
     def _value(self, name: str, code: int) -> object:

@@ -58,7 +58,7 @@ def _owners(team: Team) -> dict[str, str]:
 
 
 def framed(page: str, height: int) -> str:
-    """Return a page as a sandboxed frame of another page."""
+    """Return `page` as a sandboxed frame for another page."""
     return (
         f'<iframe srcdoc="{escape(page)}" sandbox="allow-scripts" style="width:100%;height:{height}px;border:0"'
         ' title="the scene"></iframe>'

@@ -1,4 +1,4 @@
-"""`solve`, for problems from files and from Python: the options of a run, with hints if an option is invalid."""
+"""`solve`, for problems from files and from Python: the options of a run, with hints for invalid options."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ _OPTIONS = frozenset(one.name for one in fields(Options))
 
 
 class Solvable(ABC):
-    """A problem that a team of robots can solve: the base of `Problem` and `Model`."""
+    """A problem that a team of robots can solve: the base class of `Problem` and `Model`."""
 
     def solve(  # noqa: PLR0913 - options of a run, by their names
         self,
@@ -81,13 +81,13 @@ class Solvable(ABC):
     ) -> Solution:
         """Let the robots solve the problem together.
 
-        The simulator runs all robots in this thread. With `runtime="processes"` each robot has a process, as on the
-        command line. Processes of the runtime `network` import the main program, which must call this below
-        `if __name__ == "__main__":`.
+        The simulator runs all robots in the calling thread. With `runtime="processes"` each robot has a process, as on
+        the command line. With `runtime="network"`, each process imports the main program, which must therefore call
+        this method below `if __name__ == "__main__":`.
 
         Args:
-            protocol: The name of the protocol, in upper or lower case, or its class. None, or `auto`: one that suits
-                the problem.
+            protocol: The name of the protocol, in upper or lower case, or its class. None, or `auto`: a protocol that
+                suits the problem.
             runtime: `simulator`, `processes`, `network` or `arrays`.
             order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
                 first. None: the order that suits an automatically chosen protocol; otherwise the team's order, or
@@ -99,10 +99,10 @@ class Solvable(ABC):
             environment: Receives each answer, and returns the next changes.
             seed: The seed of the simulator, of the order `random`, and of randomised protocols.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
-            deadline: The same; the best assignment known at that time is the answer.
-            improve: For how many seconds after the deadline robots search for better assignments. None: not at all.
+            deadline: A time limit in seconds, at which the best assignment known so far becomes the answer.
+            improve: The number of seconds after the deadline in which robots search for better assignments. None: none.
             messages: A limit on the number of messages. None: no limit.
-            ncccs: A limit on non-concurrent constraint checks, in the simulator. None: no limit.
+            ncccs: A limit on non-concurrent constraint checks, for the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
             verify: Whether the central solver checks a `no-solution` or a minimum cost found by the robots.
             count: Whether the central solver counts all solutions, or `count-dpop` all optima.
@@ -110,32 +110,33 @@ class Solvable(ABC):
             cache: Whether solutions of local problems are stored in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
-            delay: The longest delay of a message in the simulator, in constraint checks.
+            delay: The maximum delay of a message in the simulator, in constraint checks.
             channel: A channel model, with which the simulator counts seconds of computing and radio.
-            message_loss: The probability that a message is lost and never repeated.
+            message_loss: The probability that a message is lost without being sent again.
             on_loss: The reaction to the loss of a robot: `fail` or `withdraw`. None: the run fails, unless there are
                 `spares`.
-            spares: How many lost robots are replaced.
-            patience: A robot whose process is suspended for so many seconds counts as lost. None: it never does.
-            kill: Robots whose processes are killed, and when.
+            spares: The number of lost robots that are replaced.
+            patience: A robot whose process is suspended for this many seconds counts as lost. None: never.
+            kill: The robots whose processes are killed, and when.
             filters: The names of the channel filters of messages on a network, in the order of application.
-            bounds: Whether events report the proven lower bound of the cost (processes and simulator).
-            preprocess: Preprocessing before the protocol: `ac`, making domains arc consistent. None: nothing.
-            journal: A file for the journal of the run: all messages and decisions.
-            html: A file for the page with the scene of the drones' flight.
+            bounds: Whether events report the proven lower bound of the cost (with processes and in the simulator).
+            preprocess: The preprocessing before the protocol: `ac` makes domains arc consistent. None: no
+                preprocessing.
+            journal: The file to which the journal of the run is written: all messages and decisions.
+            html: The file to which the page with the scene of the drones' flight is written.
             progress: Called with the number of messages and the elapsed time, about ten times a second.
-            stop: An event that another thread sets to end the search. The answer is then the best one known. The
-                central solver does not notice it.
-            **unknown: No other options are allowed.
+            stop: An event that another thread sets to end the search. The answer is then the best assignment known. The
+                central solver ignores this event.
+            **unknown: Any other option is an error.
 
         Returns:
             The solution: a verdict, the values, their cost, and the metrics of the run.
 
         Raises:
             UnsupportedError: if problem, protocol, runtime and options cannot be combined.
-            RobotsLostError: if robots were lost, and the options do not allow continuing without them.
-            RefutedError: if the checker refutes the answer.
-            OptionError: if an option has a value that is not allowed, or there is no such option.
+            RobotsLostError: if robots were lost, and the options do not allow the run to continue without them.
+            RefutedError: if the check of the answer fails.
+            OptionError: if an option is unknown, or its value is not allowed.
 
         Example:
             >>> import robochoc
@@ -164,14 +165,14 @@ class Solvable(ABC):
         return solution
 
     async def solve_async(self, *arguments: Any, **options: Any) -> Solution:  # noqa: ANN401 - those of `solve`
-        """Solve the problem in a thread, while other tasks go on. If the task is cancelled, the search ends.
+        """Solve the problem in a thread while other tasks run. If the task is cancelled, the search ends.
 
         Args:
-            *arguments: As of `solve`.
-            **options: As of `solve`, except `stop`.
+            *arguments: The arguments of `solve`.
+            **options: The options of `solve`, except `stop`.
 
         Returns:
-            The solution, as `solve`. Raises as `solve`.
+            The solution, as from `solve`. Raises the same exceptions.
         """
         import asyncio  # noqa: PLC0415 - start-up
 
@@ -191,10 +192,10 @@ class Solvable(ABC):
 
     @abstractmethod
     def _team_to_solve(self) -> Team:
-        """Return the team, with its problem."""
+        """Return the team that solves this problem."""
 
     def _robots_called(self, team: Team) -> Mapping[str, str]:
-        """Return the names of the robots in `team` by the user's names of them."""
+        """Return the names of the robots in `team`, by the names that the user gave them."""
         return {name: name for name in team.order}
 
     @property
@@ -214,7 +215,7 @@ def _refuse(unknown: Iterable[str]) -> None:
 
 
 def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
-    """Return `options` with the team's names of robots. Raises `OptionError` for an unknown robot.
+    """Return `options` with the robots' names in the team. Raises `OptionError` for an unknown robot.
 
     Args:
         options: The options, with the user's names of robots.

@@ -1,4 +1,4 @@
-"""Terms as tables: the values for all combinations of the variables' values, where no expression is possible."""
+"""Computes terms as tables: the values for all combinations of the variables' values, if no expression is possible."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def truths(term: Term, place: SourceLine) -> tuple[list[Row], list[Row]]:
 
 
 def prices(parts: Sequence[tuple[Exact, Term]], scope: Sequence[ModelVariable], place: SourceLine) -> dict[Row, Price]:
-    """Return the value of a weighted sum of terms for each row of `scope`; `math.inf` where it is undefined."""
+    """Return the value of a weighted sum of terms for each row of `scope`, or `math.inf` if the sum is undefined."""
     found: dict[Row, Price] = {}
     for row, values in _combinations(scope, place, parts[0][1]):
         try:
@@ -47,7 +47,7 @@ def prices(parts: Sequence[tuple[Exact, Term]], scope: Sequence[ModelVariable], 
 
 
 def listed_rows(term: TableTerm) -> dict[Row, object] | None:
-    """Return the rows of a table over distinct variables, as codes. None: it is over other terms."""
+    """Return a table over distinct variables with its rows as codes. None: the table is over other terms."""
     variables = [one for one in term.arguments if isinstance(one, ModelVariable)]
     if len(term.variables) < len(term.arguments) or len(variables) < len(term.arguments):
         return None

@@ -1,4 +1,4 @@
-"""Builds the team of a model: units of costs, names, constraints of each robot, and changes over time."""
+"""Builds the team of a model: the unit of costs, names, the constraints of each robot, and changes over time."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ def build_team(model: Model, order: Sequence[str] | None = None) -> Team:
 
     Args:
         model: The model.
-        order: The robots in priority order. None: the order of their priorities.
+        order: The robots in priority order. None: the order given by the robots' priorities.
 
     Raises:
         ModelError: if the model is invalid.
-        InvalidInputError: if it is invalid, and no single line of the program is the cause.
+        InvalidInputError: if the model is invalid, but no single line of the program is the cause.
     """
     try:
         builder = _Builder(model, order)
@@ -61,12 +61,12 @@ def build_team(model: Model, order: Sequence[str] | None = None) -> Team:
 
 
 def saved_order(team: Team) -> tuple[str, ...]:
-    """Return the order of the robots in the files of `team`: by links, then by names."""
+    """Return the order that the files of `team` give the robots: by links, then by names."""
     return priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
 
 
 class _Builder:
-    """Builds one team."""
+    """Builds one team from a model."""
 
     def __init__(self, model: Model, order: Sequence[str] | None) -> None:
         self._model = model
@@ -102,7 +102,7 @@ class _Builder:
         self._places: dict[str, SourceLine] = {}
 
     def _parts_of(self, robot: ModelRobot) -> list[Draft]:
-        """Return a robot's parts of shared constraints. Parts over its own variables become private."""
+        """Return the drafts of a robot's parts of shared constraints; drafts over its own variables become private."""
         found = []
         for draft in (one for rule in robot.parts for one in rule.drafts()):
             owners = {variable.owner for variable in draft.scope}
@@ -147,7 +147,7 @@ class _Builder:
         return made
 
     def located(self, invalid: InvalidInputError) -> Exception:
-        """Return the first error of a team with its line in the program; `invalid` itself if no line is known."""
+        """Return the first error of a team with its line in the program, or `invalid` itself if no line is known."""
         for mistake in invalid.diagnostics:
             named = re.search(r"\b(?:constraint|predicate|relation|function) (\S+?)(?: |$)", mistake.file)
             if named and named[1] in self._places:
@@ -184,7 +184,7 @@ class _Builder:
         return (*events, *(ScenarioEvent(tuple(changing.changes(event)), event.after) for event in self._model.events))
 
     def finished_rule(self, rule: ModelConstraint) -> list[Constraint]:
-        """Return the constraints of the team for a constraint that an event adds."""
+        """Return the team's constraints for a constraint that an event adds."""
         symbolic = [variable.name for variable in self._model.variables.values() if variable.codes.symbolic]
         return with_marked_symbols([self._finished(draft) for draft in self._added[rule]], symbolic)
 
@@ -202,7 +202,7 @@ class _Builder:
         return replace(team[robot.name], children=())
 
     def owners(self, constraint: Constraint, order: Sequence[str]) -> list[str]:
-        """Return the robots of a constraint's scope, the highest priority first."""
+        """Return the robots in a constraint's scope, the highest priority first."""
         owners = {self._model.variables[name].owner for name in constraint.variables}
         return [name for name in order if name in owners]
 
@@ -212,16 +212,16 @@ class _Builder:
         return [*self._model.constraints, *(part for robot in self._robots for part in robot.parts)]
 
     def shared_by(self, rule: ModelConstraint, order: Sequence[str]) -> set[tuple[str, str, str]]:
-        """Return the name of `rule` and the two robots that have it, for each of its constraints."""
+        """Return, for each constraint that `rule` becomes, its name and the two robots that share it."""
         scopes = [{variable.owner for variable in draft.scope} for draft in rule.drafts()]
         robots = [[name for name in order if name in scope] for scope in scopes]
         return {(rule.name, names[-1], names[-2]) for names in robots if len(names) > 1}
 
 
 class _Changing:
-    """The robots and the constraints between them, as events change them.
+    """The robots and the constraints between them, updated by each event.
 
-    `held`: the name of each constraint and the two robots that have it.
+    `held`: each constraint's name with the two robots that share it.
     """
 
     def __init__(self, builder: _Builder, order: list[str], held: set[tuple[str, str, str]]) -> None:
@@ -251,7 +251,7 @@ class _Changing:
                 yield step
 
     def _added(self, rule: ModelConstraint, new: dict[str, list[Constraint]]) -> list[AddConstraint]:
-        """Return the constraints added between robots of the team; constraints of joining robots are added to `new`."""
+        """Return the constraints added between robots of the team; those of joining robots are stored in `new`."""
         found = []
         for constraint in self._builder.finished_rule(rule):
             if not constraint.variables and not constraint.price({}):

@@ -1,4 +1,4 @@
-"""The contents of an existing team, with which a model can begin."""
+"""The contents of an existing team, from which a model can start."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from robochoc.modelling.terms import ModelVariable
 
 @dataclass(frozen=True)
 class TeamContents:
-    """The contents of a team except its robots' names and variables.
+    """The contents of a team, except the robots' names and variables.
 
     Attributes:
         kind: The kind of problem.
-        units: The units of its costs.
-        constraints: Its constraints, without the partially known ones.
+        units: The units of the team's costs.
+        constraints: The constraints, except partially known constraints.
         parts: The parts of partially known constraints, by the robot that knows them.
         links: Pairs of neighbours, the parent first.
-        events: Its scenario.
+        events: The scenario.
     """
 
     kind: ProblemKind
@@ -35,12 +35,12 @@ class TeamContents:
 
     @property
     def names(self) -> set[str]:
-        """The names of its constraints."""
+        """The names of the team's constraints."""
         return {one.name for one in self._all}
 
     @property
     def definitions(self) -> set[str]:
-        """The names of its relations, predicates and functions."""
+        """The names of the team's relations, predicates and functions."""
         return {one.definition.name for one in self._all}
 
     @property
@@ -67,7 +67,7 @@ def contents_of(team: Team) -> TeamContents:
 
 
 def model_variable(variable: Variable, owner: str, symbols: Symbols, place: SourceLine) -> ModelVariable:
-    """Return a variable of a team as a variable of a model."""
+    """Return a team's variable as a variable of a model."""
     domain = variable.domain
     for symbol in domain.symbols:
         symbols.code(symbol)
@@ -80,7 +80,7 @@ def model_variable(variable: Variable, owner: str, symbols: Symbols, place: Sour
 
 
 def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
-    """Return `constraint` with its costs in a unit that is `factor` times finer."""
+    """Return `constraint` with its costs in a unit that is smaller by `factor`."""
     if factor == 1:
         return constraint
     match constraint.definition:
@@ -95,7 +95,7 @@ def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
 
 
 def changes_in_finer_units(changes: Iterable[Change], factor: int) -> tuple[Change, ...]:
-    """Return `changes` with the costs of added constraints in a finer unit. Added robots declare their own unit."""
+    """Return `changes` with the costs of added constraints in a smaller unit. Added robots declare their own unit."""
     return tuple(
         replace(change, constraint=in_finer_units(change.constraint, factor))
         if isinstance(change, AddConstraint)

@@ -16,7 +16,7 @@ from robochoc.modelling.html_tables import heading, table, text
 from robochoc.system.plain_text import counted
 
 MAX_ROBOTS = 60
-"""Of more robots no graph is drawn: it would be illegible."""
+"""The most robots for which a graph is drawn; a larger graph would be illegible."""
 _MARGIN = 110
 _LONGEST = 16
 _MAX_RANGES = 12
@@ -27,7 +27,7 @@ def team_html(team: Team, user_values: Mapping[str, Iterable[object]] = {}) -> s
 
     Args:
         team: The team.
-        user_values: The values of variables as their user wrote them, where files hold codes instead.
+        user_values: The user's values of variables for which the files contain codes.
     """
     constraints = list(_constraints(team))
     counts = {"robot": len(team.robots), "variable": len(team.variables), "constraint": len(constraints)}
@@ -71,7 +71,7 @@ def _definition(constraint: Constraint) -> str:
 
 
 def _with_actual(expression: Expression, actual: Mapping[str, str | int]) -> Expression:
-    """Return an expression with actual parameters in place of its formal parameters."""
+    """Return an expression with its formal parameters replaced by actual parameters."""
     match expression:
         case Name(name) if name in actual:
             return Name(str(actual[name]))
@@ -105,7 +105,7 @@ def _domain(domain: Domain) -> str:
 
 
 def graph_svg(team: Team) -> str:
-    """Return the SVG of the constraint graph; empty for one robot, and for more than `MAX_ROBOTS`."""
+    """Return the SVG of the constraint graph; empty if there is one robot, or more than `MAX_ROBOTS`."""
     if not 1 < len(team.robots) <= MAX_ROBOTS:
         return ""
     near = constraint_graph(team)

@@ -1,7 +1,7 @@
-"""Terms: expressions over variables, written with Python's operators, as trees with kinds and values.
+"""Terms: expressions over variables, written with Python's operators and stored as typed trees.
 
-`value` computes a term as Python would, in exact numbers: `//` and `%` round down. `modelling/translation.py`
-translates terms into expressions of files.
+`value` evaluates a term as Python would, with exact numbers: `//` and `%` round down. `modelling/translation.py`
+translates terms into the expressions of XML files.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ MAX_DEPTH = 200
 MAX_TERMS = 1_000_000
 
 Values = Mapping["ModelVariable", object]
-"""The users' values of variables."""
+"""The user's values of variables."""
 
 
 class TermSize(NamedTuple):
-    """The depth of a term, and the number of its subterms; repeated ones count repeatedly."""
+    """The depth of a term, and the number of its subterms, where repeated subterms count repeatedly."""
 
     depth: int
     terms: int
@@ -39,14 +39,14 @@ _ALONE = TermSize(0, 1)
 class Term:
     """A number, a truth value or a symbol that depends on variables.
 
-    Numbers have `+ - * // % ** abs()` and comparisons; `==` and `!=` compare anything of one kind. Conditions have
-    `& | ~ ^` and `implies`; where a number is expected they count as 0 or 1.
+    Numbers have `+ - * // % ** abs()` and comparisons; `==` and `!=` compare any two terms of the same kind. Conditions
+    have `& | ~ ^` and `implies`; where a number is expected they count as 0 or 1.
     """
 
     __array_priority__ = -1.0
-    """NumPy's scalars (-1000000) delegate operators to a term, its arrays (0) do not."""
+    """NumPy scalars (priority -1000000) leave operators to a term; NumPy arrays (priority 0) apply them elementwise."""
     kind: ValueKind | None = NUMBER
-    """The kind of its values. None: unknown before they are computed."""
+    """The kind of the term's values. None: unknown until the values are computed."""
     arguments: tuple[Term, ...] = ()
     size: TermSize = _ALONE
 
@@ -57,19 +57,19 @@ class Term:
 
     @cached_property
     def is_partial(self) -> bool:
-        """Whether the term may have no value: it divides, has a power or an element, or calls a function."""
+        """Whether the term can be undefined: it contains a division, a power, an element or a function call."""
         return any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
-        """Return the term's value. Raises `UndefinedTermError` where it has none, such as a division by zero."""
+        """Return the term's value. Raises `UndefinedTermError` if the term is undefined, as in a division by zero."""
         raise NotImplementedError
 
     def implies(self, other: object) -> Term:
-        """Return the condition that `other` holds wherever this condition does."""
+        """Return the condition that `other` holds whenever this condition holds."""
         return Operation("implies", condition(self), condition(other))
 
     def is_in(self, values: Iterable[object]) -> Term:
-        """Return the condition that this term has one of `values`."""
+        """Return the condition that the value of this term is one of `values`."""
         equations = [condition(self == value) for value in values]
         members = [one.arguments[1] for one in equations]
         if len(members) > 1 and all(isinstance(one, ConstantTerm) for one in members):
@@ -185,7 +185,7 @@ class Term:
         raise ModelTypeError(f"{self!r} is one term, not a list of terms")
 
     def __deepcopy__(self, memo: dict[int, object]) -> Term:
-        """Return a copy. The deepest terms are copied first: recursion may exceed Python's limit."""
+        """Return a copy. The deepest subterms are copied first, since recursion could exceed Python's limit."""
         waiting = [self]
         while waiting:
             below = [one for one in waiting[-1].arguments if id(one) not in memo]
@@ -198,13 +198,13 @@ class Term:
 
 
 class ModelVariable(Term):
-    """A decision of a robot. `Robot.variable` creates it.
+    """A decision of a robot, created by `ModelRobot.variable`.
 
     Attributes:
-        name: Its name in the team.
-        codes: Its domain.
-        owner: The name of its robot.
-        place: The line that created it.
+        name: The variable's name in the team.
+        codes: The variable's domain.
+        owner: The name of the variable's robot.
+        place: The line that created the variable.
         joins: The event with which its robot joins. None: the robot belongs to the team from the beginning.
     """
 
@@ -215,7 +215,7 @@ class ModelVariable(Term):
 
     @property
     def domain(self) -> tuple[object, ...]:
-        """The values of its domain."""
+        """The values in the domain."""
         return tuple(self.codes.value(code) for code in self.codes)
 
     def value(self, values: Values) -> object:
@@ -243,7 +243,7 @@ class ConstantTerm(Term):
 class Linear(Term):
     """A weighted sum: pairs of a factor and a term, and a constant.
 
-    A long `sum(...)` creates a sum for each of its terms, so equal terms are merged only on demand.
+    A long `sum(...)` creates an intermediate sum for each term, so equal terms are merged only on demand.
     """
 
     def __init__(self, pairs: tuple[tuple[Exact, Term], ...], constant: Exact = 0) -> None:
@@ -251,7 +251,7 @@ class Linear(Term):
 
     @cached_property
     def parts(self) -> tuple[tuple[Exact, Term], ...]:
-        """The factor of each distinct term. Terms that may have no value stay with factor 0: then the sum has none."""
+        """Each distinct term with its factor; partial terms stay even with factor 0, as they can be undefined."""
         merged: dict[Term, Exact] = {}
         for factor, term in self.pairs:
             merged[term] = merged.get(term, 0) + factor
@@ -259,7 +259,7 @@ class Linear(Term):
 
     @property
     def size(self) -> TermSize:  # type: ignore[override] # computed on demand, since sums grow
-        """The size of a sum of these terms."""
+        """The size of a sum of the distinct terms."""
         return size_of(self.arguments)
 
     @cached_property
@@ -289,7 +289,7 @@ class Operation(Term):
 
     @cached_property
     def is_partial(self) -> bool:
-        """Whether it may have no value."""
+        """Whether the operation can be undefined."""
         return self.operator in PARTIAL or any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
@@ -304,7 +304,7 @@ class Operation(Term):
 
 
 class FunctionCall(Term):
-    """A call of a Python function of terms: a condition or a number, depending on its results."""
+    """A call of a Python function of terms: a condition or a number, depending on the function's results."""
 
     kind = None
     is_partial = True
@@ -330,7 +330,7 @@ class FunctionCall(Term):
 
 
 class TableTerm(Term):
-    """A table over terms: the values of the listed combinations, and a default value for all others."""
+    """A table over terms: values for the listed combinations, and a default value for all others."""
 
     def __init__(self, arguments: tuple[Term, ...], rows: Mapping[tuple[object, ...], object], default: object) -> None:
         self.arguments, self.rows, self.default = arguments, rows, default
@@ -381,7 +381,7 @@ def condition(value: object) -> Term:
 
 
 def linear(parts: Iterable[tuple[Exact, Term]]) -> Term:
-    """Return a sum of terms times factors; nested sums are merged."""
+    """Return a sum of terms multiplied by factors; nested sums are merged."""
     pairs: tuple[tuple[Exact, Term], ...] = ()
     constant: Exact = 0
     for factor, term in parts:
@@ -431,7 +431,7 @@ def _equation(operator: str, left: Term, given: object) -> Term:
 
 
 def _check_known(variable: ModelVariable, value: object) -> None:
-    """Raise `ModelError` if the variable is compared with a text that is not one of its values: probably a typo."""
+    """Raise `ModelError` if the variable is compared with a text that is not in its domain, probably a typo."""
     if isinstance(value, str) and variable.codes.symbolic and variable.codes.code(value) is None:
         shown = " ".join(map(str, variable.domain[:20]))
         raise ModelError(
@@ -440,7 +440,7 @@ def _check_known(variable: ModelVariable, value: object) -> None:
 
 
 def size_of(arguments: Iterable[Term]) -> TermSize:
-    """Return the size of a term with these arguments. Raises `ModelError` if it is too deep, or too large."""
+    """Return the size of a term with these arguments. Raises `ModelError` if the term is too deep or too large."""
     depth, terms = 0, 1
     for one in arguments:
         depth = max(depth, one.size.depth)

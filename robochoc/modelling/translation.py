@@ -1,7 +1,7 @@
-"""Translates terms into expressions of files over integers (docs/reference/format.md, "Functional expressions").
+"""Translates terms into the integer expressions of XML files (docs/reference/format.md, "Functional expressions").
 
 A number that may be a fraction becomes an integer expression and a divisor, so nothing is rounded. `//` and `%` round
-down in Python and toward zero in files: `mod` corrects the remainder.
+down in Python but toward zero in files; the translation corrects this with `mod`.
 """
 
 from __future__ import annotations
@@ -20,24 +20,24 @@ from robochoc.modelling.terms import ConstantTerm, Linear, ModelVariable, Operat
 from robochoc.system.errors import RobochocError
 
 MAX_SIZE = 5_000
-"""The maximum number of operators and terms of an expression; each nested quotient doubles the number."""
+"""The maximum number of operators and terms in an expression; each nested quotient doubles the number."""
 MAX_LEVELS = 60
 """The maximum depth of an expression."""
 
 
 class UntranslatableError(RobochocError):
-    """The term has no equivalent expression: it must become a table."""
+    """The term has no equivalent expression, and must become a table."""
 
 
 class Scaled(NamedTuple):
-    """A number: the value of an integer expression, divided by `divisor` (1 or more)."""
+    """A number, stored as an integer expression that is divided by `divisor` (1 or more)."""
 
     expression: Expression
     divisor: int = 1
 
 
 class Translator:
-    """Translates terms over variables, which are called `names` in the expressions."""
+    """Translates terms over variables. `names` contains the variables' names in the expressions."""
 
     def __init__(self, names: Mapping[ModelVariable, str]) -> None:
         self._names = names
@@ -45,19 +45,19 @@ class Translator:
         self._combinations = math.prod(len(variable.codes.ever) for variable in names)
 
     def whole_condition(self, term: Term) -> Expression:
-        """Return a Boolean expression that fits into files. Raises `UntranslatableError`."""
+        """Return a Boolean expression that fits into a file. Raises `UntranslatableError`."""
         return self._within_limits(self.condition(term))
 
     def whole_number(self, term: Term) -> Scaled:
-        """Return a number whose expression fits into files. Raises `UntranslatableError`."""
+        """Return a number whose expression fits into a file. Raises `UntranslatableError`."""
         found = self.number(term)
         return found._replace(expression=self._within_limits(found.expression))
 
     def _within_limits(self, expression: Expression) -> Expression:
-        """Return `expression` if it fits into files, and into 64 bits unless a table would be too large.
+        """Return `expression` if it fits into a file, and into 64 bits unless a table would be too large.
 
         Raises:
-            UntranslatableError: if the term must become a table, whose entries are computed without such a limit.
+            UntranslatableError: if the term must become a table, whose entries have no such limit.
         """
         _check_size(expression)
         if self._combinations <= MAX_COMBINATIONS and excess(expression, self._limits):
@@ -142,7 +142,7 @@ class Translator:
         return Scaled(found[0] if len(found) == 1 else Apply("add", tuple(found)), divisor)
 
     def _division(self, operator: str, numbers: Sequence[Scaled]) -> Scaled:
-        """Return the quotient rounded down, or the remainder, which has the divisor's sign."""
+        """Return the quotient rounded down, or the remainder with the sign of the divisor."""
         (left, right), divisor = _together(numbers)
         down = self._bounds(left).low >= 0 and self._bounds(right).low > 0
         rest = Apply("mod", (left, right))
@@ -178,7 +178,7 @@ class Translator:
         return Apply(operator, tuple(found))
 
     def _symbol(self, term: Term, variable: ModelVariable) -> Expression:
-        """Return the expression of a symbol compared with `variable`. Raises `UntranslatableError`."""
+        """Return the expression for the comparison of a symbol with `variable`. Raises `UntranslatableError`."""
         if isinstance(term, ModelVariable):
             return Name(self._names[term])
         code = variable.codes.code(term.given) if isinstance(term, ConstantTerm) else None
@@ -198,7 +198,7 @@ def _interval(variable: ModelVariable) -> Interval:
 
 
 def _together(numbers: Sequence[Scaled] | map[Scaled]) -> tuple[list[Expression], int]:
-    """Return the numbers as expressions with a common divisor, and the divisor."""
+    """Return the numbers as expressions with a common divisor, and that divisor."""
     found = list(numbers)
     divisor = math.lcm(*(one.divisor for one in found))
     return [_times(divisor // one.divisor, one.expression) for one in found], divisor
@@ -234,7 +234,7 @@ def _check_size(expression: Expression) -> None:
 
 
 def may_be_undefined(expression: Expression) -> bool:
-    """Return whether an expression may be undefined: it contains a quotient, a remainder or a power."""
+    """Return whether an expression contains a quotient, a remainder or a power, and so may be undefined."""
     waiting = [expression]
     while waiting:
         one = waiting.pop()
