@@ -20,7 +20,7 @@ from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
 
 MOST_NAMED = 3
-"""The number of protocols named in a refusal. A guide helps to choose between them."""
+"""The maximum number of protocols named in a refusal. A guide helps to choose between them."""
 GUIDE = "docs/guides/which-protocol.md"
 
 
@@ -36,7 +36,7 @@ def alternatives(
         options: The refused options.
         complete: Whether the protocol must be complete.
         costs: Whether it must minimise costs.
-        narrow: Whether its tables must be narrower than DPOP's, which were refused for their memory.
+        narrow: Whether its tables must be narrower than those of DPOP, which was refused for their memory.
     """
     names = [
         offer.name

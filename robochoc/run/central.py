@@ -1,4 +1,4 @@
-"""A run without robots: one model of all files, decided by the central solver, epoch by epoch."""
+"""A run without robots: the central solver decides one merged model of all files, epoch by epoch."""
 
 from __future__ import annotations
 
@@ -40,8 +40,8 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
         header: An outcome that describes the run, without an answer.
 
     Raises:
-        RefutedError: if the checker refutes an answer.
-        SolverLostError: if the cost of an answer differs from the solver's.
+        RefutedError: if the checker refutes an answer of the solver.
+        SolverLostError: if the computed cost of an answer differs from the cost that the solver reports.
     """
     from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: robots need it seldom
 
@@ -61,7 +61,7 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
 
 
 def _opened_by(team: Team, number: int) -> str:
-    """Return the cause of the epoch of this `number`, in a few words."""
+    """Return the cause of epoch `number`, in a few words."""
     if not number:
         return "the start"
     return ", ".join(describe_change(change, team) for change in team.scenario[number - 1].changes) or "nothing"
@@ -82,7 +82,7 @@ def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
 
 
 def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
-    """Return the solver's answer, with a minimum withdrawal if the options allow it and it is necessary."""
+    """Return the solver's answer. If the options allow it and no solution exists, a minimum of robots withdraws."""
     price = None
     found = None
     if options.withdraw != Withdrawal.MINIMUM or team.kind == ProblemKind.DISCSP:
@@ -94,7 +94,7 @@ def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
 
 
 def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Options) -> PhaseAnswer:
-    """Return the answer of the central solver.
+    """Convert a result of the central solver to the answer of a phase.
 
     `price` is the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
     """

@@ -1,8 +1,8 @@
-"""The choice of protocol and order for a team, if the user names none (`--protocol auto`). No other module chooses.
+"""The choice of a protocol and an order for a team if the user names none (`--protocol auto`). No other module chooses.
 
-`RULES` (`run/choice_rules.py`) are tried from the first to the last. The first rule that holds, and whose protocol
-accepts the team and the options (`run/compatibility`), decides. If there is none, any installed protocol that accepts
-them is chosen, complete ones first.
+`RULES` (`run/choice_rules.py`) are tried from the first to the last. The first rule whose conditions hold, and whose
+protocol accepts the team and the options (`run/compatibility`), decides. If no rule applies, any installed protocol
+that accepts the team and the options is chosen, complete protocols first.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ FAILURES = (
 
 @dataclass(frozen=True)
 class ProtocolChoice:
-    """The choice for a team, with the reasons.
+    """The options with the chosen protocol, and the reasons for the choice.
 
     Attributes:
         options: How to run, with the name of a protocol, and an order if one was chosen.
         facts: The facts about the team, in words. Empty if the user named the protocol.
-        rejected: The rejected protocols, each with the reason.
+        rejected: The rejected protocols, with the reason for each rejection.
     """
 
     options: Options
@@ -53,13 +53,13 @@ class ProtocolChoice:
 
 
 def choose(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> ProtocolChoice:
-    """Return `options` with a protocol and an order, chosen where they leave these open.
+    """Return `options` with a protocol and an order; each is chosen here if `options` do not specify it.
 
     Args:
         team: The valid team with its scenario.
         options: How to run.
         environment: Whether an environment changes the problem.
-        ordered: Whether the user chose the order of the team. Otherwise one is chosen for any protocol.
+        ordered: Whether the user chose the order of the team. Otherwise an order is chosen too, for any protocol.
     """
     if options.protocol == AUTO:
         choice = _decided(team, options, environment=environment)
@@ -74,7 +74,7 @@ def choose(team: Team, options: Options, *, environment: bool = False, ordered: 
 
 
 def choose_without_analysis(team: Team, options: Options) -> ProtocolChoice:
-    """Return the choice if there is no time to analyse the team: the default protocol and the given order."""
+    """Return the choice for a run without time to analyse the team: the default protocol and the given order."""
     order = None if options.order == Order.GIVEN else options.order
     if options.protocol != AUTO:
         return ProtocolChoice(replace(options, order=order))
@@ -84,10 +84,10 @@ def choose_without_analysis(team: Team, options: Options) -> ProtocolChoice:
 
 
 def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoice:
-    """Return the choice if the protocol is open."""
+    """Choose the protocol, since `options` do not name one."""
     try:
         team = normalized(team)
-    except UnboundedCostError:  # the run refuses it
+    except UnboundedCostError:  # the run reports this error
         return ProtocolChoice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
     facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss)
     rejected: dict[str, list[str]] = {}
@@ -104,12 +104,12 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
             return _choice(facts, options, (name, ACCEPTS), rejected)
     usual = (
         DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL
-    )  # its refusal names the protocols that accept the team
+    )  # the resulting error text names the protocols that accept the team
     return _choice(facts, options, (usual, NONE_ACCEPTS), {})
 
 
 def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
-    """Return the choice for a team whose robots do not disclose their constraints: each robot checks its own."""
+    """Return the choice for a team whose robots do not disclose their constraints, since each robot checks its own."""
     if options.protocol != AUTO:
         return ProtocolChoice(options)
     if options.message_loss:
@@ -125,14 +125,14 @@ def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
 
 
 def _loss_tolerant(loss: float, *, costs: bool) -> tuple[str, str]:
-    """Return a protocol that tolerates lost messages, for undisclosed constraints, and the reason."""
+    """Return a protocol for undisclosed constraints that tolerates lost messages, and the reason for the choice."""
     without_costs = "gdba" if loss <= FEW_LOSSES else "dsa"
     name = "regret-matching" if costs else without_costs
     return name, "messages may be lost, which it tolerates; the robots do not disclose their constraints"
 
 
 def _others(*, tolerating_loss: bool) -> list[str]:
-    """Return the installed protocols, complete ones first; before these, on request, those that tolerate loss."""
+    """Return the installed protocols: on request, first those that tolerate loss; then complete ones first."""
     found = [
         (tolerating_loss and not one.protocol.traits.bears_loss, not one.protocol.traits.complete, one.name)
         for one in installed_protocols()
@@ -147,7 +147,7 @@ def accepts(name: str, team: Team, options: Options) -> bool:
 
 
 def refusal(name: str, team: Team, options: Options) -> str:
-    """Return why the protocol called `name` does not accept the team or the options; empty if it does."""
+    """Return why the protocol called `name` does not accept the team or the options; empty if it accepts them."""
     try:
         protocol = protocol_named(name)
         refuse_settings(name, protocol, options.settings)
@@ -171,21 +171,21 @@ def _choice(
 ORDERS = MappingProxyType(
     {"sfb": Order.MIN_WIDTH, "afb": Order.MIN_WIDTH, "abt": Order.MAX_DEGREE, "afc-ng": Order.MAX_DEGREE}
 )
-"""The orders that suit the protocols. Other protocols build trees, or use no order."""
+"""The orders that suit the protocols. Protocols not listed here build trees, or use no order."""
 
 ORDERS_TEXT = (
     "order, if not given: max-degree for abt, afc-ng and afb; min-width for sfb (with costs max-degree, with",
     "--withdraw dom-deg). The order of the files is kept for other protocols, and if constraints are partially known,",
     "the problem changes, or --withdraw maximal decides by priority",
 )
-"""The rules of `_with_suitable_order` and `_with_order`, in lines for the user."""
+"""The rules of `_with_suitable_order` and `_with_order`, as lines for the user."""
 
 STATIC = frozenset({"sbt", "abt", "afc", "afc-ng", "afc-tree", "disfc", "syncbb", "afb", "sfb"})
-"""Protocols with a static order, so that a poor order is expensive."""
+"""Protocols with a static order. A poor order slows these down most."""
 
 
 def faster_order(team: Team, options: Options) -> Order | None:
-    """Return an order that is usually faster than that of the files. None: `options` name one, or there is none.
+    """Return an order that is usually faster than that of the files; None if `options` name an order or none is known.
 
     Args:
         team: The team with its scenario.
@@ -198,10 +198,10 @@ def faster_order(team: Team, options: Options) -> Order | None:
 
 
 def _with_suitable_order(options: Options, facts: Facts) -> Options:
-    """Return `options` with the order that suits the protocol, if there is one."""
+    """Return `options` with the order that suits the protocol, if such an order is known."""
     order = ORDERS.get(options.protocol)
     if options.protocol == DEFAULT_COST_PROTOCOL and options.withdraw == Withdrawal.MINIMUM:
-        order = Order.DOM_DEG  # a withdrawal is found soon
+        order = Order.DOM_DEG  # robots that must withdraw are found soon
     if order == Order.MIN_WIDTH and facts.has_costs:
         order = Order.MAX_DEGREE
     if options.order is not None or order is None:
@@ -210,7 +210,7 @@ def _with_suitable_order(options: Options, facts: Facts) -> Options:
 
 
 def _with_order(options: Options, facts: Facts, order: Order, why: str) -> Options:
-    """Return `options` with `order`, unless that of the team must be kept."""
+    """Return `options` with `order`, unless the order of the team must be kept."""
     if options.withdraw == Withdrawal.MAXIMAL or facts.changes or facts.partially_known:
         return options  # priorities decide withdrawals, changes depend on the order, and PKC links cannot be reversed
     return replace(options, order=order, chosen={**options.chosen, "order": why})
@@ -220,7 +220,7 @@ def _with_order(options: Options, facts: Facts, order: Order, why: str) -> Optio
 
 
 def _compiled_sizes(team: Team, options: Options) -> Sizes | None:
-    """Return the sizes of the robots' compiled domains; None if they cannot be compiled."""
+    """Return the sizes of the robots' compiled domains, or None if the domains cannot be compiled."""
     context = RunContext(options)
     try:
         compiled = context.team_compiler().compile(team, every=True)

@@ -14,15 +14,15 @@ from robochoc.solver.encoding import MAX_TUPLES
 from robochoc.solver.filters import MAX_FILTER_BITS
 
 NARROW_CELLS = 65_536
-"""No table on a narrow pseudo-tree has more entries."""
+"""The largest number of entries of a table on a narrow pseudo-tree."""
 FEW_ROBOTS = 12
 """Up to this number of robots, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
 MOST_IN_A_TREE = 30_000
-"""This many robots take half a minute in the simulator (docs/guides/large-teams.md)."""
+"""The largest team that uses a tree. The simulator needs half a minute for it (docs/guides/large-teams.md)."""
 MANY_ROBOTS = 300
-"""With more robots, SFB's messages grow too long, and with costs only local search ends in time."""
+"""With more robots, SFB's messages become too long, and for problems with costs only local search ends in time."""
 MANY_COMBINATIONS = 100_000_000
-"""Up to this many combinations of all robots' values, `asym-pt-fb` takes seconds in the simulator."""
+"""Up to this many combinations of the values of all robots, `asym-pt-fb` takes seconds in the simulator."""
 SPARSE = 8
 """The mean number of neighbours up to which a constraint graph is called sparse."""
 FEW_TO_BEGIN_ANEW = 25
@@ -30,14 +30,14 @@ FEW_TO_BEGIN_ANEW = 25
 TIGHT = 0.7
 """The constrainedness from which `sfb`, restarted after each change, needs fewer messages than `dynabt`."""
 LONG_ROW = 65_536
-"""The values of all robots together up to which many partial assignments of SFB go into a message."""
+"""Up to this many values of all robots together, many of SFB's partial assignments fit into one message."""
 
 FEW_LOSSES = 0.1
 """The share of lost messages up to which `gdba` finds more solutions than `dsa`, whose robots move without a gain."""
 
 
 class Condition(NamedTuple):
-    """A condition of a rule on a team: a predicate, and its wording when true and when false."""
+    """A condition of a rule on a team: a predicate, and its wording for both results."""
 
     holds: Callable[[Facts], bool]
     text: str
@@ -52,7 +52,7 @@ class Rule(NamedTuple):
     why: str
 
     def unmet(self, facts: Facts) -> str:
-        """Return why the rule does not hold: the first condition that the team does not meet. Empty if it holds."""
+        """Return why the rule does not apply: the first condition that the team does not meet. Empty if it applies."""
         return next((one.otherwise for one in self.conditions if not one.holds(facts)), "")
 
 
@@ -239,4 +239,4 @@ RULES = (
     Rule("afb", (LARGE_TABLE,), "domains are large, and it needs no tables"),
     Rule("sfb", (), "it needs few messages, on hard problems too"),
 )
-"""The rules, in their order."""
+"""The rules, in the order in which they are tried."""

@@ -1,4 +1,4 @@
-"""The shared state of a run on this machine: time, cache, constraint solver, observers."""
+"""The shared state of a run on this machine: time, cache, constraint solver and observers."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 
 
 class RunContext:
-    """The context of one run. Its time starts now.
+    """The context of one run. The clock of the run starts when the context is created.
 
     Args:
         options: How to run, with the name of a protocol.
         observer: Receives all events.
-        progress: Receives the number of messages and the stage of the run, now and then.
-        solver: A constraint solver that is already running. None: one is started when it is needed.
-        spent_s: The seconds that the run has taken before.
+        progress: Receives the number of messages and the stage of the run from time to time.
+        solver: A constraint solver that is already running. None: a solver is started when it is needed.
+        spent_s: The seconds that the run took before the context was created.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class RunContext:
         self.restart(spent_s)
 
     def restart(self, spent_s: float = 0.0) -> None:
-        """Restart the clock at `spent_s`."""
+        """Restart the clock of the run, with `spent_s` seconds already spent."""
         self.began = time.monotonic() - spent_s
         limit_s = self.options.limit_s
         self.deadline = None if limit_s is None else self.began + limit_s
@@ -68,25 +68,25 @@ class RunContext:
         return TeamCompiler(self.options.local, self.cache, self.deadline, self.solver, show)
 
     def deciding_solver(self, warm: AceProcess) -> TeamSolver:
-        """Return the solver of the merged problem. For ACE it uses the process `warm`, unless the run has a process."""
+        """Return the solver of the merged problem. ACE runs in `warm`, unless the run already has a process."""
         if self.options.central_with == CentralSolverName.ORTOOLS:
             return self.cp_sat_solver()
         return self.central_solver(warm)
 
     def cp_sat_solver(self) -> CpSatSolver:
-        """Return a central solver of this run that uses OR-Tools."""
+        """Return a central solver for this run that uses OR-Tools."""
         from robochoc.solver.cp_sat import CpSatSolver  # noqa: PLC0415 - start-up: rarely needed
 
         return CpSatSolver(self.deadline, partial(self.show_stage, "OR-Tools decides the whole team"))
 
     def second_opinions(self) -> list[TeamSolver]:
-        """Return the solvers that check the proofs of robots: the central solver, and OR-Tools if it is installed."""
+        """Return the solvers that check proofs by robots: the central solver, and OR-Tools if it is installed."""
         from robochoc.solver.cp_sat import is_installed  # noqa: PLC0415 - start-up: rarely needed
 
         return [self.central_solver(), *([self.cp_sat_solver()] if is_installed() else [])]
 
     def central_solver(self, warm: AceProcess | None = None) -> CentralSolver:
-        """Return a central solver of this run; it uses the process `warm`, unless the run has a process."""
+        """Return a central solver. It uses the process `warm`, unless the run already has a process."""
         from robochoc.solver.central import CentralSolver  # noqa: PLC0415 - start-up: rarely needed
 
         show = partial(self.show_stage, "ACE decides the whole team")

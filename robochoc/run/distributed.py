@@ -1,7 +1,7 @@
-"""A distributed run, wherever the robots are: one or two phases, losses, and the reason for a missing verdict.
+"""A distributed run, in one or two phases: handles lost robots, and explains a missing verdict.
 
-A `Deployment` is a team of robots that search on command. There are two: `run/this_machine.py`, which has the robots'
-files, and `run/networked/machines.py`, whose robots do not disclose their files.
+A `Deployment` is a team of robots that search on command. It has two subclasses: `run/this_machine.py` has the robots'
+files; in `run/networked/machines.py` the robots do not disclose their files.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ FOUND_NOTHING = "ended, and found no assignment that satisfies all hard constrai
 class Deployment(ABC):
     """A team of robots that searches on command, on this machine or on several.
 
-    `options` say how to run.
+    `options` are the options of the run.
     """
 
     options: Options
@@ -45,12 +45,12 @@ class Deployment(ABC):
 
     @abstractmethod
     def in_user_units(self, total: float) -> Cost:
-        """Return `total`, a sum of the robots' internal costs, in the user's units."""
+        """Convert `total`, a sum of the robots' internal costs, to the user's units."""
 
     @property
     @abstractmethod
     def lost(self) -> tuple[str, ...]:
-        """The robots that were lost and did not come back."""
+        """The robots that were lost and have not returned."""
 
     @property
     @abstractmethod
@@ -59,7 +59,7 @@ class Deployment(ABC):
 
     @abstractmethod
     def withdrawal_cost(self) -> float:
-        """Return the withdrawal cost of a robot of weight 1: more than the costs of all constraints together."""
+        """Return the withdrawal cost of a robot of weight 1. It exceeds the sum of the costs of all constraints."""
 
     @abstractmethod
     def left_s(self) -> float | None:
@@ -67,23 +67,23 @@ class Deployment(ABC):
 
     @abstractmethod
     def search(self, phase: RunPhase) -> Search:
-        """Search once, from the beginning, with all present robots."""
+        """Run one search with all present robots, from its beginning."""
 
     @abstractmethod
     def remove(self, lost: Mapping[str, str]) -> None:
         """Remove lost robots from the team; `lost` maps their names to the reasons."""
 
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
-        """Return the central solvers that confirm `answer`. Raises `RefutedError` if one refutes it."""
+        """Return the central solvers that confirm `answer`. Raises `RefutedError` if a solver refutes it."""
         return ()
 
     @property
     def unsettled(self) -> str:
-        """Return the reason why the robots did not finish before a limit was reached; empty if it is not known."""
+        """Return why the robots did not finish before a limit was reached; empty if the reason is unknown."""
         return ""
 
     def solve(self, phase: RunPhase) -> PhaseAnswer:
-        """Return the answer of `phase`: search until a search ends without a loss, and check its result.
+        """Return the answer of `phase`: repeat the search until no robot is lost during a search, and check its result.
 
         Raises:
             RobotsLostError: if all robots were lost.
@@ -94,7 +94,7 @@ class Deployment(ABC):
         return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
 
     def evaluated(self, phase: RunPhase, search: Search) -> PhaseAnswer:
-        """Return the answer of `search`, confirmed by the central solver if the options require it."""
+        """Return the answer of `search`. If the options require it, the central solver confirms the answer."""
         deadline = self.options.deadline if self.left_s() == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.in_user_units, deadline))
         if answer.verdict in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
@@ -106,7 +106,7 @@ class Deployment(ABC):
         return answer
 
     def why_unknown(self, phase: RunPhase, answer: PhaseAnswer) -> str | None:
-        """Return the reason why `answer` has no verdict; None if it has a verdict."""
+        """Return the reason why `answer` has no verdict, or None if it has a verdict."""
         if answer.verdict != Verdict.UNKNOWN:
             return None
         if answer.witness is not None:
@@ -118,7 +118,7 @@ class Deployment(ABC):
         return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))
 
     def _limit_reached(self, spent: Metrics) -> str:
-        """Return the limit that has ended a search, in words."""
+        """Return the limit that ended a search, in words."""
         options = self.options
         if stop_requested():
             return STOPPED
@@ -137,18 +137,18 @@ class Deployment(ABC):
         return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
     def outcome(self, header: Outcome, answer: PhaseAnswer) -> Outcome:
-        """Return `header`, which describes the run, with its `answer`."""
+        """Return `header`, which describes the run, completed by `answer`."""
         metrics = replace(answer.metrics, compile_s=self.compile_s)
         return replace(answer, metrics=metrics, count=self._count(answer)).as_outcome(header, self.lost)
 
     def _count(self, answer: PhaseAnswer) -> int | None:
-        """Return the number of solutions or optima, if the options require it and it is known."""
+        """Return the number of solutions or optima if the options require it and the number is known."""
         if not self.options.count:
             return None
         return 0 if answer.verdict == Verdict.NO_SOLUTION else answer.count
 
     def _search_without_losses(self, phase: RunPhase) -> Search:
-        """Search until a search ends without a loss. Its metrics include those of the searches before."""
+        """Search until no robot is lost during a search. The metrics include all these searches."""
         spent = Metrics()
         while True:
             search = self.search(phase)
@@ -162,7 +162,7 @@ class Deployment(ABC):
 
 
 def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: Outcome) -> Outcome:
-    """Return the outcome of a run in which robots solve their problem together.
+    """Let robots solve their problem together, and return the outcome of the run.
 
     Args:
         deployment: The robots, with the options.
@@ -170,7 +170,7 @@ def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: 
         header: An outcome that describes the run, without an answer.
 
     Raises:
-        RobotsLostError: if robots were lost, and the run is not to continue without them.
+        RobotsLostError: if robots were lost, and the options do not let the run continue without them.
         RefutedError: if a check refutes the answer.
     """
     options = deployment.options

@@ -1,7 +1,7 @@
-"""The answer of a search: its verdict, and its assignment once that was checked.
+"""The evaluation of a search: the verdict, and the checked assignment.
 
-`evaluate_search` is the same wherever the robots are; how an assignment is checked is given to it. On this machine the
-files are at hand: `check_with_files`. Across machines the robots check (`run/networked/machines.py`).
+`evaluate_search` works for any deployment, because the check of the assignment is an argument. On this machine
+`check_with_files` reads the robots' files. Across machines the robots check (`run/networked/machines.py`).
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from robochoc.verification.checker import (
 )
 
 Check = Callable[[], Answer | None]
-"""Return the checked assignment of a search, with an undecided verdict. None if it violates a hard constraint."""
+"""A function that checks the assignment of a search. Returns it with an undecided verdict, or None if it is invalid."""
 
 
 class Search(NamedTuple):
-    """A search that is over: its result, and how its assignment is checked."""
+    """A finished search: its result, and the check of its assignment."""
 
     result: SearchResult
     check: Check
@@ -42,22 +42,22 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseAnswer(Answer):
-    """The answer of a phase of a run. `withdrawn` are the robots that withdrew; lost robots are not among them.
+    """The answer of a phase of a run. `withdrawn` contains the robots that withdrew, without lost robots.
 
-    `ended`: the protocol has ended by itself, no limit was reached.
+    `ended`: the protocol terminated by itself before any limit was reached.
     """
 
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> PhaseAnswer:
-        """Return this answer, confirmed by the central `solvers`; nothing else can verify `no-solution`."""
+        """Return this answer, confirmed by the central `solvers`. No other check can verify `no-solution`."""
         sure = bool(solvers)
         verified = sure if self.verdict == Verdict.NO_SOLUTION else self.verified
         return replace(self, verified=verified, confirmed=sure, confirmed_by=solvers)
 
     def then(self, second: PhaseAnswer) -> PhaseAnswer:
-        """Return the answer of two phases: that of the `second`, with the costs of both."""
+        """Return the answer of two phases: the answer of the `second` phase, with the costs of both phases."""
         return replace(
             second,
             metrics=self.metrics + second.metrics,
@@ -68,12 +68,12 @@ class PhaseAnswer(Answer):
         )
 
     def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
-        """Return the epoch that ended with this answer. Preprocessing is reported for the run as a whole."""
+        """Return the epoch that ended with this answer. Preprocessing is reported once, for the whole run."""
         parts = self.parts() | {"preprocessing": None}
         return EpochOutcome(**parts, robots=robots, opened_by=opened_by, lost=tuple(lost))
 
     def as_outcome(self, header: Outcome, lost: tuple[str, ...]) -> Outcome:
-        """Return `header`, which describes the run, with this answer; the robots `lost` are withdrawn as well."""
+        """Return `header`, which describes the run, with this answer. The robots `lost` count as withdrawn too."""
         parts = self.parts() | {"withdrawn": (*lost, *self.withdrawn)}
         return replace(header, **parts, lost=lost, epochs=self.epochs)
 
@@ -83,13 +83,13 @@ def evaluate_search(
 ) -> PhaseAnswer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`. `told` converts a cost to user units.
 
-    A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
-    protocol, and on whether it came to its end. A solution of a problem without costs needs no proof. Where a
-    `deadline` (in seconds) has ended the search, the best known assignment is a solution if it
-    violates no hard constraint.
+    A protocol that minimises costs always has an assignment. Whether the cost is proven to be minimal depends on the
+    protocol, and on whether the protocol terminated. A solution of a problem without costs needs no proof. If the
+    `deadline` (in seconds) has ended the search, the best known assignment is a solution, provided that it violates no
+    hard constraint.
 
     Raises:
-        RefutedError: when the check refutes what the protocol claims.
+        RefutedError: when the check refutes a claim of the protocol.
     """
     if is_spoiled(phase, search.result):
         return _evaluate_spoiled(phase, search, kind)
@@ -123,21 +123,21 @@ def evaluate_search(
 
 
 def is_spoiled(phase: RunPhase, result: SearchResult) -> bool:
-    """Return whether messages were lost, and the protocol does not bear that: then nothing that it claims holds."""
+    """Return whether messages were lost that the protocol does not tolerate. If so, none of its claims are valid."""
     return result.metrics.lost_messages > 0 and not phase.traits.bears_loss
 
 
 def why_spoiled(phase: RunPhase, metrics: Metrics) -> str:
-    """Return why nothing that the protocol of a spoiled search claims holds."""
+    """Return the reason why the claims of the protocol are invalid after a spoiled search."""
     many = metrics.lost_messages
     return f"{many:,} message{'s were' if many != 1 else ' was'} lost, and {phase.name} needs every one"
 
 
 def _evaluate_spoiled(phase: RunPhase, search: Search, kind: ProblemKind) -> PhaseAnswer:
-    """Return the answer of a search that is spoiled: a solution that passes the check, or that nothing is known.
+    """Return the answer of a spoiled search: a solution if the assignment passes the check, else `unknown`.
 
-    Where there are costs, a reason goes with a solution: it is what the robots had when they could not go on, not what
-    the protocol ends with. An auction may have sold nothing by then.
+    For a problem with costs, the answer also has a reason, because the assignment is the one that the robots had when
+    they were interrupted, not the final result of the protocol. An auction, for example, may not have sold anything.
     """
     answer = PhaseAnswer(Verdict.UNKNOWN, metrics=search.result.metrics)
     found = search.check()
@@ -155,9 +155,9 @@ def _evaluate_spoiled(phase: RunPhase, search: Search, kind: ProblemKind) -> Pha
 
 
 def is_proven(phase: RunPhase, result: SearchResult) -> bool:
-    """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost.
+    """Return whether the protocol claims a proven result: a solution, or a solution of minimum cost.
 
-    Where messages were lost, an incomplete protocol ends without knowing that it has found a solution.
+    If messages were lost, an incomplete protocol terminates without knowing whether its assignment is a solution.
     """
     if is_spoiled(phase, result) or (result.metrics.lost_messages and not phase.traits.complete):
         return False
@@ -166,19 +166,20 @@ def is_proven(phase: RunPhase, result: SearchResult) -> bool:
 
 @collection_paused()
 def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Answer | None:
-    """Return the assignment that a search has found, checked against every constraint of every file.
+    """Return the assignment found by a search, checked against every constraint in every file.
 
     Args:
         phase: the phase of the search.
-        result: its result.
-        team: the team as its files have it.
-        compiled: the same team, as the robots worked on it: in the order of the run, with compiled domains.
+        result: the result of the search.
+        team: the team in the form of its files.
+        compiled: the same team in the form used by the robots: in the order of the run, with compiled domains.
 
     Returns:
-        The assignment that the protocol claims, or the best one known; None if all of these break hard constraints.
+        The assignment claimed by the protocol, or the best known one; None if all known assignments violate hard
+        constraints.
 
     Raises:
-        RefutedError: when the assignment breaks a constraint, or a robot withdrew that need not.
+        RefutedError: when the assignment violates a constraint, or a robot withdrew without need.
     """
     proven = is_proven(phase, result)
     if proven:
@@ -208,10 +209,10 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
 def _checked_optima(
     phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam, cost: Cost | None
 ) -> Optima | None:
-    """Return the optima that the robots have listed, if they have, each checked as the assignment was.
+    """Return the optima that the robots listed, each checked like the assignment; None if the robots listed no optima.
 
     Raises:
-        RefutedError: when one breaks a constraint, or costs something else than `cost`.
+        RefutedError: when a listed optimum violates a constraint, or has a cost other than `cost`.
     """
     found = combined_optima(compiled, result) if is_proven(phase, result) else None
     if found is None:
@@ -228,16 +229,16 @@ def _checked_optima(
 def check_assignment(
     team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True
 ) -> None:
-    """Check an assignment against every constraint of every file.
+    """Check an assignment against every constraint in every file.
 
     Args:
-        team: the team as its files have it.
+        team: the team in the form of its files.
         assignment: the values of all robots that have not withdrawn.
-        withdrawn: the robots that have.
-        maximal: whether it is claimed that none of those could be added.
+        withdrawn: the robots that have withdrawn.
+        maximal: whether the protocol claims that no withdrawn robot could be added.
 
     Raises:
-        RefutedError: when something is wrong.
+        RefutedError: when the assignment violates a constraint, or the claim is wrong.
     """
     faults = [*violations(team, assignment, withdrawn)]
     if maximal:
@@ -249,7 +250,7 @@ def check_assignment(
 
 
 def _verdict_of(phase: RunPhase, result: SearchResult, kind: ProblemKind, found: Answer) -> Verdict:
-    """Return the verdict on what was found."""
+    """Return the verdict on the checked answer `found`."""
     if is_proven(phase, result):
         minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind == ProblemKind.DISWCSP)
         return Verdict.OPTIMAL if minimum else Verdict.SOLUTION
@@ -261,13 +262,13 @@ def _verdict_of(phase: RunPhase, result: SearchResult, kind: ProblemKind, found:
 
 
 def _meets_bound(result: SearchResult, found: Answer, told: Callable[[float], Cost]) -> bool:
-    """Return whether what was found, with all robots, costs as little as their bound says that anything does."""
+    """Return whether `found` includes all robots and its cost equals the lower bound that the robots have proven."""
     least = lower_bound(result.findings)
     return least is not None and not found.withdrawn and found.verified and found.cost == told(least)
 
 
 def _bound_of(phase: RunPhase, result: SearchResult, told: Callable[[float], Cost]) -> Cost | None:
-    """Return the bound of the cost; where robots may withdraw, the lower bound of the weight of those that do."""
+    """Return the bound of the cost; if robots may withdraw, the lower bound of the weight of the withdrawn robots."""
     bound = lower_bound(result.findings)
     withdrawal_cost = phase.parameters.withdrawal_cost
     if bound is None:

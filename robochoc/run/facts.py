@@ -1,4 +1,4 @@
-"""The facts by which a protocol is chosen for a team (`run/choice.py`). Most are read off its constraints."""
+"""The facts used to choose a protocol for a team (`run/choice.py`). Most are derived from its constraints."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from robochoc.solver.encoding import MAX_TUPLES, allows_function, is_soft
 
 _TWO = 2
 LARGE = 1_000_000
-"""The analysis of a pseudo-tree ends at a table with more entries."""
+"""The analysis of a pseudo-tree stops when a table has more entries."""
 DRAWS = 100
-"""The number of sampled combinations of values that estimates a constraint's tightness."""
+"""The number of sampled value combinations for estimating a constraint's tightness."""
 Sizes = Mapping[str, int]
-"""The number of values of each robot: the combinations that its neighbours see."""
+"""The number of values of each robot. A value is one combination that the robot's neighbours see."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Facts:
         team: The team with its scenario.
         environment: Whether an environment changes the problem.
         compiled_sizes: Returns the sizes of the robots' compiled domains; None if only the declared sizes are known.
-            It is called if these are large.
+            It is called only if these are large.
         loss: The probability that a message is lost.
     """
 
@@ -78,7 +78,7 @@ class Facts:
 
     @cached_property
     def declared_sizes(self) -> Sizes:
-        """The number of values of each robot as declared: private constraints may leave fewer."""
+        """The declared number of values of each robot. Private constraints may leave fewer values."""
         sizes = {}
         for robot in self.first.robots:
             seen = set(robot.interface)
@@ -87,7 +87,7 @@ class Facts:
 
     @cached_property
     def sizes(self) -> Sizes:
-        """The number of values of each robot: as declared, or as compiled if the declared number is large."""
+        """The number of values of each robot: as declared, or after compilation if the declared number is large."""
         if self._largest_table(self.declared_sizes) <= MAX_TUPLES:
             return self.declared_sizes
         return self.compiled_sizes() or self.declared_sizes
@@ -104,7 +104,7 @@ class Facts:
 
     @cached_property
     def largest_table(self) -> int:
-        """The number of entries of the largest table of one constraint; robots may withdraw."""
+        """The number of entries in the largest table of a single constraint, assuming that robots may withdraw."""
         return self._largest_table(self.sizes)
 
     @cached_property
@@ -114,11 +114,11 @@ class Facts:
 
     @cached_property
     def constrainedness(self) -> float:
-        """The constrainedness: problems around 1 are hardest.
+        """The constrainedness of the problem. Problems with values around 1 are hardest.
 
-        It is kappa of Gent, MacIntyre, Prosser, Walsh ("The constrainedness of search", AAAI 1996): the bits
-        that the constraints remove, divided by the bits of the domains. For a constraint with more than `DRAWS`
-        combinations of values, as many are sampled.
+        It is kappa of Gent, MacIntyre, Prosser, Walsh ("The constrainedness of search", AAAI 1996): the bits removed by
+        the constraints, divided by the bits of the domains. For a constraint with more than `DRAWS` combinations of
+        values, `DRAWS` combinations are sampled.
         """
         domains = {one.name: one.domain for robot in self.first.robots for one in robot.variables}
         bits = sum(math.log2(max(1, len(domain))) for domain in domains.values())
@@ -128,7 +128,7 @@ class Facts:
 
     @cached_property
     def tree(self) -> TreeTables:
-        """The tables of dynamic programming on the pseudo-tree that the robots would build, unless they are large."""
+        """The tables of dynamic programming on the robots' pseudo-tree. The analysis stops at a large table."""
         return tree_tables(self.graph, self.first.order, self.sizes, LARGE)
 
     def _largest_table(self, sizes: Sizes) -> int:
@@ -139,7 +139,7 @@ class Facts:
 
 
 def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> float:
-    """Return the share of combinations of values that `constraint` allows; if none is found, half of one sample."""
+    """Return the share of value combinations that `constraint` allows; if the sample has none, half of one sample."""
     columns = [list(domains[name]) for name in constraint.variables]
     many = math.prod(map(len, columns))
     if not many:
@@ -152,7 +152,7 @@ def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]
 
 
 def _forbids(constraint: Constraint) -> bool:
-    """Return whether `constraint` may forbid something."""
+    """Return whether `constraint` may forbid a combination of values."""
     definition = constraint.definition
     if isinstance(definition, Relation):
         return not is_soft(constraint) or INFINITE in (*definition.costs, definition.default_cost)
@@ -161,20 +161,20 @@ def _forbids(constraint: Constraint) -> bool:
 
 @dataclass(frozen=True)
 class TreeTables:
-    """`width`: the induced width of a pseudo-tree; `cells`: the entries of the largest table on it."""
+    """`width`: the induced width of a pseudo-tree; `cells`: the number of entries of the largest table."""
 
     width: int
     cells: float
 
 
 def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: float = math.inf) -> TreeTables:
-    """Return the tables of DPOP on the tree that `protocols/shared/dfs.py` would build.
+    """Return the size of DPOP's tables on the tree that `protocols/shared/dfs.py` would build.
 
     Args:
         graph: The neighbours of each robot.
-        order: The priority order, which settles ties.
+        order: The priority order, which breaks ties.
         sizes: The number of values of each robot.
-        enough: The analysis ends at a table with more entries.
+        enough: The analysis stops at a table with more entries.
     """
     rank = {name: place for place, name in enumerate(order)}
 
@@ -197,7 +197,7 @@ def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: floa
 
 
 def _joined(above: dict[str, tuple[str, ...]], sizes: Sizes, enough: float) -> TreeTables:
-    """Return the largest table of a tree in which each robot has the neighbours `above` it, the roots first."""
+    """Return the size of the tables on a tree. `above` contains each robot's neighbours above it, roots first."""
     place = {name: number for number, name in enumerate(above)}
     separators = {name: set(others) for name, others in above.items()}
     width, cells = 0, 1.0

@@ -1,7 +1,7 @@
-"""Answers during a search: the best one at the deadline is published, then each better one until the time is over.
+"""Answers during a search: at the deadline the best answer is published, then each better one until the time is over.
 
 The robots continue to search. At times they report snapshots (`communication/search_watch.py`), which are checked like
-any answer. Published answers only get better, and satisfy all hard constraints.
+any other answer. Each published answer is better than the previous one, and satisfies all hard constraints.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from robochoc.run.phases import RunPhase
 from robochoc.verification.checker import RefutedError
 
 PERIOD_S = 0.1
-"""The shortest time between two snapshots, in seconds. Slow snapshots are rarer: see `_SHARE`."""
+"""The shortest time between two snapshots, in seconds. Slow snapshots are taken less often: see `_SHARE`."""
 _SHARE = 10
-"""After a snapshot the search continues for at least this many times the snapshot's duration."""
+"""The search after a snapshot lasts at least this many times as long as the snapshot."""
 _FOUND = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
@@ -33,32 +33,32 @@ class Audience(Protocol):
     """Observers that receive each answer during a search."""
 
     def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        """Receive an answer that is better than all earlier ones of its epoch. The robots `withdrawn` do not fly.
+        """Receive an answer that is better than all earlier answers of its epoch. The robots `withdrawn` do not fly.
 
-        `epoch` is the epoch as if it had ended now, `team` its team in the form of the files.
+        `epoch` describes the epoch as if it had ended now; `team` is its team in the form of the files.
         """
 
     def has_news(self, team: Team) -> bool:
-        """Return whether the problem has changed, so that the search for better answers is to stop."""
+        """Return whether the problem has changed, so that the search for better answers must stop."""
 
 
 class Rank:
-    """The order of answers: first by the weight of the robots that withdraw, then by the cost."""
+    """The ranking of answers: first by the total weight of the withdrawn robots, then by the cost."""
 
     def __init__(self, team: Team, in_user_units: Callable[[float], Cost]) -> None:
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._sign = -1 if in_user_units(1) < in_user_units(0) else 1
 
     def of(self, cost: Cost, withdrawn: Sequence[str]) -> tuple[int, Cost]:
-        """Return the rank of an answer of this `cost` without the robots `withdrawn`; lower ranks are better."""
+        """Return the rank of an answer of this `cost` without the robots `withdrawn`. Lower ranks are better."""
         return sum(self._weights[name] for name in withdrawn), self._signed(cost)
 
     def of_answer(self, answer: PhaseAnswer) -> tuple[int, Cost]:
-        """Return the rank of `answer`, which has an assignment."""
+        """Return the rank of `answer`. It must have an assignment."""
         return self.of(answer.cost or 0, answer.withdrawn)
 
     def tightest(self, bounds: Sequence[Cost | None]) -> Cost | None:
-        """Return the tightest bound; None if there is none."""
+        """Return the tightest of the `bounds`, or None if there is no bound."""
         return max((bound for bound in bounds if bound is not None), key=self._signed, default=None)
 
     def meets(self, answer: PhaseAnswer, bound: Cost | None) -> bool:
@@ -70,19 +70,19 @@ class Rank:
 
 
 class Improvements(SearchWatch):
-    """The answers of one search, published from its deadline on.
+    """Publishes the answers of one search, from its deadline on.
 
     Args:
-        began: The start of the time of the deadline, on the monotonic clock.
+        began: The start of the time that the deadline limits, on the monotonic clock.
         deadline: The time at which the first answer is due, on the same clock.
         evaluate: Returns the checked answer of a snapshot.
-        rank: The order of answers.
+        rank: The ranking of answers.
         has_costs: Whether there are costs. Without them all solutions without withdrawals are equally good.
-        bounded: Whether bounds are of costs. (If robots may withdraw, they are of weights.)
+        bounded: Whether the bounds refer to costs. (If robots may withdraw, the bounds refer to weights.)
         publish: Publishes an answer.
         has_news: Returns whether the problem has changed.
-        earlier: The answers published by earlier searches of the epoch.
-        keep: Called with each best answer so far, published or not (None: not called).
+        earlier: The answers published by earlier searches in the epoch.
+        keep: Called with each best answer so far, whether it is published or not (None: not called).
     """
 
     def __init__(  # noqa: PLR0913 - the parts that differ between runs, by name
@@ -148,10 +148,10 @@ class Improvements(SearchWatch):
         self._publish_if_due(now)
         self._due = now + max(PERIOD_S, came - self._asked, _SHARE * (now - came))
         if now < self._deadline - PERIOD_S:
-            self._due = min(self._due, self._deadline - PERIOD_S)  # to have an answer at the deadline
+            self._due = min(self._due, self._deadline - PERIOD_S)  # so that there is an answer at the deadline
 
     def _note(self, answer: PhaseAnswer) -> None:
-        """Store `answer` if it is the best so far, and the proven bound of the cost."""
+        """Update the best answer so far, and the proven bound of the cost."""
         if self._bounded:
             self._bound = self._rank.tightest([self._bound, answer.bound])
         if _is_found(answer) and (
@@ -165,7 +165,7 @@ class Improvements(SearchWatch):
             self._best = replace(best, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
 
     def _is_proven(self, best: PhaseAnswer, answer: PhaseAnswer) -> bool:
-        """Return whether `answer`, or the bound, proves that `best` is optimal."""
+        """Return whether `answer` or the bound proves that `best` is optimal."""
         optimal = answer.verdict == Verdict.OPTIMAL and self._rank.of_answer(answer) == self._rank.of_answer(best)
         return optimal or self._rank.meets(best, self._bound)
 
@@ -176,7 +176,7 @@ class Improvements(SearchWatch):
             self._over = self._over or final
 
     def _publish_gain(self, best: PhaseAnswer, now: float) -> None:
-        """Publish the `best` answer if it is better than the published one: flying robots do not turn for nothing."""
+        """Publish the `best` answer if it is better than the published one: flying robots do not turn without need."""
         before = self._published
         if self._outdated or (before is not None and not self._rank.of_answer(best) < self._rank.of_answer(before)):
             return
@@ -186,10 +186,10 @@ class Improvements(SearchWatch):
         self._publish(best, tuple(self.improvements))
 
     def concluded(self, final: PhaseAnswer, *, lost: bool) -> PhaseAnswer:
-        """Return the answer of the search: `final`, with which it has ended, or a better one found before.
+        """Return the final answer of the search: `final`, or a better answer found earlier.
 
-        It is published unless an equally good one was, or the problem has changed. If robots were `lost`, the published
-        answers do not count for the others.
+        The answer is published unless an equally good one was published before or the problem has changed. If robots
+        were `lost`, the answers published before are invalid for the remaining robots.
 
         Raises:
             RefutedError: if an answer refutes a claim of the protocol.
@@ -239,7 +239,7 @@ def improvements_of(  # noqa: PLR0913 - the parts that differ between deployment
     before: Improvements | None,
     keep: Callable[[PhaseAnswer], None] | None = None,
 ) -> Improvements:
-    """Return the watch for the answers of the search of `phase`, in a run with a deadline.
+    """Return the watch for the answers in the search of `phase`, in a run with a deadline.
 
     Args:
         phase: The phase.
@@ -251,7 +251,7 @@ def improvements_of(  # noqa: PLR0913 - the parts that differ between deployment
         publish: Publishes an answer, with all improvements so far.
         audience: Reports whether the problem has changed.
         before: The answers of the previous search, if there was one.
-        keep: Called with each best answer when it is found.
+        keep: Called with each new best answer.
     """
 
     def evaluate(snapshot: SearchResult) -> PhaseAnswer:
@@ -275,9 +275,9 @@ def improvements_of(  # noqa: PLR0913 - the parts that differ between deployment
 
 
 def _with_possible_loss(snapshot: SearchResult, phase: RunPhase, options: Options) -> SearchResult:
-    """Return `snapshot`, marked as spoiled if messages may be lost: then only its checked values count.
+    """Return `snapshot`, marked as spoiled if messages may be lost. Then only its checked values are valid.
 
-    Robots report one after the other, so a message may be lost that no robot has missed yet.
+    Robots report one after the other, so a message may be lost before any robot has noticed the loss.
     """
     if not options.loss or phase.traits.bears_loss:
         return snapshot
@@ -286,6 +286,6 @@ def _with_possible_loss(snapshot: SearchResult, phase: RunPhase, options: Option
 
 
 def _is_found(answer: PhaseAnswer) -> bool:
-    """Return whether `answer` was checked. Without any robot it counts only if it is optimal."""
+    """Return whether `answer` was checked. An answer without robots is valid only if it is optimal."""
     flown = bool(answer.assignment) or not answer.withdrawn or answer.verdict == Verdict.OPTIMAL
     return flown and answer.verdict in _FOUND and answer.verified and answer.cost is not None

@@ -1,8 +1,8 @@
-"""The best known assignment of a search that minimises, whether it has ended or a limit has cut it short.
+"""The best known assignment of a minimising search that has terminated or was stopped by a limit.
 
-Robots report findings (`protocols/findings.py`): the best assignment of the whole team that one of them has received,
-the values of each robot in every cycle, or only their present values. All of these are assignments, whose cost is
-computed from the files. The cheapest is the answer.
+Robots report findings (`protocols/findings.py`): the best assignment of the whole team that any robot has received,
+the values of each robot in every cycle, or only the current values. The cost of each of these assignments is computed
+from the files, and the cheapest assignment is the answer.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robochoc.verification.objective import Objective
 
 
 class BestKnown(NamedTuple):
-    """An assignment of the robots that do not withdraw, and its cost, withdrawal costs included."""
+    """An assignment of the robots that do not withdraw, and its cost, including withdrawal costs."""
 
     assignment: dict[str, int]
     cost: float
@@ -54,7 +54,7 @@ def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: fl
 def costs_by_cycle(
     compiled: CompiledTeam, trails: Mapping[str, Trail], withdrawal_cost: float | None = None
 ) -> Iterator[float]:
-    """Yield the cost of the robots' values in cycle 0, 1, ..., up to the last cycle that all have completed."""
+    """Yield the cost of the robots' values in cycle 0, 1, ..., up to the last cycle that all robots have completed."""
     objective = Objective(compiled.team, withdrawal_cost)
     for changed in _changes(compiled, trails):
         objective.change(changed)
@@ -62,25 +62,25 @@ def costs_by_cycle(
 
 
 def lower_bound(findings: Mapping[str, Findings]) -> float | None:
-    """Return a lower bound of the cost of all assignments; None if no robot knows one."""
+    """Return a lower bound of the cost of all assignments, or None if no robot has reported a bound."""
     bounds = [found.bound for found in findings.values() if found.bound is not None]
     least = sum(bounds)
     return int(least) if bounds and least < INFINITE else None
 
 
 def optima(findings: Mapping[str, Findings]) -> int | None:
-    """Return the product of the counts of all roots; None if there are no counts."""
+    """Return the product of the roots' counts of optima, or None without counts."""
     counts = [int(found.count, 16) for found in findings.values() if found.count is not None]
     return math.prod(counts) if counts else None
 
 
 def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
-    """Return the pseudo-tree that the robots have built, with the robots that have a place in it."""
+    """Return the pseudo-tree that the robots have built, without the robots outside it."""
     return {name: found.place for name, found in findings.items() if found.place is not None}
 
 
 def merged_values(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-    """Return the values of all variables, from the values by robot."""
+    """Return the values of all variables. `own` contains the values of each robot."""
     return {name: value for values in own.values() for name, value in values.items()}
 
 
@@ -88,7 +88,7 @@ _Own = dict[str, dict[str, int]]
 
 
 def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Iterator[_Own]:
-    """Yield the cheapest assignment of the whole team that a robot has received."""
+    """Yield the cheapest assignment of the whole team that any robot has received."""
     bests = [found.best for found in findings.values() if found.best is not None]
     if bests:
         best = min(bests, key=lambda one: one.cost)
@@ -96,7 +96,7 @@ def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Finding
 
 
 def _best_cycle(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: float | None) -> Iterator[_Own]:
-    """Yield the values of the robots in the first cheapest cycle."""
+    """Yield the robots' values in the first of the cheapest cycles."""
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return
@@ -109,7 +109,7 @@ def _best_cycle(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: f
 
 
 def _changes(compiled: CompiledTeam, trails: Mapping[str, Trail]) -> Iterator[_Own]:
-    """Yield the changed values of each cycle that all robots have completed."""
+    """Yield the changed values in each cycle that all robots have completed."""
     changes: dict[int, _Own] = {}
     for name, trail in trails.items():
         for cycle, index in trail.entries:

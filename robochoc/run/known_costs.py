@@ -1,4 +1,4 @@
-"""The best cost and the lower bound known so far, from the events of a run."""
+"""The best cost and the best lower bound known so far, computed from the events of a run."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from robochoc.verification.objective import Objective
 
 
 class KnownCosts:
-    """Follows the events of runs. Costs are in the user's numbers.
+    """Tracks the known costs during runs, from their events. Costs are in the user's units.
 
-    `Began` starts a run, without a known cost. Runs that do not minimise are ignored.
+    The event `Began` starts a run without a known cost. Runs that do not minimise are ignored.
 
-    The bounds of two robots are for disjoint parts of the team, and the costs inside are 0 or more: so the sum of the
-    known bounds is a bound for the whole team at any time.
+    The bounds of two robots apply to disjoint parts of the team, and the costs within a part are 0 or more. So the sum
+    of the known bounds is a bound for the whole team at any time.
 
     Attributes:
         best: The cost of the cheapest assignment that the robots had together, or that a robot has received. None:
-            there was none.
-        bound: A lower bound of the cost (an upper bound if it is maximised). None: not known.
+            no such assignment is known.
+        bound: A lower bound of the cost (an upper bound if the problem is maximised). None: unknown.
     """
 
     def __init__(self, objective: Objective) -> None:
@@ -32,7 +32,7 @@ class KnownCosts:
         self.bound: Cost | None = None
 
     def add(self, event: AnyEvent) -> None:
-        """Add an event. Impossible events are ignored, since a journal may come from any source."""
+        """Update the known costs. Impossible events are ignored, since a journal may come from any source."""
         match event:
             case Began():
                 self._begin(event)

@@ -1,7 +1,7 @@
-"""The optima of the team, combined from those that the robots of each tree have listed, and checked.
+"""The optima of the team, combined from the optima that the robots of each tree have listed, and checked.
 
-See `protocols/inference/list_dpop`. Each root has numbered the optima of its tree, and each robot has its value in the
-first ones. Trees share no constraint, so the optima of the team are all combinations.
+See `protocols/inference/list_dpop`. Each root has numbered the optima of its tree, and each robot stores its value in
+each of the first optima. Different trees share no constraint, so the optima of the team are all combinations.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.verification.checker import RefutedError
 
 
 class _Tree(NamedTuple):
-    """The robots of a tree, with the place of their value in each listed optimum."""
+    """The robots of a tree, with the index of their value in each listed optimum."""
 
     places: dict[str, list[int]]
     listed: int
@@ -43,7 +43,7 @@ def combined_optima(compiled: CompiledTeam, result: SearchResult) -> tuple[int, 
 
 
 def _combined(compiled: CompiledTeam, trees: Sequence[_Tree], number: int) -> dict[str, int]:
-    """Return the assignment with this `number` among all combinations of the optima of the trees."""
+    """Return the assignment number `number` among all combinations of the trees' optima."""
     assignment: dict[str, int] = {}
     left = number
     for tree in trees:

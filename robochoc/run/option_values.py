@@ -1,4 +1,4 @@
-"""Converters of the values of options, from texts, numbers of other libraries, and lists. They refuse other values."""
+"""Converters for the values of options: from texts, numbers of other libraries, and lists. Other values are refused."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from robochoc.system.errors import OptionError, OptionTypeError
 from robochoc.system.suggestions import member
 
 Converter = Callable[[str, object], object]
-"""A function of the name of an option and a value; it returns the value in the type of the option.
+"""A function that receives the name of an option and a value, and returns the value in the type of the option.
 
-It raises `OptionTypeError` for a value of a wrong type, and `OptionError` for a value that is not allowed.
+A converter raises `OptionTypeError` for a value of a wrong type, and `OptionError` for a value that is not allowed.
 """
 
 
@@ -25,12 +25,12 @@ def _refusal(name: str, value: object, expected: str) -> str:
 
 
 def one_of(choices: type[StrEnum]) -> Converter:
-    """Return a converter to a member of `choices`."""
+    """Return a converter to a member of the enum `choices`."""
     return lambda name, value: member(choices, name, value)
 
 
 def instance_of(kind: type) -> Converter:
-    """Return a converter that accepts objects of one class, as they are."""
+    """Return a converter that accepts objects of one class, and returns them unchanged."""
 
     def convert(name: str, value: object) -> object:
         if not isinstance(value, kind):
@@ -53,7 +53,7 @@ def text(name: str, value: object) -> str:
 
 
 def protocol_name(name: str, value: object) -> str:
-    """Convert the name of a protocol, in any case, to the spelling of its package; or its class to its name."""
+    """Convert the name of a protocol, in any case, to the spelling of its package, or a protocol class to its name."""
     if value == AUTO:
         return AUTO
     from robochoc.run.registry import installed_spelling, name_of_class  # noqa: PLC0415 - start-up
@@ -98,13 +98,13 @@ def seconds(name: str, value: object) -> float:
 
 def flag(name: str, value: object) -> bool:
     """Convert a Boolean of any type."""
-    if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's is not a bool
+    if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's Boolean is not a bool
         raise OptionTypeError(_refusal(name, value, "True or False"))
     return bool(value)
 
 
 def items_of(convert: Converter, expected: str) -> Converter:
-    """Return a converter of lists, sets and so on to a tuple, by item."""
+    """Return a converter from lists, sets and other iterables to tuples, which applies `convert` to each item."""
 
     def convert_all(name: str, value: object) -> tuple[object, ...]:
         if isinstance(value, str | bytes) or not isinstance(value, Iterable):
@@ -116,14 +116,14 @@ def items_of(convert: Converter, expected: str) -> Converter:
 
 
 def texts_by_name(name: str, value: object) -> Mapping[str, str]:
-    """Convert a mapping of names to values; values become texts."""
+    """Convert a mapping with names as keys. Its values are converted to texts."""
     if not isinstance(value, Mapping):
         raise OptionTypeError(_refusal(name, value, "a mapping of names to values"))
     return {text(f"a name in {name}", key): str(one) for key, one in value.items()}
 
 
 def priority_order(name: str, value: object) -> object:
-    """Convert the name of an order, or the names of robots."""
+    """Accept the name of an order, or the names of robots."""
     if isinstance(value, str):
         return member(Order, name, value)
     return items_of(text, "the name of an order, or the names of all robots")(name, value)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class Runtime(StrEnum):
-    """The runtime: one process per robot, here or on a network; all robots in one thread; or all in arrays."""
+    """The runtime: one process per robot, here or on a network; all robots in one thread; or all robots in arrays."""
 
     PROCESSES = "processes"
     SIMULATOR = "simulator"
@@ -45,9 +45,9 @@ class Runtime(StrEnum):
 
 
 class ScheduleName(StrEnum):
-    """The order in which the simulator handles events: by time counted in checks, in cycles, or from a random channel.
+    """The order in which the simulator handles events: by time counted in checks, in cycles, or by a random channel.
 
-    In `CONCURRENT` a robot reads its whole inbox before it settles, in `ONE_BY_ONE` it settles after each message.
+    With `CONCURRENT` a robot reads its whole inbox before it settles, with `ONE_BY_ONE` it settles after each message.
     """
 
     CONCURRENT = "concurrent"
@@ -59,8 +59,8 @@ class ScheduleName(StrEnum):
 class Withdrawal(StrEnum):
     """The rule that chooses the robots to withdraw when the whole team has no solution.
 
-    `MINIMUM`: robots of the least total weight, proven. `MAXIMAL`: the robots without a possible value, in priority
-    order.
+    `MINIMUM`: the robots with the least total weight, proven. `MAXIMAL`: the robots without a possible value, in
+    priority order.
     """
 
     MINIMUM = "minimum"
@@ -68,13 +68,13 @@ class Withdrawal(StrEnum):
 
 
 class Preprocess(StrEnum):
-    """Preprocessing steps. `AC`: robots make their domains arc consistent first (`satisfaction/disac.py`)."""
+    """Preprocessing steps. `AC`: robots first make their domains arc consistent (`satisfaction/disac.py`)."""
 
     AC = "ac"
 
 
 class OnLoss(StrEnum):
-    """The consequence of the loss of a robot: the run fails, or the others continue without it."""
+    """The reaction to the loss of a robot: the run fails, or the other robots continue without it."""
 
     FAIL = "fail"
     WITHDRAW = "withdraw"
@@ -103,7 +103,8 @@ class Options:
         runtime: The runtime of the robots.
         seed: The seed of the simulator, of `Order.RANDOM`, and of protocols with random decisions.
         timeout: A limit on wall-clock time, in seconds (None: no limit).
-        deadline: The same; the best assignment known at the deadline is the answer (None: no deadline).
+        deadline: A limit like `timeout`, but the best assignment known at the deadline is the answer (None: no
+            deadline).
         improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
         withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
         schedule: The order of events in the simulator.
@@ -112,22 +113,22 @@ class Options:
         cache: Whether solutions of local problems are stored in the user's cache folder.
         count: Whether solutions, or optima, are counted.
         central_with: The central solver of `CENTRAL`.
-        verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found; so does
-            OR-Tools if it is installed.
-        order: The total priority order of the robots: its name, or their names (None: the order of the files).
+        verify: Whether the central solver, and OR-Tools if it is installed, check a `no-solution` or a minimum cost
+            that robots have found.
+        order: The total priority order of the robots: its name, or the robots' names (None: the order of the files).
         messages: A limit on the number of messages (None: no limit).
         ncccs: A limit on non-concurrent constraint checks, in the simulator (None: no limit).
         cycles: A limit on cycles, with `ScheduleName.CYCLES` (None: no limit).
-        on_loss: The consequence of the loss of a robot (None: the run fails, unless there are `spares`).
+        on_loss: The reaction to the loss of a robot (None: the run fails, unless there are `spares`).
         spares: The number of lost robots that are restarted.
-        patience: The seconds after which a stopped process (on a network: an unreachable robot) is lost (None: no
-            limit; on a network 10 seconds).
+        patience: The seconds after which a stopped process (on a network: an unreachable robot) counts as lost (None:
+            no limit; on a network 10 seconds).
         channel: A channel model: the simulator counts seconds of computing and radio.
-        message_loss: The probability that a message is lost for good (0: that of the `channel`). Read it by `loss`.
+        message_loss: The probability that a message is permanently lost (0: the probability in `channel`). See `loss`.
         settings: The protocol's settings, as text.
         kill: The robots whose processes are killed, with the times.
         filters: The names of the channel filters for messages on a network, in order of application.
-        chosen: The reasons for a `protocol` or an `order` that the user did not name.
+        chosen: The reasons for a `protocol` or an `order` that was chosen for the user.
         preprocess: The preprocessing before the protocol (None: no preprocessing).
         bounds: Whether events report lower bounds of the cost that robots have proven (processes and simulator).
     """
@@ -168,14 +169,14 @@ class Options:
 
     @property
     def limit_s(self) -> float | None:
-        """Return the limit on wall-clock time, in seconds, from the timeout or the deadline; None: no limit."""
+        """Return the limit on wall-clock time in seconds, set by the timeout or the deadline; None: no limit."""
         return self.timeout if self.deadline is None else self.deadline + (self.improve or 0)
 
     @property
     def loss(self) -> float:
-        """Return the probability that a message is lost for good, by the option or the channel model.
+        """Return the probability that a message is permanently lost, set by the option or the channel model.
 
-        If it depends on the link, it is the largest one.
+        If the probability depends on the link, the largest one is returned.
         """
         return self.message_loss or (self.channel.most_loss if self.channel else 0.0)
 
@@ -186,7 +187,7 @@ class Options:
 
     @property
     def wants_anytime(self) -> bool:
-        """Return whether robots are to find the best cycle themselves."""
+        """Return whether the robots must find the best cycle themselves."""
         return self.settings.get("anytime") == "yes"
 
     @property
@@ -196,7 +197,7 @@ class Options:
 
 
 def _withdrawal(name: str, value: object) -> object:
-    """Convert the name of a withdrawal; True, and the former name `fewest`, are `minimum`; None and False are none."""
+    """Convert the name of a withdrawal rule. True, and the former name `fewest`, mean `minimum`; False means None."""
     if value is None or value is False:
         return None
     if value == "fewest":
@@ -237,4 +238,4 @@ _CONVERTERS = MappingProxyType(
         "preprocess": optional(one_of(Preprocess)),
     }
 )
-"""The conversion of each field of `Options`: a field without one cannot be set."""
+"""The converter for each field of `Options`. A field without a converter cannot be set."""

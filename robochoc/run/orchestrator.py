@@ -1,4 +1,4 @@
-"""The run of a team on this machine: check the team, choose protocol and order, search, check the answer."""
+"""The run of a team on this machine: check the team, choose a protocol and an order, search, check the answer."""
 
 from __future__ import annotations
 
@@ -49,29 +49,30 @@ def solve(
     audience: Audience | None = None,
     ordered: bool = True,
 ) -> Outcome:
-    """Let `team` solve its problem, epoch by epoch if it changes, and check each answer against every constraint.
+    """Let `team` solve its problem, in epochs if the problem changes, and check each answer against every constraint.
 
     Args:
         team: the team with its scenario.
         options: how to run.
         observer: receives all events.
-        progress: receives the number of messages so far, now and then.
-        solver: a constraint solver that is running already: a program that solves many teams saves time with it.
+        progress: receives the number of messages so far, from time to time.
+        solver: a running constraint solver. A program that solves many teams saves time by passing the same one.
         environment: receives each epoch's answer, and returns the next change of the problem.
         audience: with `Options.improve`, receives each answer during the search.
-        ordered: whether the user chose the priority order of `team`. Otherwise one is chosen for any protocol.
+        ordered: whether the user chose the priority order of `team`. Otherwise an order is chosen too, for any
+            protocol.
 
     Returns:
-        The outcome. When a limit was reached, its verdict is `unknown`.
+        The outcome. Its verdict is `unknown` if a limit was reached before a verdict was known.
 
     Raises:
-        InvalidInputError: when the team is not valid, or an event of the environment.
+        InvalidInputError: when the team, or an event from the environment, is not valid.
         UnknownProtocolError: when the protocol is not installed.
         UnsupportedError: when the options cannot be combined with each other or with the team.
-        RobotsLostError: when a robot was lost, and the run is not to continue without it.
+        RobotsLostError: when a robot was lost, and the options do not let the run continue without it.
         CompileError: when the domains cannot be compiled.
-        SolverLostError: when the constraint solver has failed.
-        SolverMissingError: when it is needed and not installed.
+        SolverLostError: when the constraint solver has crashed.
+        SolverMissingError: when the constraint solver is needed and not installed.
         RefutedError: when the checker, or the central solver, refutes an answer.
     """
     changing = environment is not None
@@ -86,8 +87,8 @@ class PreparedRun:
 
     Attributes:
         team: The team with its scenario.
-        choice: The options with protocol and order, and the reasons for them.
-        spent_s: The seconds spent on the choice. They count as time of the run.
+        choice: The options with a protocol and an order, and the reasons for them.
+        spent_s: The seconds spent on the choice. They count towards the time of the run.
     """
 
     team: Team
@@ -121,13 +122,14 @@ class PreparedRun:
 
 
 def prepare(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> PreparedRun:
-    """Check the team, and choose the protocol and the order that `options` leave open.
+    """Check the team, and choose the protocol and the order if `options` do not specify them.
 
     Args:
         team: The team with its scenario.
-        options: How to run. `refuse_options` has accepted them.
+        options: How to run. They must have passed `refuse_options`.
         environment: Whether an environment changes the problem.
-        ordered: Whether the user chose the priority order of `team`. Otherwise one is chosen for any protocol.
+        ordered: Whether the user chose the priority order of `team`. Otherwise an order is chosen too, for any
+            protocol.
 
     Raises:
         InvalidInputError: if the team is not valid.
@@ -143,7 +145,7 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
 
 
 def _check_costs(team: Team, outcome: Outcome) -> None:
-    """Check the costs of answers in the user's units, up to the first loss: then the files differ from the team.
+    """Check the costs of answers in the user's units, up to the first loss: after it the files differ from the team.
 
     Raises:
         RefutedError: if a cost is wrong.
@@ -158,7 +160,7 @@ def _check_costs(team: Team, outcome: Outcome) -> None:
 
 
 def _solve_centrally(team: Team, context: RunContext) -> Outcome:
-    """Let the central solver decide. See `run/central.py`."""
+    """Let the central solver solve the problem. See `run/central.py`."""
     refuse_unfit(team, context.options, CENTRAL_TRAITS)
     from robochoc.run.central import solve_centrally  # noqa: PLC0415 - start-up: rarely needed
 

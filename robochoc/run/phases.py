@@ -1,7 +1,7 @@
 """The phases of a run: the search by the chosen protocol, and the search that decides which robots withdraw.
 
-A protocol that minimises costs decides itself which robots withdraw (`Withdrawal.MINIMUM`): the run has one phase.
-With other protocols there is a second phase by another protocol, once it is known that the team has no solution.
+A protocol that minimises costs decides itself which robots withdraw (`Withdrawal.MINIMUM`), so the run has one phase.
+With other protocols a second phase with another protocol follows when it is known that the team has no solution.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from robochoc.solver.agent_problem import RunParameters
 
 @dataclass(frozen=True)
 class RunPhase:
-    """One phase of a run.
+    """A phase of a run.
 
-    `name` is the protocol's name, `parameters` are common to all robots. With `withdrawal`, robots may withdraw.
-    `takes_over`: this is the second phase, by another protocol than the chosen one.
+    `name` is the protocol's name, `parameters` are common to all robots. If `withdrawal` is set, robots may withdraw.
+    `takes_over`: this is the second phase, in which another protocol replaces the chosen one.
     """
 
     name: str
@@ -52,9 +52,9 @@ def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Cal
 
 
 def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> RunPhase:
-    """Return the phase that decides which robots withdraw, for a team without a solution.
+    """Return the phase that decides which robots withdraw from a team without a solution.
 
-    Its protocol gets no settings, since the user has not chosen it. For the arguments see `first_phase`.
+    Its protocol has no settings, since the user has not chosen it. For the arguments see `first_phase`.
     """
     name = DEFAULT_COST_PROTOCOL if options.withdraw == Withdrawal.MINIMUM else FIRST_FIT
     protocol = protocol_or_stage(name)

@@ -1,10 +1,10 @@
-"""Make domains arc consistent before the chosen protocol begins (`--preprocess ac`).
+"""Make domains arc consistent before the chosen protocol starts (`--preprocess ac`).
 
-It is a separate search, whose findings are the remaining values. The following search has the same team with only these
-values, so its journals and replays need nothing else. The answer is checked with the files.
+The preprocessing is a separate search, whose findings are the remaining values. The following search has the same team
+with only these values, so its journals and replays need no further data. The answer is checked with the files.
 
-If the problem changes, it is repeated before each epoch, from the domains of the files. So values come back if the
-reason of their removal is gone; a protocol that continues treats them as values that a change has added.
+If the problem changes, the preprocessing is repeated before each epoch, from the domains in the files. So values return
+when the reason for their removal is gone; a protocol that continues treats them as values that a change has added.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from robochoc.solver.compiled_team import CompiledTeam
 
 
 def preprocessing_phase(options: Options) -> RunPhase:
-    """Return the phase of the preprocessing."""
+    """Return the preprocessing phase."""
     return RunPhase(PREPROCESSING, protocol_or_stage(PREPROCESSING), RunParameters(options.seed))
 
 
 def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> int:
-    """Return the number of removed values of all robots."""
+    """Return the number of values that the preprocessing removed from all robots' domains."""
     return sum(
         len(robot.domain.values) - len(findings[name].left or ())
         for name, robot in compiled.robots.items()
@@ -40,7 +40,7 @@ def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> 
 
 
 def total_preprocessing(done: Sequence[Preprocessing]) -> Preprocessing | None:
-    """Return the sum of the preprocessing of all epochs of a run; None if there was none."""
+    """Return the total preprocessing in all epochs of a run, or None if there was no preprocessing."""
     if not done:
         return None
     spent = reduce(add, [one.metrics for one in done])
@@ -50,8 +50,8 @@ def total_preprocessing(done: Sequence[Preprocessing]) -> Preprocessing | None:
 def restricted(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Team:
     """Return the team with only the remaining values.
 
-    A value of a robot with several variables is a combination of their values. Each variable keeps its values in the
-    remaining combinations; so there may be more combinations than remain, and never fewer.
+    A value of a robot with several variables is a combination of their values. Each variable keeps the values that
+    occur in the remaining combinations. So the returned team may have more combinations than remain, but never fewer.
     """
     robots = []
     for robot in compiled.team.robots:
@@ -64,7 +64,7 @@ def restricted(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Team
 
 
 def _with_values(robot: Robot, kept: Mapping[str, Collection[int]]) -> Robot:
-    """Return `robot` with only the values `kept` of its variables."""
+    """Return `robot` with the domains of its variables restricted to the values `kept`."""
     variables = tuple(
         replace(one, domain=_only(one.domain, kept[one.name])) if one.name in kept else one for one in robot.variables
     )
@@ -72,7 +72,7 @@ def _with_values(robot: Robot, kept: Mapping[str, Collection[int]]) -> Robot:
 
 
 def _only(domain: Domain, kept: Collection[int]) -> Domain:
-    """Return `domain` with only the values `kept`, in its order."""
+    """Return `domain` restricted to the values `kept`, in the original order."""
     ranges: list[range] = []
     for value in domain:
         if value in kept:

@@ -1,4 +1,4 @@
-"""Purposes of protocols, derived from their traits: the groups of `robochoc protocols --for`."""
+"""Purposes of protocols, derived from the protocols' traits: the groups of `robochoc protocols --for`."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class Purpose(NamedTuple):
 
 
 _HIDDEN = ("values", "who they are")
-"""Words in `Traits.privacy` of protocols that hide more than constraints."""
+"""Words in `Traits.privacy` that mark a protocol as hiding more than constraints."""
 _LARGE = ("large team", "hundreds of robots", "many robots")
-"""Words in `Traits.use_when` of protocols for large teams."""
+"""Words in `Traits.use_when` that mark a protocol as suitable for large teams."""
 
 
 def _is_for_large_teams(traits: Traits) -> bool:
@@ -52,7 +52,7 @@ PURPOSES = {
         lambda traits: any(words in traits.use_when for words in ("to compare", "baseline")),
     ),
 }
-"""The purposes, by their names on the command line. A protocol can have several."""
+"""The purposes by their names on the command line. A protocol can have several purposes."""
 
 
 def purposes_of(traits: Traits) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The beginning of a recording of a run: its header, and the objective for the robots' decisions."""
+"""The start of a recording of a run: its header, and the objective for evaluating the robots' decisions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def objective_to_record(team: Team, options: Options) -> Callable[[], Objective] | None:
-    """Return a function that builds the objective of a run. None if nothing is minimised, or the problem changes."""
+    """Return a function that builds the objective of a run, or None if nothing is minimised or the problem changes."""
     minimum = options.withdraw == Withdrawal.MINIMUM
     if team.dynamic or not (minimum or team.kind == ProblemKind.DISWCSP):
         return None

@@ -1,4 +1,4 @@
-"""Protocols by name: those of installed packages (entry points `robochoc.protocols`), and of the running program."""
+"""Protocols by name: from installed packages (entry points `robochoc.protocols`), and from the running program."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ from robochoc.system.installed import (
 GROUP = "robochoc.protocols"
 _NAME = re.compile(r"[A-Za-z0-9]+(-[A-Za-z0-9]+)*")
 _STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
-"""Protocols of single stages of a run. Users cannot choose them."""
+"""Protocols for single stages of a run. Users cannot choose them."""
 
 
 class UnknownProtocolError(RobochocError, LookupError):
-    """No installed package offers a protocol of that name, or the protocol cannot be used."""
+    """Raised if no installed package offers a protocol of that name, or the protocol cannot be used."""
 
 
 @dataclass(frozen=True)
 class InstalledProtocol:
-    """A protocol that a package offers: the class of `entry`, or the reason why it cannot be used."""
+    """A protocol offered by a package: the class of `entry`, or the reason why it cannot be used."""
 
     entry: EntryPoint
     protocol: type[Protocol] | None
     broken: str = ""
-    """The reason why the protocol cannot be used. Empty if it can."""
+    """The reason why the protocol cannot be used. Empty if it can be used."""
 
     @property
     def name(self) -> str:
@@ -51,17 +51,17 @@ class InstalledProtocol:
 
     @property
     def place(self) -> str:
-        """Module and class, as the package names them: `robochoc.protocols.satisfaction.abt:ABT`."""
+        """The module and the class, as declared by the package: `robochoc.protocols.satisfaction.abt:ABT`."""
         return self.entry.value
 
     @property
     def package(self) -> str:
-        """Name and version of the package."""
+        """The name and the version of the package."""
         return f"{self.entry.dist.name} {self.entry.dist.version}" if self.entry.dist else "this program"
 
 
 class _Registered(NamedTuple):
-    """A protocol that the running program has registered, in the form of an entry point."""
+    """A protocol registered by the running program, in the form of an entry point."""
 
     name: str
     protocol: type[Protocol]
@@ -82,13 +82,13 @@ _REGISTERED: dict[str, _Registered] = {}
 
 
 def register(name: str, protocol: type[Protocol]) -> None:
-    """Make a protocol of this program known under a name, as if an installed package offered it.
+    """Register a protocol of this program under a name, as if an installed package offered it.
 
-    The runtimes `simulator` and `processes` can use it; programs started by the runtime `network` do not know it.
-    Registering another class under the same name replaces the first, as notebooks need it.
+    The runtimes `simulator` and `processes` can use it; programs started by the runtime `network` cannot.
+    Registering another class under the same name replaces the first class, which notebooks need.
 
     Args:
-        name: Its name in `solve`: letters, digits and hyphens.
+        name: The protocol's name in `solve`: letters, digits and hyphens.
         protocol: A subclass of `robochoc.protocols.Protocol`.
 
     Raises:
@@ -107,7 +107,7 @@ def name_of_class(protocol: type[Protocol]) -> str:
     """Return the name of a protocol's class. A class that no package offers is registered under its name in lower case.
 
     Raises:
-        OptionError: as `register`.
+        OptionError: for the same reasons as in `register`.
     """
     installed = [entry.name for entry, _ in all_entry_points(GROUP) if entry.value == _place(protocol)]
     registered = [one.name for one in _REGISTERED.values() if one.protocol is protocol]
@@ -119,7 +119,7 @@ def name_of_class(protocol: type[Protocol]) -> str:
 
 
 def is_registered(name: str) -> bool:
-    """Return whether the running program has registered a protocol of that name."""
+    """Return whether the running program has registered a protocol called `name`."""
     return name in _REGISTERED
 
 
@@ -132,16 +132,16 @@ def _entries(name: str) -> Sequence[EntryPoint]:
 
 
 def protocol_names() -> tuple[str, ...]:
-    """Return the names of all protocols, sorted: ours, those of other packages, and registered ones."""
+    """Return the sorted names of all protocols: ours, those of other packages, and registered ones."""
     return tuple(sorted({*entry_point_names(GROUP), *_REGISTERED}))
 
 
 _SPELLINGS = {CENTRAL, AUTO}
-"""A cache of names in the spelling of their packages: each look-up of installed protocols takes 0.1 ms."""
+"""A cache of names in the spelling of their packages, because looking up installed protocols takes 0.1 ms each time."""
 
 
 def installed_spelling(name: str) -> str:
-    """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself if it matches none or several."""
+    """Return `name` in the spelling of its package (`ABT` becomes `abt`), or unchanged if no or several names match."""
     if name in _SPELLINGS or _entries(name):
         _SPELLINGS.add(name)
         return name
@@ -150,19 +150,19 @@ def installed_spelling(name: str) -> str:
 
 
 def installed_protocols() -> tuple[InstalledProtocol, ...]:
-    """Return all protocols that packages offer, sorted by name; also those that cannot be used, with the reason."""
+    """Return all protocols offered by packages, sorted by name. Unusable ones are included, with the reason."""
     installed = [_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP)]
     registered = [_offer(entry, [entry]) for entry in _REGISTERED.values()]
     return tuple(sorted(installed + registered, key=lambda one: one.name))
 
 
 def unknown_protocol(name: str) -> str:
-    """Return the error text that no protocol of that name is installed, with suggestions."""
+    """Return the error text for the unknown protocol `name`, with suggestions."""
     return not_installed_message(GROUP, "protocol", name, also=(CENTRAL, AUTO), listed_by="robochoc protocols")
 
 
 def installed_protocol(name: str) -> InstalledProtocol:
-    """Return the protocol that is offered as `name`. Raises `UnknownProtocolError`, which suggests others."""
+    """Return the protocol called `name`. Raises `UnknownProtocolError`, which suggests others."""
     found = _entries(name)
     if not found:
         raise UnknownProtocolError(unknown_protocol(name))
@@ -178,19 +178,19 @@ def protocol_named(name: str) -> type[Protocol]:
 
 
 def protocol_or_stage(name: str) -> type[Protocol]:
-    """Return the protocol of that name, including the stages that users cannot choose: `FIRST_FIT`, `PREPROCESSING`."""
+    """Return the protocol called `name`. It may be a stage that users cannot choose (`FIRST_FIT`, `PREPROCESSING`)."""
     return _STAGES[name] if name in _STAGES else protocol_named(name)
 
 
 def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
-    """Return name and class of the protocol whose class is called `class_name`, as in journals.
+    """Return the name and the class of the protocol whose class is called `class_name`, as in journals.
 
     Args:
         class_name: The name of the class.
         likely: Names of protocols that are tried first.
 
     Returns:
-        Name and class, or None if no installed protocol has such a class.
+        The name and the class, or None if no installed protocol has such a class.
     """
     for name in (*likely, *_STAGES, DEFAULT_COST_PROTOCOL):
         with suppress(UnknownProtocolError):
@@ -209,7 +209,7 @@ def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> InstalledProto
 
 
 def _fault(loaded: object) -> str:
-    """Return why `loaded` cannot be used as a protocol; empty if it can."""
+    """Return the reason why `loaded` cannot be used as a protocol; empty if it can be used."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
         return "is not a subclass of Protocol"
     # Methods of a compiled class are never marked as abstract.

@@ -1,6 +1,6 @@
-"""Runtimes by name: each is a function that opens a session.
+"""Runtimes by name. Each runtime is a function that opens a session.
 
-Each is imported on first use: a run needs one runtime, and the network is an extra that the core does not depend on.
+Each runtime is imported on first use: a run needs only one, and the network is an extra that the core does not require.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class CommonArguments(TypedDict):
-    """The arguments of the sessions of all runtimes."""
+    """The arguments common to the sessions of all runtimes."""
 
     parameters: RunParameters
     observer: Observer | None
@@ -41,14 +41,14 @@ class SessionRequest:
     """The arguments with which a session is opened.
 
     Attributes:
-        protocol: The protocol by which the robots search.
+        protocol: The protocol that the robots use.
         team: The team with its compiled domains.
         parameters: The parameters common to all robots.
         options: How to run.
         observer: Receives all events.
-        progress: Receives the number of messages so far, now and then.
+        progress: Receives the number of messages so far, from time to time.
         kills: The robots whose processes are to be killed.
-        deadline: The end of the time of the run, on the monotonic clock. None: no limit.
+        deadline: The end of the run's time, on the monotonic clock. None: no limit.
     """
 
     protocol: type[Protocol]
@@ -62,7 +62,7 @@ class SessionRequest:
 
     @property
     def common(self) -> CommonArguments:
-        """The arguments of the sessions of all runtimes."""
+        """The arguments common to the sessions of all runtimes."""
         return {"parameters": self.parameters, "observer": self.observer, "progress": self.progress}
 
 
@@ -76,11 +76,11 @@ OPENERS = MappingProxyType(
         Runtime.ARRAYS: "robochoc.run.runtimes:open_arrays",
     }
 )
-"""Module and name of each runtime's `OpenSession`."""
+"""The module and the name of each runtime's `OpenSession`."""
 
 
 def open_session(request: SessionRequest) -> Session:
-    """Return a session in the runtime that the options name. Raises `UnsupportedError` when it is not installed."""
+    """Open a session in the runtime that the options name. Raises `UnsupportedError` if it is not installed."""
     name = request.options.runtime
     try:
         opener: OpenSession = resolve_name(OPENERS[name])
@@ -109,14 +109,14 @@ def open_processes(request: SessionRequest) -> Session:
 
 
 def _import_tables(request: SessionRequest) -> None:
-    """Import the module for tables if robots need it: once here, and not in each of their processes."""
+    """Import the module for tables if robots need it. This saves an import in each robot's process."""
     costs = request.team.team.kind == ProblemKind.DISWCSP or request.parameters.withdrawal_cost is not None
     if costs and request.protocol.traits.tables:
         import_module("robochoc.solver.cost_table")
 
 
 def open_simulator(request: SessionRequest) -> Session:
-    """Open a session in which all robots live in one thread."""
+    """Open a session in which all robots run in one thread."""
     from robochoc.communication.simulator.simulator import (  # noqa: PLC0415 - as above
         EffortLimits,
         Simulation,
@@ -137,7 +137,7 @@ def open_simulator(request: SessionRequest) -> Session:
 
 
 def _losses_of(options: Options) -> Losses | None:
-    """Return the object that decides which messages are lost: by the option, or else by the channel model, or None."""
+    """Return the object that draws lost messages, by the option or else the channel model; None without losses."""
     from robochoc.communication.simulator.losses import Losses  # noqa: PLC0415 - one runtime is enough
 
     if options.message_loss or not options.loss or options.channel is None:
@@ -148,14 +148,14 @@ def _losses_of(options: Options) -> Losses | None:
 
 
 def open_arrays(request: SessionRequest) -> Session:
-    """Open a session in which all robots are rows of arrays."""
+    """Open a session in which all robots are rows in arrays."""
     from robochoc.communication.arrays.session import ArraysRun  # noqa: PLC0415 - one runtime is enough
 
     return ArraysRun(request.team, request.protocol, **request.common)
 
 
 def _schedule_of(options: Options) -> Schedule:
-    """Return the simulator's schedule that `options` ask for."""
+    """Return the simulator's schedule selected by `options`."""
     if options.channel:
         from robochoc.communication.simulator.timed import Timed  # noqa: PLC0415 - start-up: rarely needed
 

@@ -1,10 +1,10 @@
-"""A problem that changes over time, epoch by epoch (the paper's dynamic DisCSP, Section 3.1).
+"""Solves a problem that changes over time, epoch by epoch (the paper's dynamic DisCSP, Section 3.1).
 
 An epoch ends when its problem is solved, when the scenario's next event happens, or when robots are lost. The next
-epoch begins with the changed problem. A `DynamicProtocol` continues with its knowledge that still holds; any other
-protocol restarts, so that the two can be compared.
+epoch starts with the changed problem. A `DynamicProtocol` keeps the knowledge that still holds; any other protocol
+restarts, so that the two kinds can be compared.
 
-The changes are known from the beginning, as a scenario, or come epoch by epoch from an `Environment`.
+The changes are known from the beginning, as a scenario, or arrive epoch by epoch from an `Environment`.
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from robochoc.solver.explanation import Invalidated, invalidated_by
 Compile = Callable[[Team], CompiledTeam]
 
 Prepare = Callable[[], tuple[CompiledTeam, SearchResult | None]]
-"""The preparation before each epoch's search; returns the compiled team of the search.
+"""The preparation before each epoch's search. It returns the compiled team for the search.
 
-If it also returns a result, that is the result of the epoch, and there is no search.
+If it also returns a result, this is the result of the epoch, and there is no search.
 """
 
 Environment = Callable[[Team, EpochOutcome, float | None], ScenarioEvent | None]
-"""The robots' surroundings: a function that receives each epoch's answer and returns the next change of the problem.
+"""The robots' environment: a function that receives each epoch's answer and returns the next change of the problem.
 
 Args:
     Team: The epoch's team.
@@ -54,17 +54,17 @@ Args:
     float | None: The remaining seconds (None: no limit; 0: the returned event is ignored).
 
 Returns:
-    The next event, or None: no further event. It happens after the events of the files; changes in it that are
-    impossible then are left out.
+    The next event, or None if there are no further events. The event happens after the events in the files; any
+    change in it that is impossible by then is skipped.
 """
 
 
 NOT_SEARCHED = SearchResult.of(Verdict.UNKNOWN, None, {}, (), 0)
-"""The result of an epoch without time for a search."""
+"""The result of an epoch that has no time for a search."""
 
 
 class EpochStart(NamedTuple):
-    """The start of an epoch: its number, and its cause in a few words."""
+    """The start of an epoch: the epoch's number and its cause in a few words."""
 
     epoch: Epoch
     number: int = 0
@@ -72,10 +72,10 @@ class EpochStart(NamedTuple):
 
 
 class FinishedEpoch(NamedTuple):
-    """An epoch whose search is over.
+    """An epoch whose search has ended.
 
-    `team` is its team in the form of the files, `epoch` contains the same team with compiled domains, as the robots
-    used it. If the time was over before, `epoch` is the previous one.
+    `team` is the epoch's team in the form of the files, `epoch` contains the same team with compiled domains, in the
+    form used by the robots. If the time was over before the search, `epoch` is the previous one.
     """
 
     team: Team
@@ -85,13 +85,13 @@ class FinishedEpoch(NamedTuple):
 
 
 class ScenarioRun:
-    """The run of a team through its scenario and losses, epoch by epoch.
+    """Runs a team through its scenario and losses, epoch by epoch.
 
     Attributes:
-        team: The present team, in the order of its files.
-        lost_for_good: The robots that were lost and have not come back.
-        failed_returns: The reasons why lost robots could not come back, one sentence each.
-        found: The result of the new epoch, if its preparation has decided it.
+        team: The current team, in the order of its files.
+        lost_for_good: The robots that were lost and have not returned.
+        failed_returns: The reasons why lost robots could not return, one sentence each.
+        found: The result of the new epoch, if its preparation has decided the epoch.
     """
 
     def __init__(  # noqa: PLR0913 - all belong to one run
@@ -107,19 +107,19 @@ class ScenarioRun:
         prepare: Prepare | None = None,
         with_files: bool = False,
     ) -> None:
-        """Start with `team` as it is before the first event.
+        """Start with `team` in its state before the first event.
 
         Args:
             team: The team with its scenario.
-            order: The priority order of the run (None: that of the files).
+            order: The priority order of the run (None: the order of the files).
             compile_: Compiles the domains of a team.
             left_s: Returns the remaining seconds (None: no limit).
             messages: The limit on messages in all epochs together (None: no limit).
-            spares: The number of lost robots that come back. Their files are read again, past events apply to them,
+            spares: The number of lost robots that return. Their files are read again, past events are applied to them,
                 and they join at the end of the order.
             parameters: The parameters common to all robots.
             prepare: The preparation before each search (None: no preparation).
-            with_files: Whether the constraints that lost robots hold are lost with them.
+            with_files: Whether the constraints held by lost robots are lost too.
         """
         self.team = self._full = team_after_events(team, events=0)
         self.lost_for_good: list[str] = []
@@ -141,7 +141,7 @@ class ScenarioRun:
         self._has_added_events = False
 
     def ordered_team(self) -> Team:
-        """Return the team in the order of the run, as the robots use it. Raises `OrderError`."""
+        """Return the team in the order of the run, which the robots use. Raises `OrderError`."""
         return self.team if self._order is None else with_priorities(self.team, self._order)
 
     def compiled(self) -> CompiledTeam:
@@ -149,17 +149,17 @@ class ScenarioRun:
         return self._compile(self.ordered_team())
 
     def prepared(self) -> CompiledTeam:
-        """Return the compiled team of the new epoch's search. Raises the errors of `compiled`."""
+        """Return the compiled team for the search of the new epoch. Raises the errors of `compiled`."""
         if self._prepare is None:
             return self.compiled()
         compiled, self.found = self._prepare()
         return compiled
 
     def epochs(self, session: Session, on_start: Callable[[EpochStart], None]) -> Iterator[FinishedEpoch]:
-        """Yield the epochs one by one. The verdict of the last one counts. A limit may end the run earlier.
+        """Yield the epochs one by one. The verdict of the last epoch counts. A limit may end the run earlier.
 
         Args:
-            session: A session that was opened with the `prepared` team.
+            session: A session opened with the team returned by `prepared`.
             on_start: Called before each epoch.
         """
         opened = "the start"
@@ -187,7 +187,7 @@ class ScenarioRun:
                 return
 
     def _search(self, session: Session) -> SearchResult:
-        if not self.team.robots:  # all have left, and others may join: no constraint is violated
+        if not self.team.robots:  # all robots have left, and others may join: no constraint is violated
             return SearchResult.of(Verdict.SOLUTION, None, {}, (), 0)
         if self.found is not None:
             return self.found
@@ -202,21 +202,21 @@ class ScenarioRun:
 
     @property
     def _next(self) -> ScenarioEvent | None:
-        """The next event; None if no further event is known."""
+        """The next event, or None if no further event is known."""
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
     @property
     def events_left(self) -> int:
-        """The number of events that have not happened."""
+        """The number of events that have not yet happened."""
         return len(self._files.scenario) - self._happened
 
     @property
     def is_over(self) -> bool:
-        """Return whether the time is over, or all messages have been sent."""
+        """Return whether the time is over or the message limit is reached."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
     def add_event(self, event: ScenarioEvent) -> None:
-        """Add `event` to the end of the scenario. Changes in it that are impossible then are left out."""
+        """Append `event` to the scenario. Changes in the event that are impossible when it happens are skipped."""
         self._files = replace(self._files, scenario=(*self._files.scenario, event))
         self._has_added_events = True
 
@@ -226,7 +226,7 @@ class ScenarioRun:
         self._update_team(())
 
     def _describe(self, event: ScenarioEvent) -> str:
-        """Return the changes of `event` that are still possible, in a few words."""
+        """Describe the changes in `event` that are still possible, in a few words."""
         out = set(self.lost_for_good)
         changes = apply_possible_changes(self._full, event.changes)[1] if self._has_added_events else event.changes
         words = [
@@ -237,7 +237,7 @@ class ScenarioRun:
         return ", ".join(words) or "nothing"
 
     def _apply(self, event: ScenarioEvent) -> Collection[str]:
-        """Apply `event`, and return the joining robots. After losses, impossible changes are left out."""
+        """Apply `event`, and return the joining robots. After losses, impossible changes are skipped."""
         self._happened += 1
         changes: Sequence[Change] = event.changes
         if self._after_losses:
@@ -249,7 +249,7 @@ class ScenarioRun:
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _lose(self, lost: Mapping[str, str]) -> Collection[str]:
-        """Return the robots of `lost` that come back; the others are lost for good."""
+        """Return the robots in `lost` that return; the others are permanently lost."""
         self._after_losses = True
         back: list[str] = []
         for name in lost:
@@ -267,7 +267,7 @@ class ScenarioRun:
         return back
 
     def _update_team(self, joining: Collection[str]) -> None:
-        """Update the team and its order: the robots that are `joining` come last."""
+        """Update the team and its order. The robots that are `joining` come last."""
         self.lost_for_good = [name for name in self.lost_for_good if name in self._full and name not in joining]
         self.team = self._remaining()
         if self._order is not None:
@@ -276,9 +276,9 @@ class ScenarioRun:
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
     def _remaining(self) -> Team:
-        """Return the team without the robots that are lost for good.
+        """Return the team without the robots that are permanently lost.
 
-        If the constraints that they hold are lost too, the initial order of the run determines these constraints.
+        If the constraints that these robots hold are lost too, the initial order of the run determines which.
         """
         order = self._held_in
         if order is None or not self.lost_for_good:
@@ -287,7 +287,7 @@ class ScenarioRun:
         return with_priorities(left, [name for name in self._full.order if name in left])
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:
-        """Change the team of `session` to the present one; return the new epoch.
+        """Change the team of `session` to the current one, and return the new epoch.
 
         If the epoch needs no search, the session is left unchanged until an epoch needs one.
         """
@@ -303,7 +303,7 @@ class ScenarioRun:
         return epoch
 
     def _reread(self, name: str) -> None:
-        """Replace the robot `name` by the present content of its file, as if it had been the same from the start."""
+        """Replace the robot `name` by the present content of its file, as if the file had never been different."""
         symbols = symbol_table(self.team.robots)
         read = read_robot_again(Path(self.team[name].file), symbols, self._files.user_units)
         robot = normalized_joining(self._files, read)
@@ -314,7 +314,7 @@ class ScenarioRun:
 
 
 def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:
-    """Return in a few words the lost robots, and those of them that came `back`."""
+    """Describe the lost robots, and those that came `back`, in a few words."""
     out = [name for name in lost if name not in back]
     words = [f"the loss of {', '.join(out)}"] if out else []
     if back:
@@ -323,6 +323,6 @@ def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:
 
 
 def _with_joining(event: ScenarioEvent, robot: Robot) -> ScenarioEvent:
-    """Return `event` with `robot` in place of the joining robot of that name."""
+    """Return `event` with `robot` in place of the joining robot with the same name."""
     changes = (AddAgent(robot) if isinstance(c, AddAgent) and c.robot.name == robot.name else c for c in event.changes)
     return replace(event, changes=tuple(changes))

@@ -1,4 +1,4 @@
-"""A team whose robots run on this machine. Every answer is checked with the robots' files."""
+"""A team whose robots run on this machine. Every answer is checked against the robots' files."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class StartEvents:
         self._writer = TeamWriter()
 
     def report(self, protocol: type[Protocol], start: EpochStart, session: Session | None = None) -> None:
-        """Report that a search begins.
+        """Report the start of a search.
 
         Args:
             protocol: The protocol of the search.
@@ -60,9 +60,9 @@ class StartEvents:
 
 
 class ThisMachine(Deployment):
-    """A team on this machine, in the runtime that the options name. See `Deployment`.
+    """A team on this machine, in the runtime specified by the options. See `Deployment`.
 
-    `epochs` are the finished epochs; the list grows during the run.
+    `epochs` contains the finished epochs; the list grows during the run.
     """
 
     def __init__(
@@ -93,10 +93,10 @@ class ThisMachine(Deployment):
             with_files=options.runtime == Runtime.NETWORK,
         )
         self._searched = CompiledTeam(team, only=())
-        """The team of the last `search`, compiled; before the first search, none of its robots is compiled."""
+        """The compiled team of the last `search`. Before the first search, none of its robots is compiled."""
         self._preprocessings: list[Preprocessing] = []
         self._cut_short = ""
-        """The reason why the last preprocessing did not end."""
+        """The reason why the last preprocessing did not finish."""
 
     @property
     def kind(self) -> ProblemKind:
@@ -138,7 +138,7 @@ class ThisMachine(Deployment):
         """See `Deployment.solve`. The problem may change in the first phase only."""
         if not phase.withdrawal:
             return self._solve_epochs(phase)
-        answer = replace(super().solve(phase), witness=None)  # `witness` is for the whole team's no-solution
+        answer = replace(super().solve(phase), witness=None)  # `witness` explains the no-solution of the whole team
         return replace(answer, reason=answer.reason or self._absence_reason(answer, withdrawal=True))
 
     def search(self, phase: RunPhase) -> Search:
@@ -167,7 +167,7 @@ class ThisMachine(Deployment):
         return self._confirmed(total=total, withdrawal_cost=cost)
 
     def limit_reached(self, why: str) -> PhaseAnswer:
-        """Return the answer of a run that a limit has ended before the search."""
+        """Return the answer of a run that reached a limit before the search."""
         reason = "; ".join([why, *self._scenario.failed_returns])
         before = total_preprocessing(self._preprocessings)
         return self._with_epochs(PhaseAnswer(Verdict.UNKNOWN, reason=reason, preprocessing=before))
@@ -201,7 +201,7 @@ class ThisMachine(Deployment):
         missed = self._missed_events(answer)
         why = self._cut_short or missed or self.why_unknown(phase, answer) or answer.reason
         why = why or self._absence_reason(answer, withdrawal=phase.withdrawal)
-        if missed:  # an answer to a problem that was going to change
+        if missed:  # the answer is for a problem that was going to change
             answer = replace(answer, verdict=Verdict.UNKNOWN, deadline=None)
         reasons = filter(None, [why, *scenario.failed_returns])
         return replace(
@@ -209,7 +209,7 @@ class ThisMachine(Deployment):
         )
 
     def _absence_reason(self, answer: PhaseAnswer, *, withdrawal: bool) -> str | None:
-        """Return the reason for a missing solution: constraints that the remaining robots cannot satisfy."""
+        """Return the reason why there is no solution: constraints that the remaining robots cannot satisfy."""
         if answer.verdict != Verdict.NO_SOLUTION:
             return None
         from robochoc.verification.absence_reason import absence_reason  # noqa: PLC0415 - start-up: rarely needed
@@ -217,7 +217,7 @@ class ThisMachine(Deployment):
         return absence_reason(self._scenario.team, withdrawal=withdrawal) or None
 
     def _missed_events(self, answer: PhaseAnswer) -> str:
-        """Return in words that a limit was reached before some events, although there is an answer; else empty."""
+        """Return a note that a limit was reached before some events, if there is an answer; else empty."""
         left = self._scenario.events_left
         if not left or answer.verdict == Verdict.UNKNOWN:
             return ""
@@ -225,12 +225,12 @@ class ThisMachine(Deployment):
         return f"{self._limit_reached(answer.metrics)}, and {missed}"
 
     def _start_epoch(self, phase: RunPhase, session: Session, start: EpochStart) -> None:
-        """Report that an epoch begins, and watch it."""
+        """Report the start of an epoch, and watch its search."""
         self._start_events.report(phase.protocol, start, session)
         self._watch(phase, start, session)
 
     def _restart(self) -> None:
-        """Restart the time if there is a deadline: each epoch has its own deadline."""
+        """Restart the clock if there is a deadline, since each epoch has its own deadline."""
         if self.options.deadline is not None:
             self._context.restart()
             self._compiler.deadline = self._context.deadline
@@ -261,14 +261,14 @@ class ThisMachine(Deployment):
         )
 
     def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
-        """See `Deployment.concluded`. Answers published for robots that are now lost do not count."""
+        """See `Deployment.concluded`. Answers published before a robot was lost do not count."""
         improvements = self._improvements
         return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
 
     def _preprocessed(self) -> tuple[CompiledTeam, SearchResult | None]:
-        """Let the robots make their domains consistent; return the remaining team. See `scenario.Prepare`.
+        """Let the robots make their domains consistent; return the restricted team. See `scenario.Prepare`.
 
-        They begin with the domains of the files: values that a removed constraint had excluded come back.
+        The robots start from the domains in the files, so values that a removed constraint had excluded return.
         """
         self._cut_short = ""
         if self.is_empty:
@@ -287,20 +287,20 @@ class ThisMachine(Deployment):
         return whole, SearchResult.of(result.verdict, result.witness, {}, (), 0)
 
     def _settled(self, phase: RunPhase, found: SearchResult) -> PhaseAnswer:
-        """Return the answer of a run that the preprocessing has decided."""
+        """Return the answer of a run that the preprocessing has already decided."""
         before = total_preprocessing(self._preprocessings)
         answer = PhaseAnswer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
         return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict == Verdict.NO_SOLUTION else answer
 
     def _answer_of(self, phase: RunPhase, epoch: FinishedEpoch) -> PhaseAnswer:
-        """Return the answer of an epoch, checked with the files."""
+        """Return the answer of an epoch, checked against the files."""
         check = partial(check_with_files, phase, epoch.result, epoch.team, epoch.epoch.compiled)
         answer = self.evaluated(phase, Search(epoch.result, check))
         self._improvements = None
         return answer
 
     def _ask_environment(self) -> None:
-        """Give the last epoch's answer to the environment, if there is one; it may add an event."""
+        """Pass the last epoch's answer to the environment, if there is one. The environment may add an event."""
         if self._environment is None:
             return
         left_s = 0 if self._scenario.is_over else None if self.options.deadline is not None else self.left_s()
@@ -321,11 +321,11 @@ class ThisMachine(Deployment):
         return self.options.order is not None and "order" not in self.options.chosen
 
     def _compile(self, team: Team) -> CompiledTeam:
-        """Compile `team` for its next epoch. In a static problem a robot without a local solution ends the run."""
+        """Compile `team` for its next epoch. In a static problem, a robot without a local solution ends the run."""
         return self._compiler.compile(team, every=self._dynamic or bool(self.epochs))
 
     def _session(self, phase: RunPhase, compiled: CompiledTeam) -> Session:
-        """Open a session of the phase's protocol."""
+        """Open a session for the phase's protocol."""
         context = self._context
         request = SessionRequest(
             phase.protocol,
@@ -342,7 +342,7 @@ class ThisMachine(Deployment):
     def _confirmed(
         self, alone: str | None = None, *, total: float = INFINITE, withdrawal_cost: float | None = None
     ) -> tuple[str, ...]:
-        """Return the central solvers that confirm an answer, if required. For the arguments see `confirmed`."""
+        """Return the central solvers that confirm an answer, if required by the options. Arguments: see `confirmed`."""
         if not self.options.verify:
             return ()
         from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: rarely needed

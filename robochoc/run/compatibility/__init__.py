@@ -7,7 +7,7 @@ Each rule has a condition, the reason, and an alternative:
 - `setting_rules.py`: settings that the protocol does not have or accept;
 - `channel_rules.py`: channel models that do not fit the team;
 - `protocols/requirements.py`: costs and kinds of constraints that the protocol does not support. Robots on a network
-  check their own files by it, since the master does not see them.
+  use it to check their own files, since the master does not see them.
 
-The options have their names of the command line in the messages.
+Messages call the options by their command-line names.
 """

@@ -1,4 +1,4 @@
-"""Channel models that do not fit the team: they name unknown robots, or need unknown positions."""
+"""Refuses channel models that do not fit the team, since they name unknown robots or need unknown positions."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def refuse_channel(team: Team, options: Options) -> None:
     """Refuse a channel model that does not fit the team, including the robots that join in its scenario.
 
     Raises:
-        UnsupportedError: if it names a robot that is never in the team, or if losses depend on distance and the
+        UnsupportedError: if the model names a robot that is never in the team, or if losses depend on distance and the
             position of a robot is unknown.
     """
     channel = options.channel

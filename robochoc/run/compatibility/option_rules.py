@@ -10,11 +10,11 @@ from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, Sc
 from robochoc.solver.errors import UnsupportedError
 
 LEAST_SEED, LARGEST_SEED = -(2**63), 2**64 - 1
-"""Journals and robots on a network receive the seed in msgpack, whose integers are at most this long."""
+"""The range of seeds. Journals and robots on a network receive the seed in msgpack, whose integers have this range."""
 
 
 class OptionRule(NamedTuple):
-    """Options that are refused: the condition, the reason, and what to do instead."""
+    """A combination of options that is refused: the condition, the reason, and an alternative."""
 
     refuses: Callable[[Options], object]
     why: str
@@ -22,7 +22,7 @@ class OptionRule(NamedTuple):
 
 
 def _for_robots(option: str, given: Callable[[Options], object]) -> OptionRule:
-    """Return the rule that refuses an option with the central solver."""
+    """Return the rule that refuses an option together with the central solver."""
     why = f"{option} is for robots that solve the problem together, not for --protocol central"
     return OptionRule(lambda o: o.protocol == CENTRAL and given(o), why)
 
@@ -33,7 +33,7 @@ def _not_while_changing(option: str, given: Callable[[Options], object]) -> Opti
 
 
 def _is_delayed(options: Options) -> bool:
-    """Return whether the delays or the order of messages differ from the default."""
+    """Return whether the delays or the message order differ from the default."""
     return bool(options.delay) or options.schedule != ScheduleName.CONCURRENT
 
 

@@ -20,13 +20,13 @@ from robochoc.solver.exclusions import allocation_fault
 from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
-"""Costs that can add up to more are refused: messages contain integers of 64 bits."""
+"""The largest allowed sum of costs, because messages contain 64-bit integers."""
 CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 """The problems that the central solver supports."""
 
 
 class UnfitProtocolError(UnsupportedError):
-    """The protocol does not fit; another one may. `complete`: it must be one that proves its answers."""
+    """The protocol does not fit, but another one may. `complete`: the other one must prove its answers."""
 
     def __init__(self, why: str, *, complete: bool = False) -> None:
         super().__init__(why)
@@ -48,27 +48,27 @@ class RunCase:
 
     @property
     def has_negative_costs(self) -> bool:
-        """Return whether costs were shifted, as some are negative."""
+        """Return whether costs were shifted because some are negative."""
         return self.team.user_units.maximize or any(constraint.offset for constraint in self.team.constraints())
 
     @property
     def is_distributed(self) -> bool:
-        """Return whether the robots solve the problem, not the central solver."""
+        """Return whether the robots solve the problem themselves, without the central solver."""
         return self.options.protocol != CENTRAL
 
     @property
     def minimum_withdrawal(self) -> bool:
-        """Return whether a minimum of robots is to withdraw, which the robots decide."""
+        """Return whether the robots must find a minimum withdrawal."""
         return self.is_distributed and self.options.withdraw == Withdrawal.MINIMUM
 
     @cached_property
     def epochs(self) -> tuple[Team, ...]:
-        """The team after each event of its scenario, as far as the events are known before the run."""
+        """The team before and after each event in its scenario, for the events known before the run."""
         return tuple(team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
 
     @property
     def unknown_kills(self) -> str:
-        """The robots to be killed that are never in the team."""
+        """The robots to be killed that are not in the team at any time."""
         return ", ".join(sorted({kill.robot for kill in self.options.kill}.difference(*(e.order for e in self.epochs))))
 
     @property
@@ -78,15 +78,15 @@ class RunCase:
 
 
 def scenario_refusal(team: object, option: str) -> str:
-    """Return why `option` is refused for a team whose problem changes over time."""
+    """Return the reason why `option` is refused for a team whose problem changes over time."""
     return f"{team} has a scenario.xml; {option} is for problems that do not change"
 
 
 class TeamRule(NamedTuple):
     """A run that is refused: the condition, the reason, and an alternative.
 
-    The reason may contain `{team}` and `{protocol}`, the names, and `{case}`, the run. `other_protocol`: another
-    protocol may be able to do it; `complete`: only a complete one.
+    The reason may contain `{team}` and `{protocol}` for the names, and `{case}` for the run. `other_protocol`: another
+    protocol may support the run; `complete`: only a complete protocol may.
     """
 
     refuses: Callable[[RunCase], object]
@@ -164,12 +164,12 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
     """Raise `UnsupportedError` if the options cannot be combined with the team or with the traits of the protocol.
 
     Args:
-        team: The team with its scenario. Across machines: the part of it that the master sees.
+        team: The team with its scenario. In a run across machines: the part of the team that the master sees.
         options: How to run.
         traits: The traits of the protocol of `options`; `CENTRAL_TRAITS` for the central solver.
 
     Raises:
-        UnfitProtocolError: if another protocol may be able to do it.
+        UnfitProtocolError: if another protocol may support the run.
     """
     case = RunCase(team, options, traits)
     for rule in TEAM_RULES:
@@ -183,10 +183,10 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
 
 
 def _requirements(case: RunCase) -> Iterator[tuple[str, Traits]]:
-    """Yield all protocols that must support the constraints: the protocol, and those of further phases, with traits."""
+    """Yield the names and traits of the protocols of all phases. They must support the constraints."""
     options, traits = case.options, case.traits
     taken_over = case.minimum_withdrawal and not traits.costs
-    if not (taken_over and case.has_costs):  # then the second phase minimises the costs
+    if not (taken_over and case.has_costs):  # otherwise the second phase minimises the costs
         yield options.protocol, traits
     if taken_over:
         yield "--withdraw minimum", Traits(costs=True)
@@ -209,6 +209,6 @@ def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
 
 
 def max_total(team: Team, options: Options) -> float:
-    """Return the maximum sum of all costs of `team`; withdrawal costs are included if robots may withdraw."""
+    """Return the maximum sum of all costs of `team`, including withdrawal costs if robots may withdraw."""
     times = sum(robot.weight for robot in team.robots) + 1 if options.withdraw is not None else 1
     return withdrawal_cost(team) * times

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from robochoc.system.errors import RobochocError
 
 DEFAULT_PORT = 7447
-"""The default port of Zenoh."""
+"""Zenoh's default port."""
 LOOPBACK = "127.0.0.1"
 _LARGEST_PORT = 65_534
 _BRACKETED = re.compile(r"\[([^]]*)](?::(.+))?")
@@ -17,18 +17,18 @@ _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
 class AddressError(RobochocError, ValueError):
-    """A text that is not the address of a master."""
+    """Raised for a text that is not the address of a master."""
 
 
 class Address(NamedTuple):
-    """A host name or address, and a port. The master's enrolment service listens one port higher."""
+    """A host name or address, and a port. The enrolment service of the master listens one port higher."""
 
     host: str
     port: int = DEFAULT_PORT
 
     @classmethod
     def parse(cls, text: str) -> Address:
-        """Return the address in `HOST`, `HOST:PORT` or `[IPv6]:PORT`. Raises `AddressError`."""
+        """Parse an address of the form `HOST`, `HOST:PORT` or `[IPv6]:PORT`. Raises `AddressError`."""
         host, port = text, ""
         if found := _BRACKETED.fullmatch(text):
             host, port = found[1], found[2] or ""
@@ -40,12 +40,12 @@ class Address(NamedTuple):
 
     @property
     def enrolment_port(self) -> int:
-        """The port where tokens are redeemed."""
+        """The port for redeeming tokens."""
         return self.port + 1
 
     @property
     def anywhere(self) -> bool:
-        """Return whether this is the address for all addresses of a machine. Robots cannot connect to it."""
+        """Return whether the address means all addresses of a machine. Robots cannot connect to such an address."""
         try:
             return ipaddress.ip_address(self.host).is_unspecified
         except ValueError:

@@ -1,4 +1,4 @@
-"""Queries to the Directory Facilitator of a running master: the agents and their services."""
+"""Queries about agents and their services to the Directory Facilitator of a running master."""
 
 from __future__ import annotations
 
@@ -26,17 +26,17 @@ SLOTS = ("name", "protocol", "variable", "topic", "ontology", "language")
 
 
 class NoAnswerError(RobochocError):
-    """The directory refuses a query, or does not answer."""
+    """Raised if the directory refuses a query or does not answer."""
 
 
 class TemplateError(RobochocError, ValueError):
-    """An invalid template of a search."""
+    """Raised for an invalid search template."""
 
 
 def search_template(slots: Sequence[str]) -> AgentDescription:
-    """Return the template of `slot=value` words, all of which must match. Raises `TemplateError`.
+    """Return the template for `slots`, texts of the form `slot=value` that must all match. Raises `TemplateError`.
 
-    Names may omit the platform, since it may have another name on its machine.
+    Agent names may omit the platform, since its name may be unknown outside its machine.
     """
     given: dict[str, list[str]] = {slot: [] for slot in SLOTS}
     for word in slots:
@@ -58,12 +58,12 @@ def search_template(slots: Sequence[str]) -> AgentDescription:
 
 
 def platform_at(place: Address) -> str:
-    """Return the name of the platform whose master is at `place`. Agents' names end with it."""
+    """Return the name of the platform whose master is at `place`. Names of agents end with it."""
     return f"{place}/robochoc"
 
 
 def search_request(place: Address, slots: Sequence[str], at_most: int | None = None) -> str:
-    """Return a search as an action in SL0. Raises `TemplateError`."""
+    """Return a search action in SL0. Raises `TemplateError`."""
     platform = platform_at(place)
     return request(df_on(platform), DirectoryFunction.SEARCH, search_template(slots), at_most)
 
@@ -75,7 +75,7 @@ def query_directory(place: Address, identity: Identity, words: str, patience_s: 
 
 
 def watch_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
-    """Subscribe to the search `words`; yield the directory's notices in SL0, now and at each change.
+    """Subscribe to the search `words`; yield the directory's notices in SL0, first now and then at each change.
 
     Raises:
         CannotConnectError: if no master answers.
@@ -95,7 +95,7 @@ def watch_directory(place: Address, identity: Identity, words: str, patience_s: 
 
 
 class _Query:
-    """One query or subscription. Answers to other queries are ignored."""
+    """A query or subscription. Answers to other queries are ignored."""
 
     def __init__(self, place: Address, identity: Identity, transport: Transport) -> None:
         self._place = place
@@ -106,7 +106,7 @@ class _Query:
         self._early: list[DirectoryAnswer] = []
 
     def ask(self, words: str, expected: Performative, *, subscribe: bool = False) -> str:
-        """Repeat the query until there is an answer, and return its content. Raises `NoAnswerError`."""
+        """Repeat the query until an answer arrives, and return the content of the answer. Raises `NoAnswerError`."""
         until, asked = time.monotonic() + ANSWER_S, 0.0
         while time.monotonic() < until:
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -129,7 +129,7 @@ class _Query:
         )
 
     def next_notice(self) -> DirectoryAnswer | None:
-        """Return the next INFORM; None if there was none for a moment."""
+        """Return the next INFORM message, or None if none arrived within a short time."""
         if self._early:
             return self._early.pop(0)
         answer = self._next()
@@ -150,7 +150,7 @@ def agents_in(answer: str) -> tuple[AgentDescription, ...]:
 
 
 def subject_of(answer: str) -> str:
-    """Return the name of the agent that a notice is about; empty if the search named none."""
+    """Return the name of the agent described by a notice; empty if the search named no agent."""
     return searched_in(answer).name
 
 

@@ -22,25 +22,25 @@ from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.errors import UnsupportedError
 
 PATIENCE_S = 30.0
-"""The longest time for which the master may be out of reach, in seconds."""
+"""The longest time for which the master may be unreachable, in seconds."""
 _TRY_AGAIN_S = 0.5
 
 
 def identity_of(
     name: str, place: Address, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
 ) -> Identity:
-    """Return the identity of a robot. With a token it is enrolled now; after half of its lifetime it is renewed.
+    """Return the identity of a robot. With a token it is enrolled now. An identity past half its lifetime is renewed.
 
     Args:
         name: The robot's name.
         place: The address of the master.
         folder: The folder of the identity (None: the default).
         token: A token with which the robot enrols.
-        patience_s: The seconds to wait, with a token, for a master that does not listen yet.
+        patience_s: The seconds to wait for a master that does not listen yet, if there is a token.
 
     Raises:
         InvalidNameError: if the name is not a valid robot's name.
-        IdentityError: if the folder has no identity, or that of another robot.
+        IdentityError: if the folder has no identity, or the identity of another robot.
         TokenError: if the token is invalid.
         NotTrustedError: if the master's Authority has not issued the token.
         EnrolmentError: if the robot is not enrolled.
@@ -60,7 +60,7 @@ def identity_of(
     try:
         return renew(identity, place.host, place.enrolment_port)
     except EnrolmentError:
-        return identity  # it is still valid
+        return identity  # the old identity is still valid
 
 
 def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: float) -> Identity:
@@ -75,7 +75,7 @@ def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: f
 
 
 def _normalized(robot: Robot) -> Robot:
-    """Return `robot` with costs in the protocols' units. Raises `UnsupportedError`."""
+    """Return `robot` with costs in the internal units of the protocols. Raises `UnsupportedError`."""
     try:
         return normalized_robot(robot, robot.costs, {one.name: one.domain for one in robot.variables})
     except UnboundedCostError as error:
@@ -83,23 +83,23 @@ def _normalized(robot: Robot) -> Robot:
 
 
 def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettings, compiler: Compiler) -> Ending:
-    """Participate as `robot` in one run of a master.
+    """Participate in one run of a master, as the robot `robot`.
 
     Args:
-        robot: The robot of a file.
+        robot: The robot, as read from its file.
         place: The address of the master.
         identity: The robot's identity.
         settings: The settings of the robot.
         compiler: Compiles the robot's domain.
 
     Returns:
-        The end of the run for the robot.
+        The end of the run, as seen by the robot.
 
     Raises:
         InvalidInputError: if the robot is invalid.
         CannotConnectError: if no master answers.
-        UnsupportedError: if the cost of one of its functions is unbounded.
-        CompileError: if its domain cannot be compiled; also the other errors of `Compiler.compile`.
+        UnsupportedError: if the cost of one of the robot's functions is unbounded.
+        CompileError: if the robot's domain cannot be compiled. The other errors of `Compiler.compile` are raised too.
     """
     check_robot(robot)
     robot = _normalized(robot)

@@ -1,6 +1,6 @@
-"""The runtime `network`: robots in processes of this machine, connected through a master by mutual TLS.
+"""The runtime `network`: robots in processes on this machine, connected through a master by mutual TLS.
 
-A separate module, as the network is an extra: `run/runtimes.py` imports it by name on first use.
+This is a separate module because the network is an extra: `run/runtimes.py` imports it by name on first use.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A team whose robots run on several machines and do not disclose their files: the robots check the answer.
+"""A team whose robots run on several machines and do not disclose their files. The robots themselves check the answer.
 
-The master sees of each robot the same as its neighbours. The outcome names the robots whose claims only they could
-check (`claimed`).
+The master knows about each robot only what the robot's neighbours know. The outcome names the robots whose claims no
+other robot could check (`claimed`).
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from robochoc.verification.checker import RefutedError
 
 
 class TeamSnapshot(NamedTuple):
-    """A snapshot with its `number`: the `values` of all variables, and the `assignments` by robot."""
+    """Snapshot number `number`: the `values` of all variables, and the `assignments` by robot."""
 
     number: int
     values: Mapping[str, int]
@@ -44,7 +44,7 @@ _NAMED = 5
 
 
 class Machines(Deployment):
-    """The robots that have registered with `master`. See `Deployment`. Its time starts with its creation.
+    """The robots that have registered with `master`. See `Deployment`. The clock of the run starts at the creation.
 
     Args:
         master: A master whose team is complete.
@@ -112,7 +112,7 @@ class Machines(Deployment):
         members = self._master.members
         self._gone += [members.robots[name].robot for name in lost if name in members.robots]
         members.remove(lost)
-        if self.options.deadline is not None:  # the remaining robots have a new deadline
+        if self.options.deadline is not None:  # the remaining robots get a new deadline
             self._begin_time()
             self._improvements = None
 
@@ -132,7 +132,7 @@ class Machines(Deployment):
     # Answers while the robots search
 
     def _watch(self, phase: RunPhase) -> Improvements:
-        """Return the watch that stores the best answer of a search, and publishes it from the deadline on."""
+        """Return the watch that stores the best answer of a search, and publishes answers from the deadline on."""
         team = registered_team(self._master, self._name)
         options, audience = self.options, self._audience
         self._snapshot = self._kept = NO_SNAPSHOT
@@ -162,7 +162,7 @@ class Machines(Deployment):
         )
 
     def _check_snapshot(self, phase: RunPhase, snapshot: SearchResult) -> Answer | None:
-        """Return the robots' assignment at a snapshot, which all of them have checked; None if a check fails.
+        """Return the robots' assignment at a snapshot, checked by all robots; None if a check fails.
 
         Raises:
             RefutedError: when robots contradict each other.
@@ -188,13 +188,13 @@ class Machines(Deployment):
         )
 
     def _adopt(self, answer: PhaseAnswer) -> None:
-        """Order the robots to use `answer` as their decision until a further order."""
+        """Order the robots to keep `answer` as their decision until a further order."""
         withdrawn = f", {len(answer.withdrawn)} withdraw" if answer.withdrawn else ""
         number = self._kept.number if answer.assignment is self._kept.values else 0
         self._master.adopt(number, f"{answer.verdict}{withdrawn}")
 
     def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - see `Deployment`
-        """See `Deployment.concluded`. The best checked answer may be that of a snapshot."""
+        """See `Deployment.concluded`. The best checked answer may come from a snapshot."""
         improvements = self._improvements
         if improvements is None:
             return answer
@@ -216,7 +216,7 @@ class Machines(Deployment):
         return Team(self._name, (*robots, *self._gone))
 
     def _check(self, phase: RunPhase, result: SearchResult) -> Answer | None:
-        """Return the values that robots have reported, once every robot has checked its own constraints.
+        """Return the values that the robots have reported, after every robot has checked its own constraints.
 
         Raises:
             RefutedError: if a robot refutes a claim of the protocol, or robots contradict each other.
@@ -224,7 +224,7 @@ class Machines(Deployment):
         """
         state, members = self._master.state, self._master.members
         if self.options.deadline is not None and not state.assigned.keys() >= set(members.order):
-            return None  # a robot has not reported in time whether it has values or withdraws
+            return None  # a robot has not reported in time that it has values or withdraws
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
             withdrawn = without if phase.withdrawal and result.verdict == Verdict.SOLUTION else ()
@@ -250,7 +250,7 @@ class Machines(Deployment):
         return None
 
     def _reported(self, assignments: Mapping[str, dict[str, int]]) -> dict[str, dict[str, int]]:
-        """Return the reported values. Raises `RobotsLostError` for a robot that has values and does not report them."""
+        """Return the reported values. Raises `RobotsLostError` if a robot has values and does not report them."""
         for name, assigned in self._master.state.assigned.items():
             if assigned and not assignments[name]:
                 raise RobotsLostError({name: "it has reported that it has values, but not which"})
@@ -267,15 +267,15 @@ class Machines(Deployment):
 
 
 def registered_team(master: Master, name: str) -> Team:
-    """Return the team that has registered with `master`, with the parts of it that the master sees."""
+    """Return the team that has registered with `master`, limited to the parts that the master sees."""
     members = master.members
     return Team(name, tuple(members.robots[robot].robot for robot in members.order))
 
 
 def claimed(outcome: Outcome) -> Outcome:
-    """Return `outcome` with the robots whose unchecked claims it contains (docs/guides/security.md, "One traitor").
+    """Return `outcome` with the robots whose unchecked claims it relies on (docs/guides/security.md, "One traitor").
 
-    `no-solution` is the claim of one robot. Optimality, and unreported values, are claims of all robots.
+    `no-solution` is claimed by one robot. Optimality and unreported values are claimed by all robots.
     """
     by: str | None = None
     match outcome.verdict:
@@ -293,5 +293,5 @@ def claimed(outcome: Outcome) -> Outcome:
 
 
 def first_names(names: Sequence[str]) -> str:
-    """Return a few of `names`, and the number of the others."""
+    """Return the first few of `names`, and the number of remaining names."""
     return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} others" * (len(names) > _NAMED)

@@ -1,4 +1,4 @@
-"""A run from the master's side: listen, wait for the team, search, check, report the outcome.
+"""The master's side of a run: listen, wait for the team, search, check, report the outcome.
 
 Section 5.2: "The master waits for the confirmation of creation all agents before ordering the start of the search."
 """
@@ -41,7 +41,7 @@ from robochoc.system.errors import RobochocError
 from robochoc.verification.checker import RefutedError
 
 LOOPBACK_ADDRESS = Address(LOOPBACK)
-"""The default: other addresses must be chosen explicitly."""
+"""The default address, reachable only from this machine. Other addresses must be chosen explicitly."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class MasterPlan:
     Attributes:
         authority: The folder of the Authority.
         place: The address at which the master listens.
-        hosts: Further names and addresses of its machine that robots may use.
+        hosts: Further names and addresses of the master's machine that robots may use.
         name: The team's name.
         names: The robots of the team. Without `names` and `number`, the team is complete when every neighbour that a
             robot names has registered.
@@ -62,11 +62,12 @@ class MasterPlan:
         withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
         gather_s: The seconds to wait for the team (None: no limit).
         timeout: A limit in seconds, from the time at which the team is complete (None: no limit).
-        deadline: The same; the best assignment known at the deadline is the answer (None: no deadline).
+        deadline: A limit like `timeout`, but the best assignment known at the deadline is the answer (None: no
+            deadline).
         improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
         messages: A limit on the number of messages (None: no limit).
         message_loss: The probability with which robots drop received messages.
-        conditions: The settings of the network.
+        conditions: The network settings.
     """
 
     authority: Path
@@ -88,7 +89,7 @@ class MasterPlan:
     conditions: NetworkSettings = NetworkSettings()
 
     def options(self, protocol: str) -> Options:
-        """Return the options of the run by `protocol`."""
+        """Return the options of a run with `protocol`."""
         return Options(
             protocol=protocol,
             runtime=Runtime.NETWORK,
@@ -107,11 +108,11 @@ class MasterPlan:
 
 
 class TeamIncompleteError(RobochocError):
-    """The team was not complete in time."""
+    """Raised if the team was not complete in time."""
 
 
 class MasterResult(NamedTuple):
-    """The outcome, and the team as the master sees it: without constraints."""
+    """The outcome, and the team without constraints, as the master sees it."""
 
     outcome: Outcome
     team: Team
@@ -128,24 +129,24 @@ def run_master(
     publication: Publication | None = None,
     concluded: Callable[[Outcome | None], None] = lambda _outcome: None,
 ) -> MasterResult:
-    """Run as the master of one run.
+    """Act as the master in one run.
 
     Args:
         plan: The plan of the run.
         observer: Receives all events of the master.
         audience: Receives each answer that is published during the search (`plan.improve`).
         watched: Whether the observer also receives the robots' events.
-        progress: Receives the number of messages so far, now and then.
-        listening: Called once robots can connect.
-        publication: The journal for members that may sniff; it is served until a moment after `concluded`.
-        concluded: Called with the outcome (None: the run was broken off); it writes the end of the publication.
+        progress: Receives the number of messages so far, from time to time.
+        listening: Called as soon as robots can connect.
+        publication: The journal for members that may sniff. It is served until shortly after `concluded`.
+        concluded: Called with the outcome (None: the run was aborted). It writes the end of the publication.
 
     Raises:
         AuthorityError: if the folder has no Authority.
-        HostNameError: if the name of a host is invalid.
+        HostNameError: if a host name is invalid.
         RouterError: if the master cannot listen.
         TeamIncompleteError: if the team is not complete in time.
-        RobotsLostError: if robots were lost, and the run is not to continue without them.
+        RobotsLostError: if robots were lost, and the options do not let the run continue without them.
         UnsupportedError: if the options cannot be combined with each other or with the team.
         UnknownProtocolError: if the protocol is not installed.
         RefutedError: if a check refutes the answer.
@@ -176,7 +177,7 @@ def run_master(
 
 @contextmanager
 def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iterator[None]:
-    """Serve robots that redeem their tokens. Raises `RouterError`."""
+    """Serve robots that redeem tokens. Raises `RouterError`."""
     with ExitStack() as stack:
         try:
             stack.enter_context(EnrolmentServer(authority, identity, place.host, place.enrolment_port))
@@ -193,7 +194,7 @@ def _run(
     observers: tuple[Observer | None, Audience | None],
     concluded: Callable[[Outcome | None], None],
 ) -> MasterResult:
-    """Run the search once the master listens, and send the outcome to the robots."""
+    """Run the search after the master has started to listen, and send the outcome to the robots."""
     try:
         led = _solve(plan, master, *observers)
     except BaseException as error:
