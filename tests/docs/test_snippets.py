@@ -21,6 +21,7 @@ ELSEWHERE = {"write-a-protocol.md": "tests/cli/test_own_protocol.py"}
 """Pages whose snippets another test runs."""
 HERE = [page for page in PAGES if page.name not in ELSEWHERE]
 WHOLE_PROGRAMS = {
+    "docs/gallery.md",
     "docs/index.md",
     "docs/tutorials/fly.md",
     "docs/tutorials/two-machines.md",
