@@ -1,1 +1,1 @@
-"""Flights of drones: missions, coordination of several drones, and the simulated quadrotor. Nothing of ROS."""
+"""Flights of drones: missions, coordination of several drones, and the simulated quadrotor. Independent of ROS."""

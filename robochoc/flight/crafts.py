@@ -1,7 +1,7 @@
 """Crafts: one drone per robot, or one per place for a robot that decides about several places.
 
-A craft's cell and level come from the first of these sources that applies: the coordinates of its topic under the
-assignment; the two numbers at the end of its name (`Robot3.1`, `V3.1`), with its first value for the level; its first
+A craft's cell and level are derived from the first applicable source: the coordinates of its topic under the
+assignment; the two numbers at the end of its name (`Robot3.1`, `V3.1`), with its first value as the level; its first
 value alone.
 """
 
@@ -19,11 +19,11 @@ from robochoc.model.problem import Assignment, Robot, Topic
 Cell = tuple[int, int]
 """Row and column, or the x and y of a topic."""
 
-# Longer numbers are dates or serial numbers, not rows.
+# Longer numbers are dates or serial numbers, not rows or columns.
 _ROW_AND_COLUMN = re.compile(r"(?<![0-9])([0-9]{1,4})[._,:;-]([0-9]{1,4})$")
 
 _COORDINATE_MAX = 10**300
-"""The largest coordinate: larger numbers do not fit into floating point, and are cut."""
+"""The largest coordinate: larger numbers exceed the range of floats, and are clamped."""
 _DECISIONS_MAX = 1_000
 """The possible places of a robot with more decisions are not listed."""
 
@@ -36,9 +36,9 @@ class Craft:
     cell: Cell | None = None
     level: int | None = None
     robot: str = ""
-    """The robot that decides about it; empty where only a variable is known."""
+    """The robot that decides about the craft; empty if only a variable is known."""
     topic: Topic | None = None
-    """The topic of its waypoints, if there is one in its file."""
+    """The topic of its waypoints, if its file has one."""
     decided_by: tuple[str, ...] = field(default=(), compare=False)
     """The variables on which its place depends."""
 
@@ -55,7 +55,7 @@ def craft_of_variable(variable: str, values: Assignment) -> Craft:
 
 
 def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
-    """Return one craft per topic that has coordinates, or per variable that names a cell, or one for the robot."""
+    """Return one craft per topic with coordinates, else one per variable that names a cell, else one for the robot."""
     own = [variable.name for variable in robot.variables]
     topics = [topic for topic in robot.topics if topic.x is not None and topic.y is not None]
     if len(topics) > 1:
@@ -80,7 +80,7 @@ def possible_crafts(robot: Robot) -> Iterator[Craft]:
 
 
 def _craft(name: str, variables: Sequence[str], topic: Topic | None, values: Assignment) -> Craft:
-    """Return the craft `name`. Its cell is that of its topic, or is in its name, or in that of its first variable."""
+    """Return the craft `name`. Its cell is from its topic, else from its name, or the name of its first variable."""
     named = (row_and_column(one) for one in (name, *variables[:1]))
     cells = [_cell_of(topic, values) if topic else None, *named]
     known = [values[own] for own in variables if own in values]
@@ -121,6 +121,6 @@ def _bounded(value: int) -> int:
 
 
 def _short_names(topics: Sequence[Topic]) -> list[str]:
-    """Return `drone3.1` for `/drone3.1/waypoint3.1`; the whole topics if these names would not be unique."""
+    """Return short names such as `drone3.1` for `/drone3.1/waypoint3.1`; the whole topics if these are not unique."""
     first = [topic.name.strip("/").partition("/")[0] for topic in topics]
     return first if len(set(first)) == len(topics) else [topic.name for topic in topics]

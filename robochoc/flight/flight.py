@@ -1,17 +1,17 @@
 """The simulated flight: quadrotors fly a mission's legs, with wind, motor failures and obstacles.
 
-A drone stands at its home with its motors off until its route begins, and stops its motors after landing. Possible
-events:
+Drones stand at their homes with their motors off until their routes begin, and stop their motors after landing.
+Possible events:
 
-- A motor stops. The drone tumbles; its other motors are switched off once it is tilted by 60 degrees (as failure
-  detectors of autopilots do), and it stays where it falls. It never flies again. Later routes keep their distance from
-  it.
-- An obstacle, a point, is nearer than `CLEARANCE_M` to a goal (or than the planned distance, if that is more). The
+- A motor stops. The drone tumbles. Its other motors are switched off once the drone is tilted by 60 degrees, like the
+  failure detectors of autopilots do. It stays where it falls and never flies again; later routes keep their distance
+  from it.
+- An obstacle (a point) is nearer to a goal than `CLEARANCE_M`, or than the planned distance if that is larger. The
   planner learns of such an obstacle only when a drone sees it; it avoids all others from the start. A drone whose route
-  passes too near sees it from a distance of `SIGHT_M`, or more if it needs more space to stop: the clearance, the
-  length on which the common clock stops (`quadrotor/trajectory.py`), and `_SIGHT_MARGIN_M` for tracking errors and the
-  time between samples.
-- A drone cannot follow its setpoints. No leg waits for it longer than `SETTLING_S` after the planned end.
+  passes too near to the obstacle sees it from a distance of `SIGHT_M`, or more if the drone needs more space to stop.
+  This space is the sum of the clearance, the distance flown while the common clock stops (`quadrotor/trajectory.py`),
+  and `_SIGHT_MARGIN_M` for tracking errors and the time between samples.
+- A drone cannot follow its setpoints. A leg waits for such a drone for at most `SETTLING_S` after the planned end.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ from robochoc.maps.walls import Walls
 DISTANCE_M = 0.5
 """The default distance between drones' centres."""
 _SHARE = 0.8
-"""The kept share of the distance between two homes or goals that are nearer than `DISTANCE_M`."""
+"""The default distance as a fraction of the smallest distance between homes or goals, if that is below `DISTANCE_M`."""
 LIMITS = MotionLimits()
 CLEARANCE_M = 0.5
 SIGHT_M = 1.5
@@ -59,36 +59,31 @@ _STILL_S = 1.0
 _CLOSE_M = 0.005
 _SLOW_M_S = 0.02
 _FAR_M = 0.05
-"""The largest distance from its setpoint at which a drone has completed a leg."""
+"""A drone within this distance of its final setpoint has completed the leg."""
 DRONES_MAX = 1_000
-"""The maximum number of drones: planning considers all pairs."""
+"""The maximum number of drones, since planning considers all pairs."""
 COORDINATE_MAX_M = 1e8
-"""The largest coordinate: floating point has a resolution of a tenth of a micrometre there."""
+"""The largest coordinate. The resolution of floating-point numbers is a tenth of a micrometre there."""
 _NEAR_ORIGIN_M = 1_000.0
-"""Flights whose homes are nearer to the origin are not moved."""
+"""Flights are moved to the origin only if their homes are farther away than this."""
 PATH_MAX_M = 2_000.0
 """The longest path of a drone in a leg: planning uses steps of a twentieth of a second, or less."""
 _SAMPLES_MAX = 3_000_000
-"""The maximum number of samples of all drones, of some 300 bytes each: 1,000 drones for 100 s, or 100 for 1,000 s."""
+"""The maximum number of samples, of about 300 bytes each: enough for 1,000 drones for 100 s, or 100 for 1,000 s."""
 
 
 class Flight:
-    """Drones that stand at their homes, and fly legs one after the other.
+    """Simulates drones that start from their homes and fly one leg after another.
 
-    If homes are far away, the simulation uses an origin near them, where floating point is finer.
+    If the homes are far away, the simulation uses an origin near them, where floating-point numbers are more precise.
 
     Args:
         names: The drones' names.
-        homes: Their places in the beginning, in metres: (N, 3).
+        homes: The drones' initial places (N, 3), in metres.
         conditions: Distance, wind, failures and obstacles.
-        progress: Called with a description of the progress at every logged sample.
-        rises: Whether drones leave the ground, and land, vertically where possible.
-        ground: The height of the ground. None: the lowest home stands on it.
-        walls: Walls that drones fly around, at the speed for which the team was made.
 
-    Raises:
-        ValueError: There are no drones, or too many; the conditions name others; or homes are
-            nearer to each other than the distance, or in a wall.
+
+
     """
 
     def __init__(
@@ -136,18 +131,18 @@ class Flight:
     def fly(
         self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False, blocks: Sequence[Point] = ()
     ) -> tuple[Report, ...]:
-        """Fly one leg from the present places, and return the reports of the drones.
+        """Fly one leg from the present places, and return the drones' reports.
 
         Args:
             title: The leg's title in the log.
             goals: Goals by the drones' numbers. A drone without a goal stays in place.
-            stop_on_report: Whether all drones stop and hover at the first report. The goals are then not reached.
-                Without it, nothing is returned.
-            blocks: Points that routes avoid, except those too near to a start or an end.
+            stop_on_report: Whether all drones stop and hover at the first report, before they reach their goals. If
+                False, no reports are returned.
+            blocks: Points that routes avoid, except points too near to a start or a goal.
 
         Raises:
             ValueError: Two goals are nearer to each other than the distance, a drone's path is too long, or obstacles
-                leave no route.
+                block all routes.
         """
         began = time.perf_counter()
         if blocks and self._downwash > 1:
@@ -165,7 +160,7 @@ class Flight:
         return reports
 
     def log(self) -> FlightLog:
-        """Return the log of the flight so far, and of a second of hovering."""
+        """Let the drones hover for `_STILL_S`, and return the log of the flight so far."""
         began = time.perf_counter()
         if not self._hovers:
             with np.errstate(all="ignore"):
@@ -219,7 +214,7 @@ class Flight:
         return leg_goals
 
     def _fly_leg(self, leg_goals: LegGoals, *, stop_on_report: bool) -> tuple[Report, ...]:
-        """Plan and fly; without `stop_on_report`, repeat as long as obstacles are found."""
+        """Plan and fly a leg; without `stop_on_report`, plan again whenever an obstacle is found."""
         simulation = self._simulation
         reported = len(simulation.failures)
         preferred = leg_goals.places.copy()
@@ -259,9 +254,9 @@ class Flight:
         return trajectory, encounters(trajectory, unknown, keep)
 
     def _hazards(self, known: Mask, keep: float, ends: Array) -> Hazards:
-        """Return the hazards for routes: fallen drones at the distance, known obstacles and blocks at `keep`.
+        """Return the hazards for routes: fallen drones with the usual distance, known obstacles and blocks with `keep`.
 
-        Blocks nearer than `keep` to one of `ends` (K, 3) are not avoided: goals do not move away from them.
+        Blocks nearer than `keep` to one of `ends` (K, 3) are left out, since goals are not moved away from blocks.
         """
         fallen = self._simulation.places[self._simulation.failed & ~self._simulation.falling]
         blocks = self._blocks[nearest_distances(self._blocks, ends) >= keep]
@@ -297,7 +292,7 @@ class Flight:
             raise ValueError(self._refusal(refused, who)) from refused
 
     def _refusal(self, refused: TooCloseError | NoRouteError, who: npt.NDArray[np.intp]) -> str:
-        """Return the error text of `refused`, with the drones' names. The planner has only their places in `who`."""
+        """Return the error text of `refused`, with the drones' names. The planner only has their indices in `who`."""
         numbers = refused.drones if isinstance(refused, NoRouteError) else (refused.first, refused.second)
         named = [self.names[who[number]] if number < len(who) else "an obstacle" for number in numbers]
         if isinstance(refused, NoRouteError) and refused.indoors:
@@ -314,7 +309,7 @@ class Flight:
     ) -> list[BlockedReport]:
         """Fly the trajectory to its end, or until it has stopped because of an obstacle.
 
-        Unless `reported` is None, it also stops once there are more failures than that.
+        Unless `reported` is None, also stop once there are more than `reported` failures.
         """
         simulation = self._simulation
         reports: list[BlockedReport] = []
@@ -365,7 +360,7 @@ class Flight:
 def fly(
     mission: Mission, conditions: FlightConditions | None = None, progress: Callable[[str], None] | None = None
 ) -> FlightLog:
-    """Fly all legs of `mission`, one after the other, and return the log.
+    """Fly all legs of `mission` and return the log.
 
     Args:
         mission: The drones and the legs.
@@ -373,7 +368,7 @@ def fly(
         progress: See `Flight`.
 
     Raises:
-        ValueError: There are no drones, the conditions do not fit the mission, or its places are too near.
+        ValueError: There are no drones, the conditions do not fit the mission, or places are too near to each other.
     """
     conditions = conditions or FlightConditions()
     names = [drone.name for drone in mission.drones]
@@ -393,7 +388,7 @@ def fly(
 
 
 def _distance(places: Sequence[Array], downwash: float) -> float:
-    """Return the default distance: `DISTANCE_M`, or less where two points of the same (K, 3) array are nearer."""
+    """Return the default distance: `DISTANCE_M`, or less if two points in the same (K, 3) array are nearer."""
     nearest = (nearest_two(squashed(points, downwash)) for points in places)
     return max(DISTANCE_MIN_M, min(DISTANCE_M, *(_SHARE * apart for apart in nearest)))
 
@@ -408,9 +403,9 @@ def check_homes(names: Sequence[str], homes: Array) -> None:
 
 
 def check_near(names: Sequence[str], places: npt.ArrayLike) -> None:
-    """Raise `ValueError` for the first of `places` (K, 3) that is too far away, or not finite."""
+    """Raise `ValueError` for the first of `places` (K, 3) that is too far away or not finite."""
     places = np.array(places, dtype=np.float64).reshape(-1, 3)
-    far = np.flatnonzero(~(np.abs(places) <= COORDINATE_MAX_M).all(axis=1))  # true of nan as well
+    far = np.flatnonzero(~(np.abs(places) <= COORDINATE_MAX_M).all(axis=1))  # also true for nan
     if len(far):
         place = ", ".join(f"{part:g}" for part in places[far[0]])
         raise ValueError(
@@ -419,7 +414,7 @@ def check_near(names: Sequence[str], places: npt.ArrayLike) -> None:
 
 
 def origin_of(homes: Array) -> Array:
-    """Return the origin (3,) of the simulation: 0, or the rounded mean of `homes` if these are far away."""
+    """Return the origin (3,) of the simulation: 0, or the rounded mean of `homes` if the homes are far away."""
     return np.zeros(3) if np.abs(homes).max() <= _NEAR_ORIGIN_M else np.asarray(np.round(homes.mean(axis=0)))
 
 

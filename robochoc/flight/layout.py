@@ -1,6 +1,6 @@
 """The layout of a mission: homes, goals and landing points of drones, in a box of rows, columns and levels.
 
-Lengths are in cells. A drone is a little narrower than a cell. An axis maps cells to values of the problem.
+Lengths are in cells. A drone is a little narrower than a cell. An axis maps values of the problem to cells.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from robochoc.maps.ground_map import GroundMap
 Point = tuple[float, float, float]
 
 _GAP = 2
-"""Cells from the box to the first line of drones beside it."""
+"""The distance from the box to the first line of drones beside it, in cells."""
 _TALL = 6
-"""The largest number of levels of an unscaled box, even for a single drone."""
+"""The maximum number of levels in an unscaled box, even for a single drone."""
 _LEVELS = range(4, 13)
 """The possible numbers of levels in a box with scaled levels."""
 _TICKS = 15
 """The maximum number of labels on an axis."""
 _LEAST_POWER = -3
-"""The exponent of ten of the smallest step between labels in metres."""
+"""The smallest step between labels in metres, as a power of ten."""
 _FAR = 1000
-"""Axes with a larger first value are moved to begin at 1: a browser draws in single precision."""
+"""Axes with a larger first value are moved to begin at 1, since browsers draw in single precision."""
 _PLACE = ("x", "y", "z")
 _TOO_CLOSE = 0.5
-"""Places nearer to each other count as the same place."""
+"""Places nearer to each other than this count as the same place."""
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 @dataclass(frozen=True)
 class BoxAxis:
-    """One side of the box: values `first` to `last` are spread evenly over cells `low` to `high`.
+    """An axis of the box, which spreads the values `first` to `last` evenly over the cells `low` to `high`.
 
-    On a map with a length of a unit, `unit_m`, the axis is labelled in metres of the map's frame.
+    On a map whose units have a length, `unit_m`, the axis is labelled in metres of the map's frame.
     """
 
     name: str
@@ -51,7 +51,7 @@ class BoxAxis:
 
     @classmethod
     def spanning(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> BoxAxis:
-        """Return the axis for `values`: with a cell for each of up to `most` numbers, else with `scaled` cells."""
+        """Return an axis for `values`: one cell per number if there are at most `most`, else `scaled` cells."""
         found = [*values] or [1]
         first, last = min(found), max(found)
         if last - first < most:
@@ -93,16 +93,16 @@ class BoxAxis:
 
     @property
     def title(self) -> str:
-        """The name, with the unit of the labels if they have one."""
+        """The name of the axis, with the unit of its labels if they have one."""
         return self.name if self.unit_m is None else f"{self.name} (m)"
 
     def text(self, value: Fraction | float) -> str:
-        """Return a value as text: in metres, to the millimetre, if units have a length."""
+        """Return a value as text, in metres to the millimetre if units have a length."""
         return str(value) if self.unit_m is None else f"{round(float(value) * self.unit_m, 3) + 0.0:.10g}"
 
     @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Positions and texts of the labels: round numbers, at most `_TICKS`."""
+        """The positions and texts of at most `_TICKS` labels with round numbers."""
         unit = Fraction(1) if self.unit_m is None else Fraction(str(self.unit_m))
         span = (self.last - self.first) * unit
         if unit != 1 and not span:  # a single level may not be at a round number
@@ -116,7 +116,7 @@ class BoxAxis:
 
 @dataclass(frozen=True)
 class MissionLayout:
-    """The box, and the home of each craft: the point on the ground on which it stands in the beginning."""
+    """The box, and the home of each craft: its initial place on the ground."""
 
     axes: tuple[BoxAxis, BoxAxis, BoxAxis]
     homes: tuple[Point, ...]
@@ -127,12 +127,12 @@ class MissionLayout:
         return self.axes[2].ground
 
     def in_metres(self, unit_m: float) -> MissionLayout:
-        """Return the same layout, with axes in metres: `unit_m` is the length of a unit of `x`, `y` and `z`."""
+        """Return the same layout with axes in metres. `unit_m` is the length of a unit on the axes `x`, `y` and `z`."""
         rows, columns, levels = (replace(axis, unit_m=unit_m if axis.name in _PLACE else None) for axis in self.axes)
         return replace(self, axes=(rows, columns, levels))
 
     def places(self, crafts: Sequence[Craft]) -> list[Point | None]:
-        """Return the goal of each craft, in the order of `homes`; None without a level. All goals differ."""
+        """Return the goals of the crafts, all different, in the order of `homes`; None for a craft without a level."""
         taken = _OccupiedPoints()
         around: dict[Point, Iterator[Point]] = {}
         found: list[Point | None] = []
@@ -157,10 +157,10 @@ class MissionLayout:
 
 
 def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: GroundMap | None = None) -> MissionLayout:
-    """Return the layout for `crafts`. Its axes also include `others`: places of crafts at other times.
+    """Return the layout for `crafts`. The axes also include the places of `others`: crafts at other times.
 
-    With a map of the `ground`, the axes include the whole map, and robots with one craft have their homes at their
-    places on it; on a three-dimensional map, these are in the air.
+    With a map of the `ground`, the axes include the whole map, and the home of a robot with one craft is the robot's
+    place on the map. On a three-dimensional map, homes are in the air.
     """
     others = [*others]
     cells = _cells(crafts)
@@ -197,7 +197,7 @@ def _cells(crafts: Sequence[Craft]) -> list[Cell]:
 
 
 def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap) -> list[Cell]:
-    """Return the cells of crafts on the map; the given cell if their robot has several crafts, or is not on the map."""
+    """Return the crafts' cells on the map; the given cell if a robot has several crafts, or is not on the map."""
     count = Counter(craft.robot for craft in crafts)
     return [
         ground.x_and_y(*ground.starts[craft.robot])
@@ -208,7 +208,7 @@ def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap)
 
 
 def _exact_places(crafts: Sequence[Craft], ground: GroundMap) -> dict[int, tuple[float, float]]:
-    """Return the exact places of crafts, in units of topics, by their numbers."""
+    """Return the exact places of crafts, in units of topics, by craft number."""
     count = Counter(craft.robot for craft in crafts)
     found = {}
     for number, craft in enumerate(crafts):
@@ -219,7 +219,7 @@ def _exact_places(crafts: Sequence[Craft], ground: GroundMap) -> dict[int, tuple
 
 
 def _height(craft: Craft, ground: GroundMap | None, levels: BoxAxis, *, is_exact: bool) -> float:
-    """Return the height of a craft, in cells: on the ground, or as given by a three-dimensional map."""
+    """Return the height of a craft, in cells: the height of the ground, or that given by a three-dimensional map."""
     volume = ground.volume if ground else None
     level = volume.starts.get(craft.robot) if volume else None
     if ground is None or volume is None or level is None:
@@ -258,7 +258,7 @@ def _lines(x: float, across: int, y: int, step: int) -> Iterator[tuple[float, fl
 
 
 class _OccupiedPoints:
-    """Occupied points, sorted into boxes, so that a search compares few points."""
+    """Finds occupied points near a point. Points are sorted into boxes, so that a search compares few of them."""
 
     def __init__(self) -> None:
         self._boxes: dict[tuple[int, ...], list[Point]] = {}
@@ -278,7 +278,7 @@ class _OccupiedPoints:
 
 
 def _spiral(point: Point) -> Iterator[Point]:
-    """Yield the point itself, then points around it in a spiral, like the seeds of a sunflower."""
+    """Yield `point`, then points around it on a spiral, like the seeds of a sunflower."""
     x, y, z = point
     for number in count():
         turn, radius = number * _GOLDEN_ANGLE, _TOO_CLOSE * math.sqrt(number)

@@ -1,4 +1,4 @@
-"""The flight log: a flight as data, for pictures, recordings and reports."""
+"""The flight log: the data of a flight, for pictures, recordings and reports."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SAMPLE_RATE_HZ = 30
 
 @dataclass(frozen=True)
 class ClosestApproach:
-    """The smallest distance between two drones, by their numbers, and its time."""
+    """The smallest distance between two drones, by their numbers, and the time of the approach."""
 
     distance_m: float
     first: int
@@ -26,7 +26,7 @@ class ClosestApproach:
 
 @dataclass(frozen=True)
 class NearestWall:
-    """The smallest distance of a drone, by its number, from a wall, its time, and the distance to keep."""
+    """The smallest distance of a drone (by number) from a wall, the time of the approach, and the distance to keep."""
 
     distance_m: float
     drone: int
@@ -45,7 +45,7 @@ class LegTimes:
 
 @dataclass(frozen=True)
 class FlightEvent:
-    """An event of a drone, by its number: a motor stops, an obstacle is seen, the drone hits the ground."""
+    """An event of a drone (by number): a motor stops, an obstacle is seen, or the drone hits the ground."""
 
     at_s: float
     drone: int
@@ -58,21 +58,21 @@ class FlightLog:
 
     Attributes:
         names: The drones' names.
-        times: (T,).
-        positions: (T, N, 3), of the drones' centres.
-        attitudes: (T, N, 4), unit quaternions x, y, z, w from the drone's frame to the world's.
+        times: (T,): the times of the samples.
+        positions: (T, N, 3): the positions of the drones' centres.
+        attitudes: (T, N, 4): unit quaternions x, y, z, w from the drone's frame to the world frame.
         legs: The flown legs.
         events: The events of drones.
-        errors_m: (N,), each drone's distance from its last goal at the end; 0 without a goal, nan if it has fallen.
+        errors_m: (N,): each drone's final distance from its last goal; 0 without a goal, nan if it has fallen.
         nearest: The closest approach of two drones, in the air or on the ground, at any step of the simulation.
-        nearest_fallen: The closest approach of two drones at least one of which has fallen, or falls.
+        nearest_fallen: The closest approach of two drones, at least one of which is falling or has fallen.
         distance: The distance to keep.
         obstacles: All obstacles.
-        wall_s: The duration of simulation and planning.
+        wall_s: The computation time of simulation and planning.
         seen_s: The time at which each obstacle was first seen; 0 for an obstacle known to the planner.
         downwash: The number by which heights are divided in `nearest` and `distance`.
         nearest_wall: The closest approach to a wall, over all samples of drones that have not fallen; None without
-            walls, or if none was near.
+            walls, or if no drone came near to one.
     """
 
     names: tuple[str, ...]

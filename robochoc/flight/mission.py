@@ -1,8 +1,8 @@
 """The mission: the goals of a team's drones, epoch by epoch, derived from the team's decisions.
 
-The paper's drones stand on the ground in the beginning (Figure 5), and are at the places of the solution in the end
-(Figure 6). In between, an epoch may have sent them elsewhere. Lengths are in metres, in a frame whose z axis points up.
-One unit of a topic's coordinates is `scale` metres.
+In the paper, drones stand on the ground at first (Figure 5), and are at the places of the solution in the end (Figure
+6). Epochs in between may send them elsewhere. Lengths are in metres, in a frame whose z axis points up. One unit of a
+topic's coordinates is `scale` metres.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ _Array = npt.NDArray[np.float64]
 
 
 UNIT_M = 1.0
-"""The default length of a unit of coordinates: drones are a little narrower."""
+"""The default length of a unit of coordinates, a little more than the width of a drone."""
 VAST_M = 40.0
 """The default maximum length of a box."""
 _DENSE_M = 0.025
-"""The minimum length of a unit, unless the box would be longer than `_FLOWN_M`: neighbours need some space."""
+"""The minimum length of a unit, since neighbours need some space; less if the box would be longer than `_FLOWN_M`."""
 _FLOWN_M = 1_000.0
 _FAR_BELOW = 40
-"""Possible levels further below all decided levels are not shown."""
+"""Possible levels more than this far below all decided levels are not shown."""
 _BLOCK_HIGH = 0.6
-"""The height of a blocked cell's point above the ground, in cells: a drone at the lowest level has to fly over it."""
+"""The height of a blocked cell's point above the ground, in cells. Drones at the lowest level must climb over it."""
 
 
 @dataclass(frozen=True)
 class Drone:
-    """A drone of a mission. It stands at `home` in the beginning. Drones of a `group` (a row) have the same colour."""
+    """A drone of a mission, which starts from its `home`. Drones of the same `group` (a row) have the same colour."""
 
     name: str
     robot: str
-    """The robot that decides about it; empty where only a variable is known."""
+    """The robot that decides about the drone; empty if only a variable is known."""
     topic: Topic | None
     """The topic of its waypoints."""
     home: Point
@@ -61,33 +61,33 @@ class Goal:
 
 @dataclass(frozen=True)
 class Leg:
-    """The goals of the drones in an epoch, by drone number. A drone without a goal stays in place."""
+    """The drones' goals in an epoch, by drone number. Drones without a goal stay in place."""
 
     opened_by: str
     verdict: Verdict
     goals: Mapping[int, Goal]
     cost: Cost | None = field(default=None, compare=False)
-    """The cost of the decision, which has no effect on drones. None: not known, or no cost."""
+    """The cost of the decision, which has no effect on the drones. None: unknown, or no cost."""
 
 
 @dataclass(frozen=True)
 class MissionBlock:
-    """A blocked cell of the map: from leg `leg` on, routes keep their distance from the point `at`."""
+    """A blocked cell of the map. From leg `leg` on, routes keep their distance from the point `at`."""
 
     at: Point
     leg: int = 0
     is_cube: bool = False
-    """True for a cell of a three-dimensional map, with its middle at `at`. Routes avoid only its voxels (`walls`)."""
+    """True for a cell of a three-dimensional map with the centre `at`. Routes avoid only the map's voxels (`walls`)."""
     sides: int = ALL_SIDES
     """The visible sides of a cube, as in `Volume.sides`."""
 
 
 @dataclass(frozen=True)
 class Mission:
-    """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places.
+    """All legs of a run, and the drones that fly them. `axes` are the axes of the box around all places.
 
     With a map of the ground, drones first rise vertically (`rises`), and avoid `blocks` or `walls`. With a
-    three-dimensional map (`has_volume`), they are in the air in the beginning.
+    three-dimensional map (`has_volume`), drones start in the air.
     """
 
     team: str
@@ -112,10 +112,10 @@ class MissionBuilder:
     Args:
         robots: All robots that ever take part, including those that join later.
         first: The first assignment.
-        names: Names of variables and of robots, if nothing else is known.
-        others: Crafts at other times, which the box also includes.
-        leaving: The number of drones that will leave; None: any may.
-        scale: The length of a unit, in metres; by default the map's scale, or `UNIT_M`, or less if the box would be too
+        names: The names of variables and robots, if nothing else is known.
+        others: Crafts at other times, which are also inside the box.
+        leaving: The number of drones that will leave. None: all drones may leave.
+        scale: The length of a unit, in metres. Default: the map's scale, or `UNIT_M`, or less if the box would be too
             large.
         ground: A map of the ground. Robots without a waypoint in their files then stay in place. If the map has walls,
             withdrawn drones return to their homes.
@@ -191,14 +191,14 @@ class MissionBuilder:
 
     @property
     def ground(self) -> float | None:
-        """The height of the ground on a three-dimensional map, where drones are in the air in the beginning."""
+        """The height of the ground on a three-dimensional map, where drones start in the air; None on other maps."""
         levels = self.layout.axes[2]
         has_volume = self._ground is not None and self._ground.volume is not None
         return levels.value(levels.ground) * self.scale if has_volume else None
 
     @property
     def rises(self) -> bool:
-        """Whether drones leave the ground vertically, since their places are known from a map."""
+        """Whether drones take off vertically, since their places are known from a map."""
         return self._ground is not None
 
     def _blocks(self) -> Iterator[MissionBlock]:
@@ -257,7 +257,7 @@ def mission_of(
 
     Args:
         outcome: The outcome of a run.
-        team: The team as its files have it, before its scenario. Without it, only names are known.
+        team: The team as defined in its files, before its scenario. Without a team, only names are known.
         scale: The length of a unit, in metres; see `MissionBuilder`.
         ground: A map of the ground, if there is one.
 
@@ -287,13 +287,13 @@ def mission_of(
 
 
 def all_robots(team: Team) -> list[Robot]:
-    """Return all robots that ever take part: those of the team, and those added by its scenario."""
+    """Return all robots that ever take part: the robots in the team, and those added by its scenario."""
     added = [change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent)]
     return [*{robot.name: robot for robot in (*team.robots, *added)}.values()]
 
 
 def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
-    """Return the lowest possible craft, unless it is far below all `decided`. It gives all runs the same ground."""
+    """Return the lowest possible craft, unless it is far below all `decided`, so that all runs have the same ground."""
     possible = [craft for robot in robots for craft in possible_crafts(robot) if craft.level is not None]
     if not possible:
         return []
@@ -303,13 +303,13 @@ def _lowest(robots: Iterable[Robot], decided: Iterable[Craft]) -> list[Craft]:
 
 
 def _leaving(epochs: Sequence[EpochOutcome], outcome: Outcome) -> int:
-    """Return an estimate of the number of drones that leave before the end: a robot may have several."""
+    """Return an estimate of the number of drones that leave before the end; a robot may have several drones."""
     stay = {*epochs[-1].robots} - {*outcome.withdrawn}
     return len({*outcome.withdrawn, *(name for epoch in epochs for name in epoch.robots)} - stay)
 
 
 def _owner(craft: Craft) -> str:
-    """Return the name of a craft's robot, or that of the craft if its robot is not known."""
+    """Return the name of a craft's robot, or the name of the craft if its robot is not known."""
     return craft.robot or craft.name
 
 
@@ -320,12 +320,12 @@ def _scale(axes: Sequence[BoxAxis]) -> float:
 
 
 def in_cells(mission: Mission, metres: _Array) -> _Array:
-    """Return points (..., 3), given in metres, in the cells of the mission's box."""
+    """Convert points (..., 3) from metres to cells of the mission's box."""
     parts = [_cells(axis, metres[..., number] / mission.scale) for number, axis in enumerate(mission.axes)]
     return np.stack(parts, axis=-1)
 
 
 def _cells(axis: BoxAxis, values: _Array) -> _Array:
-    """Return `BoxAxis.at` of many values."""
+    """Return `BoxAxis.at` for an array of values."""
     span = axis.last - axis.first
     return axis.low + (values - axis.first) * ((axis.high - axis.low) / span if span else 1.0)

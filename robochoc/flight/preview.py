@@ -1,4 +1,4 @@
-"""A preview flight: a mission flown in calm air, for a picture. Missions that would take minutes are refused."""
+"""Preview flights: missions flown in calm air, for pictures. Missions that would take minutes are rejected."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission, in_cells
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
-"""The errors of an impossible flight: places too close to each other, no route between them, numbers out of range.
+"""The errors of an impossible flight: places too close to each other, no routes, or numbers out of range.
 The mission can still be shown."""
 _DRONES_MAX = 500
-"""The largest number of drones: planning routes for more takes minutes."""
+"""The maximum number of drones, since planning routes for more drones takes minutes."""
 _FLIGHTS_MAX = 2_000
-"""The largest product of drones and epochs: more take minutes."""
+"""The maximum product of the numbers of drones and epochs; larger flights take minutes."""
 _LEGS_MAX = 60
-"""The largest number of legs: each takes a fifth of a second, even for few drones."""
+"""The maximum number of legs, each of which takes a fifth of a second even for few drones."""
 _CELL_MIN_M = 0.25
 """The smallest cell into which a drone fits."""
 _CELL_MAX_M = 4.0
-"""The largest cell: in larger cells drones would fly for minutes."""
+"""The largest cell; with larger cells, drones would fly for minutes."""
 _OFFSET_MAX_M = 1e6
 """Missions with places further from the origin are moved near the origin."""
 
@@ -33,7 +33,7 @@ _OFFSET_MAX_M = 1e6
 class Preview:
     """The flown mission and its log, or the reason why it was not flown.
 
-    `mission` is not to scale if cells of the given mission are smaller than drones, or very large.
+    `mission` is not to scale if cells in the given mission are smaller than drones, or very large.
     """
 
     mission: Mission
@@ -66,7 +66,7 @@ def _counted(number: int, noun: str) -> str:
 
 
 def _with_flyable_cells(mission: Mission) -> Mission:
-    """Return `mission`, with cells of a metre if its cells are smaller than drones, or very large."""
+    """Return `mission`; if its cells are smaller than drones, or very large, with cells of one metre."""
     cells_m = [_cell_m(axis) * mission.scale for axis in mission.axes]
     ends_m = [abs(end) * mission.scale for axis in mission.axes for end in (axis.first, axis.last)]
     if min(cells_m) >= _CELL_MIN_M and max(cells_m) <= _CELL_MAX_M and max(ends_m) <= _OFFSET_MAX_M:

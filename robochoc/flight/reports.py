@@ -1,4 +1,4 @@
-"""Robots' reports on their situation: the paper's "read the robot situation" (Section 4.2), as data.
+"""Robots' reports on their situation: the data for "read the robot situation" in the paper (Section 4.2).
 
 Places are in metres, in the mission's frame. `at_s` is the time of the report, in seconds since a common beginning of
 all reports of a source.
@@ -13,7 +13,7 @@ from robochoc.flight.layout import Point
 
 @dataclass(frozen=True)
 class BlockedReport:
-    """An obstacle is at `place`: no drone can be there."""
+    """There is an obstacle at `place`: no drone can be there."""
 
     drone: str
     place: Point
@@ -31,7 +31,7 @@ class ClearedReport:
 
 @dataclass(frozen=True)
 class OutOfOrderReport:
-    """The drone cannot fly any more."""
+    """The drone can no longer fly."""
 
     drone: str
     why: str = ""

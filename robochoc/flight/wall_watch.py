@@ -1,8 +1,8 @@
 """Walls during a flight: the floor plan for each leg, and the closest approach of drones to walls.
 
-Drones keep the radius for which the team was made between their centres and everything that is not free. Places of
-teams that were not generated, or by an earlier version, and places between voxels may be a little nearer to a wall:
-then drones keep the distance of these places.
+Drones keep the radius for which the team was generated between their centres and everything that is not free. If the
+team was not generated, or by an earlier version, or if its places are between voxels, places may be a little nearer to
+a wall; drones then keep the distance of these places.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from robochoc.maps.routes.wall_plan import WallPlan, wall_plan_of
 from robochoc.maps.walls import Walls
 
 _SPARES_M = (0.06, 0.04, 0.02, 0.0)
-"""Margins beyond the radius; routes use the largest margin that leaves a route for all."""
+"""Margins beyond the radius. The largest margin with which all drones have routes is used."""
 _ERROR_M = 0.04
 """The allowance for tracking errors: 3 cm in sharp turns in calm air."""
 _SHARE = 0.999
-"""The used share of the distance of a place from walls: rounding must not make a route impossible."""
+"""The fraction of a place's distance from walls that routes keep, so that rounding excludes no route."""
 _CLOSE_M = 1e-6
 _LEAST_S = 1.0
-"""The least time from one corner to the next."""
+"""The minimum time from one corner to the next."""
 _LEAST_M = 0.03
-"""The least distance of places from a wall."""
+"""The minimum distance of places from a wall."""
 _NEAR_M = 0.3
-"""Distances from walls larger than the radius and this are not reported."""
+"""Distances from walls larger than the sum of the radius and this value are not reported."""
 
 
 class WallWatch:
-    """Measures the distance of drones, called `names`, from walls. Each sample is checked once."""
+    """Measures the distances of the drones `names` from walls. Each sample is checked once."""
 
     def __init__(self, walls: Walls, names: Sequence[str]) -> None:
         self._names = names
@@ -49,11 +49,11 @@ class WallWatch:
         self._nearest: tuple[float, int, int] | None = None
 
     def limits(self, usual: MotionLimits) -> MotionLimits:
-        """Return the limits for motion with the mean speed of the walls' robots, at most the `usual` limits."""
+        """Return limits for motion with the mean speed of the robots for these walls, at most the `usual` limits."""
         return replace(usual, speed=min(usual.speed, PEAK * self._speed), least_s=_LEAST_S)
 
     def floor_plan(self, places: Array) -> WallPlan:
-        """Return the plan for routes between `places` (K, 3): a multiple of the number of drones, in their order.
+        """Return the plan for routes between `places` (K, 3); K is a multiple of the number of drones, in their order.
 
         Raises:
             ValueError: A place is in a wall, or too near to one.
@@ -70,19 +70,19 @@ class WallWatch:
         return self._keeping(wish) if leave >= wish else self._leaving(leave)
 
     def floor(self, place: Array) -> float | None:
-        """Return the height of the floor below a place; None where only the ground is known, or in a wall."""
+        """Return the height of the floor below a place; None if only the ground is known, or the place is in a wall."""
         return self._plan.floor(place) if isinstance(self._plan, VoxelPlan) else None
 
     def with_routes(self, plan: WallPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> WallPlan:
         """Return `plan`, or a plan with a smaller distance from walls if only that has routes for the drones `who`.
 
         Raises:
-            ValueError: Walls leave no route for one of them from its start to its goal, which are given for all (N, 3).
+            ValueError: One of these drones has no route from its start to its goal, which are given for all (N, 3).
         """
         without = [number for number in who.tolist() if plan.route(starts[number], goals[number]) is None]
         if not without:
             return plan
-        if plan.keep > _SHARE * self._radius:  # a door may be just as wide as the radius requires
+        if plan.keep > _SHARE * self._radius:  # doors may be only just wide enough for the radius
             wider = (self._radius + spare for spare in _SPARES_M)
             less = next((keep for keep in wider if keep < plan.keep - _CLOSE_M), self._radius)
             return self.with_routes(self._leaving(less), who, starts, goals)
@@ -95,7 +95,7 @@ class WallWatch:
         )
 
     def nearest(self, positions: Array, failures: Sequence[tuple[int, str, float]]) -> NearestWall | None:
-        """Return the closest approach in all `positions` (T, N, 3) so far, except those of failed drones."""
+        """Return the closest approach in all `positions` (T, N, 3) so far, without the positions of failed drones."""
         new = positions[self._checked :]
         if len(new):
             counts = np.ones(new.shape[:2], dtype=np.bool_)

@@ -1,12 +1,12 @@
 """Moves between walls, floors and ceilings: paths in space, and an order in which drones get past each other.
 
-There is no sky above all drones here. A drone moves to its goal when the goal is free and a path leads there that is
-clear of all resting drones. Drones whose goals block fewer others' paths move first. If none can move, one drone is let
-through: all drones on its path move to points beside it, preferably on nobody's path, and later to their goals. If the
-drone does not get through, these moves are undone.
+Indoors there is no sky above all drones. A drone moves to its goal when the goal is free and some path to it is clear
+of all resting drones. Drones whose goals block fewer paths of others move first. If no drone can move, one drone is let
+through: all drones on its path move to points beside the path, preferably not on any other path, and later to their
+goals. If the drone does not get through, these moves are undone.
 
-The method is not complete: drones in a corridor may be in an order in which they cannot leave it. Then other orders of
-precedence are tried, and finally `NoRouteError` is raised.
+The method is incomplete: drones may be lined up in a corridor in an order in which they cannot leave it. Then other
+orders of precedence are tried, and finally `NoRouteError` is raised.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from robochoc.maps.routes.voxel_plan import Resting, VoxelPlan
 _ORDERS = 6
 """The number of orders of precedence that are tried."""
 _AWAY_M = (3.0, 12.0, math.inf)
-"""The search distances for a point at which a drone blocks nobody, one after the other."""
+"""The successive search radii for a point at which a drone blocks no other drone."""
 _SPOTS = 2_000
-"""The number of such points from which the best is chosen."""
+"""The maximum number of candidates for this point."""
 
 
 @dataclass(frozen=True)
 class IndoorSpace(Spacing):
-    """The space between the walls of a `plan`. Heights of points, but not of the plan, are divided by `downwash`."""
+    """Finds paths between the walls of a `plan`. Heights of points, but not of the plan, are divided by `downwash`."""
 
     plan: VoxelPlan
     downwash: float = 1.0
 
     def path(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Return a short path that keeps its distance from walls and from `points`; None if none is found."""
+        """Return a short path that keeps the distance from walls and from `points`; None if no path is found."""
         found = self.plan.route_among(self._unsquashed(start), self._unsquashed(goal), self._resting(points))
         if found is None:
             return None
@@ -47,12 +47,12 @@ class IndoorSpace(Spacing):
         return path if self.is_clear(path, points) else None
 
     def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
-        """Yield no alternative paths: they are not searched for in this space."""
+        """Yield nothing: indoors, alternative paths are not searched for."""
         del start, goal, points
         yield from ()
 
     def spots(self, start: Array, points: Array, most: float) -> Array:
-        """Return points (K, 3) that can be reached from `start` clear of `points`, the nearest first."""
+        """Return points (K, 3) that can be reached from `start` without coming too near to `points`, nearest first."""
         found = self.plan.reached(self._unsquashed(start), self._resting(points), most)
         return squashed(found, self.downwash)
 
@@ -76,7 +76,7 @@ def moves_indoors(starts: Array, goals: Array, standing: Array, space: IndoorSpa
 
 
 class _IndoorMoves(MoveOrder[IndoorSpace]):
-    """Moves in one order of precedence: of drones with equal ranks, the one with the least of `turns` moves first."""
+    """Finds moves for one order of precedence: of equal drones, the drone with the lowest turn moves first."""
 
     def __init__(
         self,
@@ -120,12 +120,12 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return self._routes[key]
 
     def _is_on_path(self, drone: int, points: Array) -> Flags:
-        """Return which of `points` (P, 3) are on the path of a drone."""
+        """Return which of `points` (P, 3) are too near to the path of a drone."""
         way = self._path(drone)
         return np.asarray(self.space.near(way[:-1], way[1:], points).any(axis=0))
 
     def _by_precedence(self) -> list[int]:
-        """Return the drones not at their goals, ordered by delay, and by the number of others that they would block."""
+        """Return the drones not at their goals, by delay, then by the number of others that they would block."""
         away = sorted(self.away)
         hinders = np.zeros(self.count)
         for drone in away:
@@ -133,7 +133,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], self._turns[drone]))
 
     def _move_one_to_goal(self) -> bool:
-        """Move a drone to its goal; return whether one moved."""
+        """Move one drone to its goal; return whether a drone moved."""
         ranks = [drone for drone in self._by_precedence() if self.goal_is_free(drone)]
         for drone in ranks:
             if self.space.is_clear(self._path(drone), self.others(drone)):
@@ -148,7 +148,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return path is not None
 
     def _let_one_through(self) -> bool:
-        """Move all drones away from the path of one drone, and then that drone; return whether that was possible."""
+        """Move all drones off the path of one drone, then move this drone; return whether that was possible."""
         self._attempts_left -= 1
         if self._attempts_left < 0:
             return False
@@ -169,7 +169,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return False
 
     def _make_room(self, other: int, drone: int) -> bool:
-        """Move `other` off the path of a drone; return whether the path is clear of it."""
+        """Move `other` off the path of a drone; return whether it no longer blocks the path."""
         if not self._is_on_path(drone, self.rests[other][None])[0]:
             return True
         others = self.others(other)
@@ -184,7 +184,7 @@ class _IndoorMoves(MoveOrder[IndoorSpace]):
         return False
 
     def _best(self, spots: Array, without: set[int]) -> Array:
-        """Return the first of `spots` that is on the fewest paths, and near the fewest goals, of other drones."""
+        """Return the first of the `spots` on the fewest paths, and near the fewest goals, of other drones."""
         rest = [drone for drone in range(self.count) if drone not in without]
         hindered = (norms(spots[:, None] - self.goals[rest][None]) < self.space.distance).sum(axis=1)
         for drone in self.away - without:

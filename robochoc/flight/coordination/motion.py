@@ -1,8 +1,8 @@
-"""Motion of drones along their paths, and the positions of all drones at any time.
+"""The motion of drones along their paths, and the positions of all drones at any time.
 
 Every straight piece of a path begins and ends at rest, in minimum-jerk motion: the polynomial of degree five whose
-velocity and acceleration are zero at both ends (Flash and Hogan, "The coordination of arm movements", 1985). So both
-are continuous over a whole path, and a controller can use them as its feed-forward.
+velocity and acceleration are zero at both ends (Flash and Hogan, "The coordination of arm movements", 1985). So
+velocity and acceleration are continuous over a whole path, and can be the feed-forward of a controller.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 from robochoc.maps.routes.distances import Array, norms, squashed
 
 PEAK = 15 / 8
-"""The greatest speed of minimum-jerk motion over a unit of length in a unit of time, reached half way."""
+"""The peak speed, half way, of minimum-jerk motion over a unit of length in a unit of time."""
 _TOP_ACCELERATION = 10 / math.sqrt(3)
-"""The greatest acceleration of this motion."""
+"""The peak acceleration of this motion."""
 
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2, and the least time from rest to rest.
+    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2, and the minimum time from rest to rest.
 
-    In much less than a second a drone cannot lean to one side and then to the other: it overshoots between consecutive
-    short pieces.
+    The minimum time is needed because a drone cannot tilt to one side and then to the other in much less than a second:
+    it would overshoot between consecutive short pieces.
     """
 
     speed: float = 2.0
@@ -47,7 +47,7 @@ class MotionLimits:
 
 @dataclass(frozen=True)
 class Motion:
-    """Positions, velocities and accelerations of all drones at a time: m, m/s, m/s^2, each (N, 3)."""
+    """The positions, velocities and accelerations of all drones at one time, in m, m/s and m/s^2, each (N, 3)."""
 
     position: Array
     velocity: Array
@@ -55,9 +55,9 @@ class Motion:
 
 
 class Route:
-    """One drone's motion along a path (K + 1, 3), from rest to rest, which begins at time 0.
+    """The motion of a drone along a path (K + 1, 3), from rest to rest, beginning at time 0.
 
-    Heights of the path are divided by `downwash`; `limits` apply to the motion with undivided heights.
+    Heights in the path are divided by `downwash`; `limits` apply to the motion with the original heights.
     """
 
     def __init__(self, drone: int, path: Array, limits: MotionLimits, downwash: float = 1.0) -> None:
@@ -77,7 +77,7 @@ class Route:
         return points
 
     def pieces(self, begins_s: float) -> tuple[Array, Array, Array, Array, Array]:
-        """Return its straight pieces, if it begins at `begins_s`: beginnings, ends, durations, origins, goals."""
+        """Return the straight pieces of a route begun at `begins_s`: start and end times, durations, starts, ends."""
         ends = begins_s + self._ends
         begins = np.concatenate(([begins_s], ends[:-1]))
         return begins, ends, self._durations, self.path[:-1], self.path[1:]
@@ -100,7 +100,7 @@ class _MotionWindow:
 class RoutePlan:
     """The positions of all drones from second 0 to `duration_s`, as planned by `plan_routes`.
 
-    Heights of `starts` and `flights` are divided by `downwash`, but not those of the plan.
+    Heights in `starts` and `flights` are divided by `downwash`; the plan returns the original heights.
     """
 
     def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]], downwash: float = 1.0) -> None:
@@ -117,7 +117,7 @@ class RoutePlan:
         self._window = self._window_at(0.0)
 
     def at(self, s: float) -> Motion:
-        """Return the motion of all drones at second `s`, limited to the time of the plan."""
+        """Return the motion of all drones at second `s`, clamped to the duration of the plan."""
         s = min(max(s, 0.0), self.duration_s)
         window = self._window
         if not window.begins_s <= s < window.ends_s:
@@ -143,7 +143,7 @@ class RoutePlan:
         ends = self._bounds[place] if place < len(self._bounds) else math.inf
         resting = self._starts.copy()
         done = self._ends <= begins
-        # Pieces are sorted by their beginning: the last piece of a drone counts.
+        # Pieces are sorted by start time; for each drone the last one is used.
         resting[self._drones[done]] = self._goals[done]
         now = (self._begins <= begins) & ~done
         origins = self._origins[now]
@@ -163,6 +163,6 @@ _NONE = [np.empty(0), np.empty(0), np.empty(0), np.empty((0, 3)), np.empty((0, 3
 
 
 def _progress(share: Array) -> Array:
-    """Return the share of the length that is flown after a `share` of the time."""
+    """Return the fraction of the length that is flown after a fraction `share` of the time."""
     way: Array = share * share * share * (10 + share * (6 * share - 15))
     return way

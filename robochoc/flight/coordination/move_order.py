@@ -18,7 +18,7 @@ _Space = TypeVar("_Space", bound=Spacing)
 class NoRouteError(RobochocError, ValueError):
     """No order of moves was found in which `drones` reach their goals.
 
-    Either standing points enclose them, or, if `indoors`, drones block each other between walls.
+    Standing points enclose these drones or, if `indoors`, drones block each other between walls.
     """
 
     def __init__(self, drones: Sequence[int], *, indoors: bool = False) -> None:
@@ -36,7 +36,7 @@ class DroneMove:
     drone: int
     path: Array
     points: Array
-    """The places of all drones that rest during the move. Another path has to be clear of them, too."""
+    """The places of all drones that rest during the move. An alternative path must also be clear of these places."""
 
 
 class MoveOrder(Generic[_Space]):
@@ -48,7 +48,7 @@ class MoveOrder(Generic[_Space]):
         self.space = space
         self.count = len(starts)
         self.points = np.vstack((starts, standing))
-        """Positions of drones, and standing points after them."""
+        """The positions of all drones, followed by the standing points."""
         self.rests = self.points[: self.count]
         self.moves: list[DroneMove] = []
 

@@ -1,17 +1,19 @@
 """The order in which drones move, one at a time: each path is clear of all drones that rest during the move.
 
-A drone moves to its goal when the goal is free and a path leads there (`paths.py`). If all remaining drones block each
-other (they swap places, for example), one of them makes room, near its place if possible, else in the sky.
+A drone moves to its goal when the goal is free and there is a path to it (`paths.py`). If all remaining drones block
+each other, for example because they swap places, one of them makes room, near its place if possible, else in the sky.
 
-This always ends: a drone makes room near its place once and in the sky once, and then moves to its goal. If no drone
-can do that, all start again with `_MovesBySky`: every drone, even one that stays, moves up to its own column in the
-sky, and then down to its goal. Each drone that can move up does, so that fewer block others: if this order gets stuck,
-any other order does, too. They move down in the reverse of an order in which they could leave the goals.
+This always ends, since a drone makes room near its place once and in the sky once, and then moves to its goal. If no
+drone can make room, the search starts again with `_MovesBySky`: every drone, even one that could stay, moves up to its
+own column in the sky, and then down to its goal. Drones move up as soon as they can, so that fewer drones block others;
+if this order gets stuck, every other order does, too. They move down in the reverse of an order in which they could
+leave their goals.
 
 So a solution is found if all drones could move up from their starts, and from their goals, one after the other. Without
-standing points they can: the path up from the topmost drone leads away from all others, and drones cross at a height at
-which none rests, a distance above all places and a distance below waiting drones. With standing points the method fails
-only if these, or drones with too little space between them, enclose a drone: then `NoRouteError` is raised.
+standing points this is always possible: the path up from the topmost drone leads away from all others, and drones cross
+at a height without resting drones, a distance above all places and a distance below the waiting drones. With standing
+points the method fails only if a drone is enclosed by these points, or by drones with too little space between them.
+`NoRouteError` is then raised.
 """
 
 from __future__ import annotations
@@ -34,8 +36,8 @@ _PathFinder = Callable[[Array, Array, Array], Array | None]
 def moves_between(starts: Array, goals: Array, standing: Array, space: OutdoorSpace, delays: Array) -> list[DroneMove]:
     """Return a sequence of moves of all drones from `starts` to `goals`. Raises `NoRouteError`.
 
-    `space.sky` is at least two distances above all of them. Drones with less delay, or that block fewer others, move
-    first.
+    `space.sky` is at least two distances above all starts and goals. Drones with shorter delays, or that block fewer
+    others, move first.
     """
     found = _DirectMoves(starts, goals, standing, space, delays)
     if not found.solve():
@@ -52,12 +54,15 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
         """The drones in the sky."""
 
     def move(self, drone: int, path: Array) -> None:
-        """Move a drone; it no longer waits in the sky."""
+        """Move a drone, and record that it no longer waits in the sky."""
         super().move(drone, path)
         self.waiting.discard(drone)
 
     def to_goal(self, drone: int, ways: Iterable[_PathFinder], *, low: bool = True) -> bool:
-        """Move to the goal by a path of one of `ways`, along the ground only if `low`. Return whether it moved."""
+        """Move a drone to its goal, by the first of `ways` with a path; along the ground only if `low`.
+
+        Return whether the drone moved.
+        """
         if not self.goal_is_free(drone):
             return False
         others = self.others(drone)
@@ -69,7 +74,7 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
         return False
 
     def to_sky(self, drone: int) -> bool:
-        """Move up to a waiting place, a distance above the height at which drones cross. Return whether it moved."""
+        """Move a drone up to a waiting place, a distance above the height for crossing; return whether it moved."""
         others = self.others(drone)
         up = self.space.path_up(self.rests[drone], others)
         if up is None:
@@ -88,9 +93,9 @@ class _MovesUnderSky(MoveOrder[OutdoorSpace]):
         return True
 
     def _spot(self, start: Array, up: Array) -> Array | None:
-        """Return the nearest point in the sky that keeps the distance, seen from above, from all waiting drones.
+        """Return the nearest point in the sky at the distance, seen from above, from all waiting drones.
 
-        It can be reached from `up`. None: walls leave no such point.
+        The point can be reached from `up`. None if walls prevent this for all points.
         """
         taken = self.rests[[*self.waiting], :2]
         offsets = _spiral(self.space.distance, math.inf if self.space.floor_plan is None else _RINGS)
@@ -156,11 +161,11 @@ class _DirectMoves(_MovesUnderSky):
             self._lengths[drone] = norms(goal - here)
 
     def _barred(self, starts: Array, goals: Array) -> Flags:
-        """Return which straight paths (K,) are not allowed: they lead along the ground, or through walls."""
+        """Return which straight paths (K,) are forbidden because they lead along the ground or through walls."""
         return self.space.slides(starts, goals) | self.space.is_walled(starts, goals)
 
     def _by_precedence(self) -> list[int]:
-        """Return the drones not at their goals, ordered by delay, number of drones they would block, and distance."""
+        """Return the drones not at their goals, by delay, number of drones that they would block, and distance."""
         away = sorted(self.away)
         hinders = self._blocked_by_goal[away].sum(axis=0)
         return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], -self._lengths[drone], drone))
@@ -176,14 +181,14 @@ class _DirectMoves(_MovesUnderSky):
         return any(self.to_goal(drone, (self.space.by_lane,)) for drone in self._by_precedence())
 
     def _unhindered(self) -> list[int]:
-        """Return the drones whose straight path is blocked only by drones at their goals."""
+        """Return the drones whose straight paths are blocked only by drones that are at their goals."""
         return [drone for drone in self._by_precedence() if not self._blocked[drone, [*self.away]].any()]
 
     def _move_by_detour(self, drones: Iterable[int], *, again: bool = False) -> bool:
         """Move one of `drones` by a detour, and return whether one moved.
 
-        After a search without a path, a drone searches again only when others have moved, as a search takes long. With
-        `again`, when nothing else is possible, all search, and may move along the ground.
+        Since a search takes long, a drone without a path searches again only after others have moved. With `again`, if
+        nothing else is possible, all drones search again, and may move along the ground.
         """
         for drone in drones:
             if (again or len(self.moves) >= self._next_search[drone]) and self.goal_is_free(drone):
@@ -214,7 +219,7 @@ class _DirectMoves(_MovesUnderSky):
         spots = spots[~self._barred(np.broadcast_to(here, spots.shape), spots)]
         rest = [other for other in self.away if other != drone]
         taken = np.vstack((others, self.goals[rest]))
-        # Offsets are a thousandth longer than needed: rounding must not decide for points between two places.
+        # Offsets are longer by a thousandth, so that rounding errors do not exclude points between two places.
         free = (norms(spots[:, None] - taken[None]) >= self.space.distance).all(axis=1)
         spots = spots[free]
         spots = spots[~self.space.near(np.broadcast_to(here, spots.shape), spots, others).any(axis=1)]
@@ -230,7 +235,7 @@ class _DirectMoves(_MovesUnderSky):
 
 
 class _MovesBySky(_MovesUnderSky):
-    """All drones move up, and down to their goals in the reverse of an order in which they could leave the goals."""
+    """All drones move up, then down to their goals in the reverse of an order in which they could leave the goals."""
 
     def all_moves(self) -> list[DroneMove]:
         """Return the moves. Raises `NoRouteError`."""
@@ -244,7 +249,7 @@ class _MovesBySky(_MovesUnderSky):
         return self.moves
 
     def empty(self) -> None:
-        """Move all drones up, the topmost possible drone first."""
+        """Move all drones up; of those that can move, the topmost first."""
         drones = sorted(range(self.count), key=lambda drone: -self.rests[drone][2])
         while drones:
             for drone in drones:
@@ -265,8 +270,8 @@ def _spiral(distance: float, rings: float) -> Iterator[Array]:
 
 
 def _around() -> Array:
-    """Return offsets for making room, in distances: up, or to eight sides, level, rising or sinking; nearest first."""
-    # A little more than the distance: rounding must not decide for points on the line between two places.
+    """Return offsets for making room, in distances, nearest first: up, to eight sides (level, up, down), or down."""
+    # A little more than the distance, so that rounding errors do not exclude points on the line between two places.
     radii = (1.001, 1.5, 2.0, 3.0)
     sides = [(math.cos(step * math.pi / 4), math.sin(step * math.pi / 4)) for step in range(8)]
     level = [np.array((x, y, 0.0)) for x, y in sides]

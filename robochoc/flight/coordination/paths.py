@@ -1,20 +1,20 @@
-"""Paths of a drone between resting drones: polylines that keep the distance from all of them.
+"""Paths of a drone between resting drones: polylines that keep the distance from all these drones.
 
 Candidates, in order of preference:
 
 1. a straight line;
-2. `by_lane`: up or down to a lane's height, across, and up or down. The lane with the shortest detour is chosen, and of
-   equal lanes the lowest;
+2. `by_lane`: up or down to the height of a lane, across, and up or down. The lane with the shortest detour is used, the
+   lowest of equal lanes;
 3. `around`: by lane via a column beside the start or the goal, for a drone with another drone directly above;
-4. `over_all`: from the start up to the `sky`, via a column beside it if necessary, across, and down in the same manner.
-   The sky is a height that is clear of all points at rest.
+4. `over_all`: up to the `sky`, via a column beside the start if necessary, across, and down in the same way. The sky is
+   a height that is clear of all points at rest.
 
 Blocked heights are computed, not searched for. On a vertical line, or among all horizontal lines between two columns, a
-point blocks an interval of heights. Half of the interval is sqrt(distance^2 - r^2), where r is the distance of the
-point in the plane. So `by_lane` finds a lane whenever there is one.
+point blocks an interval of heights. Half of its length is sqrt(distance^2 - r^2), where r is the point's distance in
+the plane. So `by_lane` finds a lane whenever there is one.
 
-With a floor plan (`maps/routes/floor_plan.py`), "across" is not straight, but by a route around the walls, at constant
-height.
+With a floor plan (`maps/routes/floor_plan.py`), "across" is not a straight line, but a route around the walls at
+constant height.
 """
 
 from __future__ import annotations
@@ -31,20 +31,20 @@ from robochoc.maps.routes.distances import SLACK_M, Array, Flags, norms, segment
 from robochoc.maps.routes.floor_plan import FloorPlan
 
 Column = Array
-"""The x and the y of a vertical line."""
+"""The x and y coordinates of a vertical line."""
 
 _DIRECTIONS = 8
-"""Directions of the columns around a point."""
+"""The number of directions of the columns around a point."""
 _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
-"""Distances of these columns, in distances."""
+"""The radii of these columns around the point, as multiples of the distance."""
 
 
 @dataclass(frozen=True)
 class OutdoorSpace(Spacing):
-    """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points.
+    """Finds paths at least `distance` from points at rest, and not below `ground`. `sky` is above all points.
 
-    With `rises`, drones leave the ground, and land, vertically where possible. No path leads through walls of the
-    `floor_plan`, at any height.
+    With `rises`, drones take off and land vertically where possible. Paths do not cross walls of the `floor_plan` at
+    any height.
     """
 
     ground: float
@@ -54,11 +54,11 @@ class OutdoorSpace(Spacing):
 
     @property
     def off_ground(self) -> float:
-        """The least height at which a drone is off the ground."""
+        """The minimum height at which a drone is off the ground."""
         return self.ground + self.distance / 4
 
     def slides(self, starts: Array, goals: Array) -> Flags:
-        """Return which straight lines (K,) lead along the ground; or, with `rises`, diagonally from it or to it."""
+        """Return which straight lines (K,) lead along the ground or, with `rises`, diagonally from or to the ground."""
         low = (np.minimum if self.rises else np.maximum)(starts[:, 2], goals[:, 2]) < self.off_ground
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
@@ -72,9 +72,9 @@ class OutdoorSpace(Spacing):
     def across(
         self, start: Array, goal: Array, first: Column | None = None, last: Column | None = None
     ) -> Array | None:
-        """Return the columns (K + 1, 2) of a route from `start` to `goal` in the plane; None if there is none.
+        """Return the columns (K + 1, 2) of a route from `start` to `goal` in the plane; None if there is no route.
 
-        It begins in the column `first`, and ends in `last`; by default, in those of `start` and `goal`.
+        The route begins in the column `first` and ends in `last`; by default, in the columns of `start` and `goal`.
         """
         first, last = start[:2] if first is None else first, goal[:2] if last is None else last
         if self.floor_plan is None:
@@ -94,11 +94,11 @@ class OutdoorSpace(Spacing):
         return self.floor_plan is None or bool(self.floor_plan.are_clear(first[None], second[None])[0])
 
     def by_lane(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Return the path up or down to the best lane, across, and up or down; None if no lane is clear of `points`."""
+        """Return the path by the best lane (up or down, across, up or down); None if no lane is clear of `points`."""
         return next(self.lanes(start, goal, points), None)
 
     def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
-        """Yield the paths by several lanes, at least a distance from each other, the best first."""
+        """Yield paths by several lanes, the best first. Lanes are at least a distance apart."""
         columns = self.across(start, goal)
         if columns is None:
             return
@@ -119,7 +119,7 @@ class OutdoorSpace(Spacing):
                     yield path
 
     def around(self, start: Array, goal: Array, points: Array) -> Array | None:
-        """Return the path via the best column beside the start or the goal; None if there is none."""
+        """Return the path via the best column beside the start or the goal; None if there is no such path."""
         best, path = math.inf, None
         reach, limits = self._reach(start, points), self._reach(goal, points)
         for column, there, here in self._ways_round(start, goal):
@@ -166,7 +166,7 @@ class OutdoorSpace(Spacing):
         return found
 
     def _ways_round(self, start: Array, goal: Array) -> Iterator[tuple[Column, Array, Array]]:
-        """Yield each column beside the start or the goal, with the columns of the route to it, and from it."""
+        """Yield each column beside the start or the goal, with the columns of the routes to it and from it."""
         for column in self._beside(start):
             here = self.across(start, goal, first=column)
             if here is not None:
@@ -186,7 +186,7 @@ class OutdoorSpace(Spacing):
     def _exits(self, start: Array, columns: Array, points: Array, reach: tuple[float, float]) -> list[float]:
         """Return the heights at which a drone can leave by `columns`: the ends of clear intervals.
 
-        Heights along the ground are used only if there are no others.
+        Heights at the ground are returned only if there are no others.
         """
         low, high = max(reach[0], min(self.ground, float(start[2]))), min(reach[1], self.sky)
         found = _outside(self._spans(columns, points), low, high, (start[2], self.off_ground))
@@ -203,11 +203,11 @@ class OutdoorSpace(Spacing):
     def _spans(self, columns: Array, points: Array) -> Array:
         """Return the intervals of heights (W, 2) in which points block the route by `columns`, or a single column.
 
-        With several pieces there is one interval for each point: that of the nearest piece.
+        For a route with several pieces, each point has one interval: that for the piece nearest to the point.
         """
         first, second = (columns[:-1], columns[1:]) if len(columns) > 1 else (columns, columns)
         radius = segment_distances(first, second, points[:, :2]).min(axis=0)
-        # A little less strict than `is_clear`, which decides finally: they must not differ by rounding.
+        # A little less strict than `is_clear`, which makes the final decision, in spite of rounding.
         least = self.distance - SLACK_M / 2
         close = radius < least
         half = np.sqrt(least * least - radius[close] ** 2)
@@ -216,7 +216,7 @@ class OutdoorSpace(Spacing):
 
 
 def _outside(spans: Array, low: float, high: float, wished: tuple[float, ...]) -> list[float]:
-    """Return the ends of the intervals between `low` and `high` outside `spans`, and the `wished` heights in these."""
+    """Return the ends of the free intervals between `low` and `high`, outside `spans`, and `wished` heights in them."""
     heights = np.concatenate((spans.ravel(), [low, high], wished))
     heights = np.unique(heights[(low <= heights) & (heights <= high)])
     free = ~((spans[None, :, 0] < heights[:, None]) & (heights[:, None] < spans[None, :, 1])).any(axis=1)

@@ -27,7 +27,7 @@ class TooCloseError(RobochocError, ValueError):
 
 
 def check_spacing(points: Array, standing: Array, distance: float, where: Literal["start", "goal"]) -> None:
-    """Raise `TooCloseError` for the nearest two of `points` and `standing`, not both standing, if they are too near."""
+    """Raise `TooCloseError` for the nearest pair of `points` and `standing`, not both standing, if it is too close."""
     count = len(points)
     if not count:
         return
@@ -41,17 +41,17 @@ def check_spacing(points: Array, standing: Array, distance: float, where: Litera
 
 @dataclass(frozen=True)
 class Spacing:
-    """The `distance` that drones keep from points at rest."""
+    """Checks whether drones keep the `distance` from points at rest."""
 
     distance: float
 
     @property
     def least(self) -> float:
-        """The distance, less rounding."""
+        """The distance, less an allowance for rounding."""
         return self.distance - SLACK_M
 
     def near(self, origins: Array, ends: Array, points: Array) -> Flags:
-        """Return whether (K, P) straight lines pass too near to `points` (P, 3)."""
+        """Return which straight lines (K,) pass too near to which `points` (P, 3), as (K, P)."""
         return segment_distances(origins, ends, points) < self.least
 
     def is_clear(self, path: Array, points: Array) -> bool:

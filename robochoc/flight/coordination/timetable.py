@@ -1,14 +1,14 @@
-"""The timetable of drones' moves, in which no two drones are ever nearer to each other than a distance.
+"""The timetable of drones' moves, in which any two drones keep a given distance at all times.
 
-`moves.py` gives moves that are safe one after the other. Here they begin as early as possible, in that order of
-precedence. Scheduled moves are not changed. The next move begins at the first time at which it keeps the distance from
-all drones at all times: before the move, during it, and at rest after it, permanently. There is always such a time:
-after all scheduled moves, the other drones rest at places of which the path is clear. This is prioritized planning
-(Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths; without the order of `moves.py` it would
-be incomplete.
+`moves.py` returns a sequence of moves that are safe one after the other. Here the moves are scheduled in this order,
+each as early as possible, without changes of moves scheduled before. A move begins at the first time at which its drone
+keeps the distance from all others permanently: before the move, during it, and at rest after it. Such a time always
+exists: after all scheduled moves, the other drones rest at places that are not too near to the path. This is
+prioritized planning (Erdmann and Lozano-Perez, "On multiple moving objects", 1987) on fixed paths; without the order
+from `moves.py` it would be incomplete.
 
-Time is divided into steps, at which all moves begin. Within a step, motion differs from uniform straight motion by at
-most acceleration * step^2 / 8, which is added to the distance; apart from that, the closest approach is exact. Paths
+Moves begin at discrete time steps. Within a step, motion differs from uniform straight motion by at most
+acceleration * step^2 / 8. This deviation is added to the distance; apart from it, the closest approach is exact. Paths
 that keep the distance from each other, or from a resting drone, are not compared in time, and need only the distance.
 """
 
@@ -37,12 +37,12 @@ Steps = NDArray[np.int64]
 
 _STEP_S = 0.05
 _BULGE = 0.01
-"""The largest deviation of two drones from uniform motion in a step, in distances. It bounds the step."""
+"""The largest deviation of two drones from uniform motion in a step, in distances. It limits the length of a step."""
 _CHUNK = 8
-"""The number of steps of a move that are compared together, by the box around them."""
+"""The number of steps of a move that are compared together, using the box around them."""
 _PORTION = 4096
 _PATIENCE_S = 1.0
-"""A drone that would wait longer tries other lanes, and uses one if it arrives earlier by this time."""
+"""A drone that would wait longer tries other lanes, and uses a lane that makes it arrive earlier by this time."""
 _LANES = 4
 """The number of other lanes that a drone tries."""
 _FOREVER = 2**62
@@ -61,28 +61,28 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     downwash: float = 1.0,
     floor_plan: WallPlan | None = None,
 ) -> RoutePlan:
-    """Return the routes of N drones from `starts` to `goals`, never nearer to each other than `distance`.
+    """Return routes of N drones from `starts` to `goals` on which all drones keep `distance` from each other.
 
-    With a `downwash` above 1, drones are ellipsoids, taller than wide by this factor: the plan is computed for spheres,
-    with heights divided by it.
+    With a `downwash` above 1, drones are ellipsoids, taller than wide by this factor. The plan is computed for spheres,
+    with heights divided by this factor.
 
     The result is deterministic. Lengths are in metres.
 
     Args:
         starts: (N, 3).
-        goals: (N, 3). A drone with the same start and goal stays there, unless `moves.py` finds no other solution.
+        goals: (N, 3). A drone whose start is its goal stays there, unless `moves.py` finds a solution only if it moves.
         distance: The distance between drones' centres.
         standing: Points (M, 3) from which drones also keep the distance.
-        delays: (N,): the earliest begin of each drone, in seconds.
-        limits: Speed and acceleration of all drones.
+        delays: (N,): the earliest start time of each drone, in seconds.
+        limits: The maximum speed and acceleration of the drones.
         ground: The lowest height of drones, except for starts and goals.
-        rises: Whether drones leave the ground, and land, vertically where possible.
+        rises: Whether drones take off and land vertically where possible.
         downwash: The vertical distance, as a multiple of `distance`; at least 1.
-        floor_plan: Walls that no drone flies over; or walls in space, with floors and ceilings.
+        floor_plan: Walls that no drone flies over; or walls in three dimensions, with floors and ceilings.
 
     Raises:
-        TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
-        NoRouteError: Standing points enclose a start or a goal; or drones do not get past each other between walls.
+        TooCloseError: Two starts, two goals, or a start or goal and a standing point, are nearer than `distance`.
+        NoRouteError: Standing points enclose a start or a goal, or drones cannot pass each other between walls.
         ValueError: An argument is invalid.
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
@@ -112,7 +112,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
 
 
 def _check_counts(starts: Array, goals: Array, delays: Array) -> None:
-    """Raise `ValueError` if there is not one goal and one delay for each start."""
+    """Raise `ValueError` unless there are as many goals and delays as starts."""
     if len(goals) != len(starts) or delays.shape != (len(starts),):
         raise ValueError(
             f"the numbers of {len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} differ"
@@ -146,7 +146,7 @@ class _ScheduledMove:
 
     @cached_property
     def chunks(self) -> Array:
-        """The positions in chunks (C, _CHUNK + 1, 3); each begins at the end of the previous one; NaN after the end."""
+        """The positions in chunks (C, _CHUNK + 1, 3), padded with NaN. Each begins at the end of the previous chunk."""
         count = -(-self.steps // _CHUNK)
         padded = np.full((count * _CHUNK + 1, 3), np.nan)
         padded[: len(self.samples)] = self.samples
@@ -155,7 +155,7 @@ class _ScheduledMove:
 
 
 class _Timetable:
-    """The scheduled moves, and the places of all drones between them."""
+    """The scheduled moves, and the places of all drones between their moves."""
 
     def __init__(
         self, starts: Array, space: OutdoorSpace | IndoorSpace, limits: MotionLimits, delays: Array, downwash: float
@@ -172,7 +172,7 @@ class _Timetable:
         self._latest = 0
         self._corners = np.empty((2, 0, 3))
         """The lowest and the highest corners of the boxes around all paths."""
-        # The rests of drones: the drone, the point, the first step, and the step of departure.
+        # Drones at rest: the drone, its place, the first step at rest, and the step of departure.
         self._resting = np.arange(len(starts))
         self._places = starts.copy()
         self._from = np.zeros(len(starts), dtype=np.int64)
@@ -180,7 +180,7 @@ class _Timetable:
         self._last_rest = [*range(len(starts))]
 
     def add(self, move: DroneMove) -> None:
-        """Schedule `move` at the first safe step, by another lane if it then arrives much earlier."""
+        """Schedule `move` at the first safe step; use another lane if the drone then arrives much earlier."""
         earliest = max(self._first[move.drone], int(self._from[self._last_rest[move.drone]]))
         entry = self._entry(move.drone, move.path, earliest)
         patience = math.ceil(_PATIENCE_S / self._step)
@@ -197,7 +197,7 @@ class _Timetable:
         return RoutePlan(self._starts, flights, self._downwash)
 
     def _entry(self, drone: int, path: Array, earliest: int) -> _ScheduledMove:
-        """Return the move along `path`, as early as possible."""
+        """Return the earliest safe move of `drone` along `path`."""
         flight = Route(drone, path, self._limits, self._downwash)
         steps = max(1, math.ceil(flight.duration_s / self._step))
         entry = _ScheduledMove(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
@@ -223,7 +223,7 @@ class _Timetable:
         self._to = np.append(self._to, _FOREVER)
 
     def _mark_rests(self, taken: Flags, entry: _ScheduledMove) -> None:
-        """Mark the begins with which the move would pass, or end, too near to a drone at rest."""
+        """Mark the start times for which the move would pass or end too near to a drone at rest."""
         path, samples = entry.flight.path, entry.samples
         near = self._space.near(path[:-1], path[1:], self._places).any(axis=0) & (self._resting != entry.flight.drone)
         for rest in np.flatnonzero(near):
@@ -237,7 +237,7 @@ class _Timetable:
                 taken[: max(0, ends - entry.steps)] = True
 
     def _mark_goal(self, taken: Flags, entry: _ScheduledMove) -> None:
-        """Mark the begins with which the drone would be at its goal before another drone has passed it."""
+        """Mark the start times for which the drone would be at its goal before another drone has passed the goal."""
         goal = entry.flight.path[-1:]
         for other in self._near(entry.flight.drone, goal):
             path = other.flight.path
@@ -248,7 +248,7 @@ class _Timetable:
                     taken[: max(0, other.begins + int(near[-1]) + 1 - entry.steps)] = True
 
     def _mark_moves(self, taken: Flags, entry: _ScheduledMove) -> None:
-        """Mark the begins with which the drone would be too near to another moving drone."""
+        """Mark the start times for which the drone would be too near to another moving drone."""
         others = self._near(entry.flight.drone, entry.flight.path)
         if not others:
             return
@@ -270,12 +270,12 @@ class _Timetable:
 
 
 def _boxes(chunks: Array) -> Array:
-    """Return the lowest and the highest corner (2, C, 3) of the box around each chunk."""
+    """Return the lowest and highest corners (2, C, 3) of the boxes around the chunks."""
     return np.array([np.fmin.reduce(chunks, axis=1), np.fmax.reduce(chunks, axis=1)])
 
 
 def _box_gaps(first: Array, second: Array) -> Array:
-    """Return the distances (A, B) of boxes (2, A, 3) from others (2, B, 3)."""
+    """Return the distances (A, B) between the boxes `first` (2, A, 3) and `second` (2, B, 3)."""
     (low, high), (lows, highs) = first[:, :, None], second[:, None]
     return norms(np.maximum(np.maximum(lows - high, low - highs), 0))
 

@@ -2,12 +2,12 @@
 
 The airframe is an AscTec Hummingbird as modelled in RotorS: Furrer, Burri, Achtelik, Siegwart, "RotorS - A Modular
 Gazebo MAV Simulator Framework", 2016, and its `hummingbird.xacro`. Its arms lie along the body's x and y axes; z is up.
-From tip to tip of its rotors it measures 0.54 m.
+Its width is 0.54 m from rotor tip to rotor tip.
 
-From RotorS: the masses of body and rotors, the arm, the inertia of the body, thrust and moment per rotor speed, the
-highest speed, the time constants, the drag coefficient. Ours: the rotors' masses are points at the ends of the arms;
-the lag is one of the thrust (in RotorS, of the speed); drag is linear, the same in all directions, and as in hover (in
-RotorS it grows with the rotors' speed, and acts across their axes only).
+From RotorS: the masses of body and rotors, the arm length, the inertia of the body, thrust and moment per rotor speed,
+the highest rotor speed, the time constants, the drag coefficient. Different from RotorS: the masses of rotors are
+points at the ends of the arms; the thrust lags (in RotorS, the rotor speed); drag is linear, the same in all
+directions, with the value for hover (in RotorS it grows with the rotor speed, and acts only across the rotor axes).
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ _DRAG_PER_ROTOR = 8.06428e-5
 
 @dataclass(frozen=True)
 class Airframe:
-    """A quadrotor in SI units. Rotors: front (x), left (y), back, right; front and back turn clockwise."""
+    """A quadrotor in SI units. Rotors: front (x), left (y), back, right; the front and back rotors turn clockwise."""
 
     mass: float
     """kg"""
@@ -44,15 +44,15 @@ class Airframe:
     arm: float
     """m, from the centre to a rotor's axis"""
     moment: float
-    """m: a rotor's drag torque, per thrust"""
+    """m, the drag torque of a rotor per thrust"""
     thrust_max: float
-    """N, of a rotor"""
+    """N, the maximum thrust of a rotor"""
     lag_up: float
-    """s: time constant of a rotor's thrust when it grows"""
+    """s, time constant of a rotor's increasing thrust"""
     lag_down: float
-    """s: and when it falls"""
+    """s, time constant of a rotor's decreasing thrust"""
     drag: float
-    """N per m/s: linear drag against the air"""
+    """N per m/s, linear drag relative to the air"""
 
     def mixing(self) -> Array:
         """Return the matrix (4, 4) from the rotors' thrusts to the total thrust and the torques about x, y and z."""

@@ -10,7 +10,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.quadrotor.airframe import ROTORS
 
 WIND_MAX_M_S = 200.0
-"""The largest wind speed: no wind near the ground is faster."""
+"""The largest wind speed; winds near the ground are slower."""
 DOWNWASH_MAX = 100.0
 DISTANCE_MIN_M = 0.01
 """The smallest distance for which the planner's time steps are short enough."""
@@ -34,8 +34,8 @@ class FlightConditions:
             goals are nearer to each other.
         downwash: The vertical distance of drones, as a multiple of `distance`: for routes, drones are ellipsoids taller
             than wide by this factor. Above 1, obstacles and motor failures are not possible.
-        wind: The mean velocity of the wind, in m/s.
-        gusts: The standard deviation of each component of the wind, in m/s.
+        wind: The mean wind velocity, in m/s.
+        gusts: The standard deviation of each component of the wind velocity, in m/s.
         seed: The seed of the gusts.
         failures: The motors that stop.
         obstacles: Points; see `robochoc.flight.flight`.
@@ -79,7 +79,7 @@ class FlightConditions:
             raise ValueError("downwash cannot be combined with motor failures or obstacles")
 
     def check(self, names: Collection[str]) -> None:
-        """Raise `ValueError` if a drone of `failures` is not among `names`."""
+        """Raise `ValueError` if a drone in `failures` is not among `names`."""
         for failure in self.failures:
             if failure.drone not in names:
                 raise ValueError(f"no drone is called {failure.drone!r}; the drones are {', '.join(names)}")

@@ -1,13 +1,13 @@
 """The geometric tracking controller on SE(3), for all drones at once.
 
 Lee, Leok, McClamroch, "Geometric tracking control of a quadrotor UAV on SE(3)", CDC 2010, with z up and the front of
-all drones along x. The integral of position errors is that of Goodarzi, Lee, Lee, "Geometric nonlinear PID control of a
-quadrotor UAV on SE(3)", ECC 2013: a constant wind leaves no error. The drag of the planned velocity is fed forward. The
-controller does not know the wind.
+all drones along x. The integral of position errors is from Goodarzi, Lee, Lee, "Geometric nonlinear PID control of a
+quadrotor UAV on SE(3)", ECC 2013, so that a constant wind leaves no error. The drag at the planned velocity is fed
+forward. The controller does not use the wind.
 
-Ours: the gains, per mass and inertia, as Lee's are for an airframe six times as heavy; the torque that compensates a
-desired angular acceleration is left out; the desired angular velocity is the difference quotient of the desired thrust
-direction, and bounded; so are the desired accelerations.
+Differences from the papers: the gains, per mass and inertia, are new, since Lee's are for an airframe six times as
+heavy; the torque that compensates a desired angular acceleration is left out; the desired angular velocity is the
+difference quotient of the desired thrust direction; this velocity and the desired accelerations are bounded.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ _ERRORS_PER_VELOCITY = 2.0
 """Goodarzi's c1, 1/s: the weight of the position error in the integral."""
 _ATTITUDE = np.array([[280.0], [280.0], [40.0]])
 _RATES = np.array([[28.0], [28.0], [12.0]])
-"""Gains per inertia: 1/s^2, 1/s. Turning about z is slow: the rotors' drag torques are small."""
+"""Gains per inertia: 1/s^2, 1/s. Turning about z is slow, since the rotors' drag torques are small."""
 _INTEGRAL_MAX = 1.2
-"""m/s: the bound of the integral. With the gain `_INTEGRAL` it compensates a wind of up to 35 m/s."""
+"""The bound of the integral, in m/s. With the gain `_INTEGRAL` it compensates a wind of up to 35 m/s."""
 _SIDEWAYS_MAX = 9.0
 _UP_MIN, _UP_MAX = 0.4 * GRAVITY, 2.0 * GRAVITY
-"""m/s^2, with gravity compensated: drones neither turn over nor fall freely."""
+"""Bounds of the upward acceleration including gravity, in m/s^2: drones neither turn over nor fall freely."""
 _THRUST_MIN = 0.2
-"""The least thrust, in weights: without thrust a drone cannot be turned, for example if it is upside down."""
+"""The minimum thrust, in weights. Without thrust a drone cannot be rotated, for example if it is upside down."""
 _TURN_MAX = 8.0
-"""rad/s"""
+"""The bound of the desired angular velocity, in rad/s."""
 
 
 class Controller:
@@ -55,14 +55,14 @@ class Controller:
         self._summing = np.hstack([_ERRORS_PER_VELOCITY * one, one]) * dt
         self._desired = np.zeros((5, 3, number))
         self._wrench = np.zeros((4, number))
-        # Vectors with their first two components repeated behind the third: see `RigidBodies`.
+        # Vectors with their first two components repeated after the third: see `RigidBodies`.
         self._up = np.zeros((5, number))
         self._up[2] = 1
         self._turn = np.zeros((5, number))
         self._rates = np.zeros((5, number))
 
     def command(self, bodies: RigidBodies, setpoints: Array, idle: Array) -> Array:
-        """Return the rotors' thrusts (4, N), in N; 0 for the `idle`.
+        """Return the rotors' thrusts (4, N), in newtons; 0 for `idle` drones.
 
         `setpoints` (9, N) are positions, velocities and accelerations.
         """
@@ -98,7 +98,7 @@ class Controller:
         self._up[:, drone] = [0, 0, 1, 0, 0]
 
     def _torque_rate(self, up: Array, bodies: RigidBodies) -> Array:
-        """Return the angular acceleration (3, N) towards thrust along `up` and a front along x, in the body's frame."""
+        """Return the angular acceleration (3, N), in the body frame, towards thrust along `up` and front along x."""
         x, y, z = up
         desired, axes = self._desired, bodies.wrapped_axes
         flat = np.sqrt(y * y + z * z)
@@ -116,7 +116,7 @@ class Controller:
         turn[:3] /= self._dt
         _bound(turn[:3], -_TURN_MAX, _TURN_MAX)
         turn[3:] = turn[:2]
-        # The direction's change, turned by a right angle: the angular velocity, in the world's frame.
+        # The change of the direction, rotated by a right angle, is the angular velocity in the world frame.
         self._up[:3] = up
         self._up[3:] = up[:2]
         desired_rates = self._up[1:4] * turn[2:] - self._up[2:] * turn[1:4]

@@ -9,11 +9,11 @@ from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.maps.routes.wall_plan import WallPlan
 
 _STEPS = 8
-"""The number of steps, of half a distance each, of the search for free points in each direction."""
+"""The number of search steps for free points in each direction; a step is half a distance."""
 
 
 def nearest_two(points: Array) -> float:
-    """Return the distance of the nearest two of `points` (K, 3); infinite for fewer than two."""
+    """Return the distance between the nearest two of `points` (K, 3); infinite for fewer than two points."""
     if len(points) < 2:  # noqa: PLR2004 - a pair
         return float("inf")
     apart = _distances(points, points)
@@ -22,7 +22,7 @@ def nearest_two(points: Array) -> float:
 
 
 def nearest_distances(points: Array, others: Array) -> Array:
-    """Return the distance (K,) of each of `points` (K, 3) to the nearest of `others` (M, 3); infinite without any."""
+    """Return the distances (K,) from `points` (K, 3) to the nearest of `others` (M, 3); infinite without others."""
     return np.asarray(_distances(points, others).min(axis=1, initial=np.inf))
 
 
@@ -31,7 +31,8 @@ def free_point(
 ) -> Array:
     """Return the point nearest to `wish`, on a grid around it, that is `radii` (M,) away from `taken` (M, 3).
 
-    It is on the ground if `low`, else not much lower than `wish`. No wall of the `floor_plan` is between it and `wish`.
+    The point is on the ground if `low`, else not much lower than `wish`. No wall in the `floor_plan` is between the
+    point and `wish`.
 
     Raises:
         ValueError: Walls leave no such point.

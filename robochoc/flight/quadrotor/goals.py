@@ -1,4 +1,4 @@
-"""The goals of a leg: the given points, or free points near them if an obstacle is in the way."""
+"""The goals of a leg: the given points, or nearby free points if an obstacle is in the way."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MARGIN_M = 0.1
 into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`). Errors of two drones may add up.
 """
 _SHARE = 0.999
-"""The used share of the distance between starts or goals: rounding must not make a route impossible."""
+"""The fraction of the distance between starts or goals that is planned, so that rounding excludes no route."""
 _STAGGER_S = 2.0
 """The longest time between the starts of the first and the last row."""
 _ROW_S = 0.25
@@ -32,7 +32,7 @@ _LOW_M = 1e-6
 
 @dataclass(frozen=True)
 class Hazards:
-    """Points (M, 3) to keep away from, and their radii (M,)."""
+    """Points (M, 3) for drones to keep away from, and the distances to keep (M,)."""
 
     points: Array
     radii: Array
@@ -70,7 +70,7 @@ class LegGoals:
         check_separation("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance, downwash)
 
     def planned_distance(self, starts: Array, hazards: Hazards | None = None) -> float:
-        """Return the distance that routes from `starts` (N, 3) keep: with the margin, as far as places allow it."""
+        """Return the distance for routes from `starts` (N, 3), including the margin as far as the places allow it."""
         leave = min(nearest_two(self._flat(starts[self.who])), nearest_two(self._flat(self.places[self.who])))
         if hazards is not None:
             apart = nearest_distances(self._flat(hazards.points), self._ends(starts))
@@ -82,8 +82,9 @@ class LegGoals:
     ) -> list[tuple[int, str]]:
         """Replace places that are not free; return the affected drones, each with a description of the change.
 
-        Goals are moved away from hazards. Drones that stay in place are moved away from others' goals. Each gets the
-        free point nearest to its `preferred` point (N, 3), with no wall of the `floor_plan` in between.
+        Goals are moved away from hazards. Drones that stay in place are moved away from the goals of others. Each moved
+        place becomes the free point nearest to the drone's `preferred` point (N, 3), without a wall of the `floor_plan`
+        in between.
 
         Raises:
             ValueError: Walls leave no free point.
@@ -114,7 +115,7 @@ class LegGoals:
         return moved
 
     def standing(self, hazards: Hazards, starts: Array, planned: float) -> Array:
-        """Return the hazards that routes can avoid: no drone starts or ends too near to them."""
+        """Return the hazards that routes can avoid because no drone starts or ends too near to them."""
         return np.asarray(hazards.points[nearest_distances(self._flat(hazards.points), self._ends(starts)) >= planned])
 
     def _ends(self, starts: Array) -> Array:
@@ -125,14 +126,14 @@ class LegGoals:
 
 
 def needed_distance(distance: float) -> float:
-    """Return the distance of places that lets drones keep `distance`, since tracking is not exact."""
+    """Return the distance between places with which drones keep `distance` despite tracking errors."""
     return distance + min(MARGIN_M, distance / 4)
 
 
 def check_separation(
     what: str, names: Sequence[str], places: Mapping[int, Point], distance: float, downwash: float = 1.0
 ) -> None:
-    """Raise `ValueError` if two of `places`, by drones' numbers, are too near to keep `distance`."""
+    """Raise `ValueError` if two of `places`, given by drone number, are too near for drones to keep `distance`."""
     least = needed_distance(distance) - SLACK_M
     if nearest_two(squashed(np.array([*places.values()]).reshape(-1, 3), downwash)) >= least:
         return
@@ -152,7 +153,7 @@ def check_separation(
 
 
 def start_delays(goals: Mapping[int, Goal], homes: Array) -> Array:
-    """Return delays (N,) in seconds: landing drones start first, then row by row, by the x of their homes."""
+    """Return the drones' delays (N,), in seconds: landing drones start first, others row by row (x of the homes)."""
     lands = np.array([number in goals and goals[number].lands for number in range(len(homes))])
     _, rows = np.unique(homes[:, 0], return_inverse=True)
     turns = np.where(lands, 0, rows.reshape(-1) + bool(lands.any()))

@@ -1,8 +1,9 @@
-"""Rigid bodies: all drones in one step, component by component, so that numpy works along the drones.
+"""Rigid bodies: all drones are advanced in one step, component by component, so that numpy vectorizes over the drones.
 
-The integrator is of second order. It computes motors exactly (their commands are constant within a step), body rates by
-the midpoint rule, rotations by the Cayley map, which keeps them orthonormal up to rounding (Hairer, Lubich, Wanner,
-"Geometric Numerical Integration", 2006, Section IV.8), positions with the mean thrust of the step, and drag implicitly.
+The integrator is of second order. Motors are computed exactly, since their commands are constant within a step, body
+rates by the midpoint rule, positions with the mean thrust of the step, and drag implicitly. Rotations are computed by
+the Cayley map, which keeps them orthonormal up to rounding (Hairer, Lubich, Wanner, "Geometric Numerical Integration",
+2006, Section IV.8).
 """
 
 from __future__ import annotations
@@ -17,30 +18,30 @@ from robochoc.flight.quadrotor.airframe import GRAVITY, Airframe, Array
 Mask = npt.NDArray[np.bool_]
 
 IMPACT_MAX_M_S = 2.0
-"""A drone that touches the ground at a higher speed, or with a tilt beyond `TILT_MAX_COSINE`, does not fly again."""
+"""A drone that hits the ground at a higher speed, or with a tilt beyond `TILT_MAX_COSINE`, never flies again."""
 TILT_MAX_COSINE = math.cos(math.radians(45))
 _LEVELLING_S = 0.1
 """The time constant with which a standing drone becomes level."""
 
 
 class RigidBodies:
-    """N drones on the ground or in the air.
+    """Simulates the motion of N drones on the ground and in the air.
 
     Attributes:
-        state: (6, N), position and velocity in the world's frame, whose z is up.
-        axes: (3, 3, N): `axes[k]` is the body's axis k in the world.
-        rates: (3, N), rad/s, about the body's axes.
-        thrusts: (4, N), N, of the rotors.
-        stands: (N,): on the ground.
-        fallen: (N,): crashed; these stay on the ground permanently.
-        grounds: (N,): the height of the ground below each.
+        state: (6, N): positions and velocities in the world frame (z up).
+        axes: (3, 3, N): `axes[k]` is the body axis k in the world frame.
+        rates: (3, N): the angular velocities about the body axes, in rad/s.
+        thrusts: (4, N): the thrusts of the rotors, in newtons.
+        stands: (N,): whether each drone is on the ground.
+        fallen: (N,): whether each drone has crashed; it then stays on the ground permanently.
+        grounds: (N,): the height of the ground below each drone.
     """
 
     def __init__(self, homes: Array, ground: float, airframe: Airframe, dt: float) -> None:
         number = len(homes)
         self.state = np.zeros((6, number))
         self.state[:3] = homes.T
-        # The first two axes are repeated behind the third: a cross product is then two products of slices.
+        # The first two axes are repeated after the third, so that a cross product is two products of slices.
         self._axes = np.zeros((5, 3, number))
         self._axes[[0, 1, 2, 3, 4], [0, 1, 2, 0, 1]] = 1
         self.axes = self._axes[:3]
@@ -49,7 +50,7 @@ class RigidBodies:
         self.stands: Mask = np.ones(number, dtype=np.bool_)
         self.fallen: Mask = np.zeros(number, dtype=np.bool_)
         self.motors_running = np.ones((4, number))
-        """0 for a motor that has stopped, else 1."""
+        """(4, N): 0 for a motor that has stopped, else 1."""
         self.grounds = np.full(number, ground)
         self._airframe = airframe
         self._dt = dt
@@ -67,11 +68,11 @@ class RigidBodies:
 
     @property
     def wrapped_axes(self) -> Array:
-        """(5, 3, N): the axes, with the first two repeated behind the third."""
+        """(5, 3, N): the axes, with the first two repeated after the third."""
         return self._axes
 
     def step(self, command: Array, air: Array) -> None:
-        """Advance by one step with commanded thrusts (4, N), in air that moves at `air` m/s: (3, N) or (3, 1)."""
+        """Advance by one step with thrusts (4, N) commanded, in air with the velocity `air`, m/s: (3, N) or (3, 1)."""
         before = self.state[:2].copy() if self.stands.any() else None
         axes_before = None if before is None else self._axes.copy()
         wrench = self._mixing @ self._spin(command * self.motors_running)
@@ -84,12 +85,12 @@ class RigidBodies:
             self._touch(low, before, axes_before)
 
     def stop_motor(self, drone: int, motor: int) -> None:
-        """Stop a motor, which then has no thrust. A drone on the ground does not fly again."""
+        """Stop a motor for good. A drone on the ground then never flies."""
         self.motors_running[motor, drone] = 0
         self.fallen[drone] |= self.stands[drone]
 
     def lay(self, drone: int, place: Array) -> None:
-        """Put `drone` on the ground below `place`, for good."""
+        """Put `drone` permanently on the ground below `place`."""
         self.state[:, drone] = [place[0], place[1], self.grounds[drone], 0, 0, 0]
         self._axes[:, :, drone] = np.eye(3)[[0, 1, 2, 0, 1]]
         self.rates[:, drone] = 0
@@ -97,7 +98,7 @@ class RigidBodies:
         self.stands[drone] = self.fallen[drone] = True
 
     def energy(self) -> Array:
-        """Return the energy (N,) in J: kinetic, of translation and rotation, and potential above the ground."""
+        """Return each drone's energy (N,), in J: translational, rotational, and potential above the ground."""
         mass, inertia = self._airframe.mass, np.array(self._airframe.inertia)[:, None]
         moving = mass / 2 * (self.state[3:] ** 2).sum(0) + (inertia / 2 * self.rates**2).sum(0)
         return np.asarray(moving + mass * GRAVITY * (self.state[2] - self.grounds))
@@ -111,7 +112,7 @@ class RigidBodies:
         return np.asarray(mean)
 
     def _turn(self, torque: Array) -> None:
-        """Advance by Euler's equation with the midpoint rule, then rotate by the rates in the middle of the step."""
+        """Advance the rates by Euler's equation with the midpoint rule; rotate by the rates at the step's midpoint."""
         dt, spin = self._dt, self._turning
         push = torque * self._per_inertia
         spin[:3] = self.rates
@@ -120,7 +121,7 @@ class RigidBodies:
         spin[:3] = half
         spin[3:] = half[:2]
         self.rates += (push + self._gyroscopic * spin[1:4] * spin[2:5]) * dt
-        # Cayley's map of h turns by 2 arctan |h|: h is tan(angle / 2) here, up to its fifth power.
+        # The Cayley map of h rotates by 2 arctan |h|; here h is tan(angle / 2), up to its fifth power.
         quarter = np.square(half).sum(0) * (dt * dt / 4)
         spin *= dt / 2 * (1 + quarter / 3)
         vector = spin[:, None]
@@ -134,7 +135,7 @@ class RigidBodies:
         self._axes[3:] = self._axes[:2]
 
     def _move(self, thrust: Array, air: Array) -> None:
-        """Advance by Newton's law. `thrust` is twice the force: the sum of its directions before and after."""
+        """Advance by Newton's law. `thrust` is twice the force: the sum for directions before and after the step."""
         dt, frame = self._dt, self._airframe
         drag = frame.drag / frame.mass
         velocity = self.state[3:]

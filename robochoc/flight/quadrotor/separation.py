@@ -1,9 +1,9 @@
 """The smallest distance between any two drones, measured at every step of a simulation.
 
-Pairs are listed as by Verlet ("Computer 'experiments' on classical fluids", 1967): a pair is on the list if it is at
-most `_REACH_M` further apart than the nearest pair so far. Until one of the drones has moved by half of that, no other
-pair can be nearer; then the list is computed again. So most steps measure few pairs only, and the result is still the
-minimum over all pairs and steps.
+Neighbour lists are used as by Verlet ("Computer 'experiments' on classical fluids", 1967): the list has all pairs that
+are at most `_REACH_M` further apart than the nearest pair so far. Until a drone has moved by half of `_REACH_M`, no
+other pair can be nearer; then the list is computed again. So most steps measure only a few pairs, and the result is
+still the minimum over all pairs and steps.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from robochoc.maps.routes.distances import squashed
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6
-"""A bound of the rounding errors of the list's distances, which are computed by scalar products."""
+"""A bound on the rounding errors of distances in the list, which are computed by scalar products."""
 
 
 class SeparationMonitor:
-    """Measures all drones' distances at every step. Pairs with a falling or fallen drone are counted separately.
+    """Measures the distances between all drones at every step, separately for pairs with a falling or fallen drone.
 
-    Heights are divided by `downwash` for distances.
+    In distances, heights are divided by `downwash`.
     """
 
     def __init__(self, number: int, downwash: float = 1.0) -> None:
@@ -39,7 +39,7 @@ class SeparationMonitor:
         self._sound = 0
 
     def observe(self, places: Array, at_s: float) -> None:
-        """Measure the positions (3, N) at a time."""
+        """Measure the distances between the positions (3, N) at time `at_s`."""
         if not len(self._pairs[0]):
             return
         places = squashed(places.T, self._downwash).T if self._downwash != 1 else places
@@ -56,13 +56,13 @@ class SeparationMonitor:
             self.nearest_fallen = self._nearer(self.nearest_fallen, squares[sound:], sound, at_s)
 
     def exclude(self, failed: Mask) -> None:
-        """Count pairs with these drones separately from now on."""
+        """From now on, count pairs with the drones in `failed` separately."""
         self._failed = failed.copy()
         self._anchor = None
 
     @staticmethod
     def _moved(places: Array, anchor: Array) -> bool:
-        """Return whether pairs that are not on the list may be nearest now."""
+        """Return whether a pair that is not on the list may now be the nearest."""
         way = places - anchor
         way *= way
         return bool((way[0] + way[1] + way[2]).max() >= (_REACH_M / 2) ** 2)

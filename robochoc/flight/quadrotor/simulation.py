@@ -1,8 +1,9 @@
-"""The simulation's loop: setpoints, the rotors' commands, the bodies' motion, wind, the log.
+"""The simulation loop: setpoints, rotor commands, motion of the bodies, wind, log.
 
-The step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from a flight
-with ten times as many steps between the same commands, and a body that tumbles freely at one turn a second for 10 s
-keeps the energy of its rotation to 3e-5 (`tests/unit/flight/test_rigid_bodies.py`). Half the step takes twice the time.
+The time step, `DT`, was chosen by measurement. A flight of 4.7 m in a wind of 3 m/s differs by at most 0.5 mm from a
+flight with ten times as many steps between the same commands. The rotational energy of a body that tumbles freely at
+one turn per second for 10 s is constant within 3e-5 (`tests/unit/flight/test_rigid_bodies.py`). Halving the step would
+double the computation time.
 """
 
 from __future__ import annotations
@@ -25,28 +26,28 @@ _CORRELATION_S = 1.5
 STEPS_PER_SAMPLE = 4
 DT = 1 / (SAMPLE_RATE_HZ * STEPS_PER_SAMPLE)
 _CUT_OFF = math.cos(math.radians(60))
-"""The tilt from which on the other motors of a drone with a stopped motor are switched off."""
+"""The cosine of the tilt at which a drone with a stopped motor switches its other motors off."""
 _PRESS_M = 0.05
-"""The depth below the ground of the setpoint of a landing drone, so that it touches the ground."""
+"""The depth of a landing drone's setpoint below the ground, which makes the drone touch the ground."""
 _ABOVE_M = 0.003
 _HOP_M = (0.01, 0.08)
-"""The least and the greatest height of a drone with setpoints along the ground."""
+"""The minimum and maximum height of a drone whose setpoints move along the ground."""
 _HOP = 0.8
-"""The share of the routes' spare distance for this height: another drone may be directly above."""
+"""This height as a fraction of the routes' spare distance, since another drone may be directly above."""
 _TOUCH_M = 1e-6
 _BOUNDS = 1e6
-"""m and m/s: the bound of valid states."""
+"""The bound of valid states, in m and m/s."""
 
 
 class QuadrotorSimulation:
-    """Simulates N drones, step by step. `setpoints` (9, N) are their positions, velocities and accelerations.
+    """Simulates N drones, step by step. `setpoints` (9, N) are positions, velocities and accelerations.
 
     Args:
         names: The drones' names.
-        homes: Their places in the beginning.
+        homes: The drones' initial places.
         ground: The height of the ground.
         conditions: Wind and failures.
-        floor: Returns the height of the floor below a place, onto which failed drones fall; None if it is not known.
+        floor: Returns the height of the floor below a place, onto which failed drones fall; None if it is unknown.
     """
 
     def __init__(
@@ -63,10 +64,10 @@ class QuadrotorSimulation:
         self.events: list[FlightEvent] = []
         self.hop_m = _HOP_M[1]
         self.failures: list[tuple[int, str, float]] = []
-        """Drones that cannot fly any more: number, reason, time in seconds."""
+        """Drones that can no longer fly: number, reason, time in seconds."""
         self.separation = SeparationMonitor(number, conditions.downwash)
         self.failed: Mask = np.zeros(number, dtype=np.bool_)
-        """(N,): the drones that fall or have fallen."""
+        """(N,): whether each drone is falling or has fallen."""
         self._names = names
         self._ground = ground
         self._floor = floor or (lambda _: None)
@@ -84,7 +85,7 @@ class QuadrotorSimulation:
 
     @property
     def now_s(self) -> float:
-        """Seconds since the beginning."""
+        """The simulated time, in seconds."""
         return self._steps * DT
 
     @property
@@ -99,11 +100,11 @@ class QuadrotorSimulation:
 
     @property
     def falling(self) -> Mask:
-        """The drones that are falling."""
+        """(N,): whether each drone is falling."""
         return self.failed & ~self._bodies.fallen
 
     def settled(self, near: float, slow: float) -> bool:
-        """Return whether no drone is falling, and all others are within `near` of their setpoints and below `slow`."""
+        """Return whether no drone is falling, and the others are below `slow` and within `near` of their setpoints."""
         gaps = np.square(self.setpoints[:3] - self._bodies.state[:3]).sum(0)
         speeds = np.square(self._bodies.state[3:]).sum(0)
         low = self.setpoints[2] <= self._ground + _TOUCH_M
@@ -111,7 +112,7 @@ class QuadrotorSimulation:
         return bool(calm.all()) and not self.falling.any()
 
     def tracking_errors(self) -> Array:
-        """Return each drone's distance (N,) from its setpoint; 0 for failed ones."""
+        """Return the drones' distances (N,) from their setpoints; 0 for failed drones."""
         gaps = np.sqrt(np.square(self.setpoints[:3] - self._bodies.state[:3]).sum(0))
         return np.where(self.failed, 0.0, gaps)
 
@@ -131,7 +132,7 @@ class QuadrotorSimulation:
         setpoints = self._adjusted_setpoints(low, moving, late=late) if low.any() else self.setpoints
         bodies.step(self._controller.command(bodies, setpoints, idle), self._wind.air())
         self._steps += 1
-        if not bool(np.abs(bodies.state).max() < _BOUNDS):  # true of nan as well
+        if not bool(np.abs(bodies.state).max() < _BOUNDS):  # also true for nan
             self._ground_invalid()
         if self.failures or bodies.fallen.any():
             self._update_failed()
@@ -193,7 +194,7 @@ class QuadrotorSimulation:
                 self._mark_failed(drone, "has hit the ground")
 
     def _ground_invalid(self) -> None:
-        """Put drones with an invalid state on the ground, below their last logged position."""
+        """Put drones with invalid states on the ground, below their last logged positions."""
         bodies = self._bodies
         for drone in np.flatnonzero(~(np.abs(bodies.state) < _BOUNDS).all(0)).tolist():
             bodies.lay(drone, self._places[-1][:, drone])
@@ -204,11 +205,12 @@ class QuadrotorSimulation:
 
 
 class Wind:
-    """The velocity of the air around each of `number` drones: `mean` and gusts of standard deviation `gusts`, m/s.
+    """Simulates the air velocity around each of `number` drones: `mean`, plus gusts of standard deviation `gusts`, m/s.
 
-    Gusts are first-order Gauss-Markov processes, like the longitudinal gusts of the Dryden model (MIL-F-8785C, Section
-    3.7.1.2). Ours: all three directions have such gusts, with one correlation time, and each drone has its own. Real
-    air is more alike over a metre or two; independent gusts are the harder case for the distances between drones.
+    Gusts are first-order Gauss-Markov processes, like the longitudinal gusts in the Dryden model (MIL-F-8785C, Section
+    3.7.1.2). Unlike in that model, gusts in all three directions are of this kind, with the same correlation time, and
+    are independent for each drone. Real gusts are correlated over a metre or two; independent gusts are the harder case
+    for the distances between drones.
     """
 
     def __init__(self, mean: Point, gusts: float, seed: int, number: int, dt: float) -> None:
@@ -219,7 +221,7 @@ class Wind:
         self._now = gusts * self._chance.standard_normal((3, number)) if gusts else np.zeros((3, 1))
 
     def air(self) -> Array:
-        """Return the air's velocity in the next step: (3, N), or (3, 1) without gusts."""
+        """Return the air velocity in the next step: (3, N), or (3, 1) without gusts."""
         if not self._gusts:
             return self._mean
         drawn = self._chance.standard_normal(self._now.shape)
@@ -228,13 +230,13 @@ class Wind:
 
 
 def quaternions(axes: Array) -> Array:
-    """Return unit quaternions x, y, z, w (..., 4) of rotations (..., 3, 3); `[..., k, :]` is the turned axis k.
+    """Return unit quaternions x, y, z, w (..., 4) of rotations (..., 3, 3); `[..., k, :]` is the rotated axis k.
 
-    After Shepperd, "Quaternion from rotation matrix", 1978: of four formulas, the one without cancellation.
+    Of the four formulas by Shepperd ("Quaternion from rotation matrix", 1978), the one without cancellation is used.
     """
     xx, yy, zz = axes[..., 0, 0], axes[..., 1, 1], axes[..., 2, 2]
     squares = np.stack([1 + xx - yy - zz, 1 - xx + yy - zz, 1 - xx - yy + zz, 1 + xx + yy + zz], axis=-1)
-    # The products of each component with all four, times four.
+    # The products of each component with all four components, times four.
     xy, yz, zx = (axes[..., i, j] + axes[..., j, i] for i, j in ((0, 1), (1, 2), (2, 0)))
     xw, yw, zw = (axes[..., i, j] - axes[..., j, i] for i, j in ((1, 2), (2, 0), (0, 1)))
     rows = np.stack(

@@ -1,9 +1,9 @@
-"""A trajectory: routes on a clock that can be slowed to a stop.
+"""A trajectory: routes that follow a clock which can be slowed to a stop.
 
-All drones share one clock, so the distances of the routes are kept for any rate of the clock. It stops smoothly: over
-`STOP_S` its rate falls from 1 to 0 by a cubic, whose slope is at most 1.5 / `STOP_S`. At the planned 2 m/s this
-requires 3.75 m/s^2 besides a quarter of the planned acceleration, well within the limits of a drone, and a length of at
-most `STOP_S` / 2 at that speed.
+All drones share one clock, so drones keep their distances at any rate of the clock. The clock stops smoothly: over
+`STOP_S` its rate falls from 1 to 0 by a cubic polynomial, with a slope of at most 1.5 / `STOP_S`. At the planned 2 m/s
+this requires 3.75 m/s^2 besides a quarter of the planned acceleration, well within the limits of a drone. The stopping
+distance is at most that flown in `STOP_S` / 2 at this speed.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.flight.coordination.motion import RoutePlan
 from robochoc.flight.quadrotor.airframe import Array
 
 _SAMPLE_S = 0.05
-"""The time between samples of a trajectory: at 2 m/s a drone flies 0.1 m in a step."""
+"""The time between samples of a trajectory, in which a drone flies 0.1 m at 2 m/s."""
 _LOOK_M = 0.1
 
 
@@ -40,12 +40,12 @@ class Trajectory:
 
     @property
     def s(self) -> float:
-        """The time on the routes' own clock, in seconds."""
+        """The time on the routes' clock, in seconds."""
         return self._s
 
     @property
     def has_ended(self) -> bool:
-        """Whether no setpoint moves any more: the end is reached, or the clock has stopped."""
+        """Whether setpoints no longer move: the end is reached, or the clock has stopped."""
         return self._s >= self.plan.duration_s or self._slow >= STOP_S
 
     def stop(self) -> None:
@@ -92,7 +92,7 @@ class Trajectory:
 
 
 class ObstacleEncounter(NamedTuple):
-    """A drone's trajectory passes an obstacle nearer than `keep`, for the last time at second `until`."""
+    """A drone's trajectory that passes an obstacle nearer than `keep`, for the last time at second `until`."""
 
     obstacle: int
     drone: int
@@ -101,7 +101,7 @@ class ObstacleEncounter(NamedTuple):
 
 
 def encounters(trajectory: Trajectory, obstacles: dict[int, Array], keep: float) -> list[ObstacleEncounter]:
-    """Return all encounters with `obstacles`, given by number, which the planner does not know."""
+    """Return all encounters with `obstacles` (by number), which the planner does not know."""
     if not obstacles:
         return []
     times = np.append(np.arange(0.0, trajectory.plan.duration_s, _SAMPLE_S), trajectory.plan.duration_s)
