@@ -24,7 +24,7 @@ class Kind(StrEnum):
 
 
 class Measure(StrEnum):
-    """The measures of loss."""
+    """The measures of privacy loss."""
 
     LINEAR = "linear"
     ENTROPY = "entropy"
@@ -76,7 +76,7 @@ class PrivacyReport:
         robots: All robots, the highest priority first.
         losses: The losses of all pairs of an observer and a subject with secrets.
         without_rule: The types of received messages without a rule.
-        undecided: The reason why decisions are not among the losses; empty if they are.
+        undecided: The reason why the losses do not include decisions; empty if they do.
     """
 
     team: str
@@ -89,7 +89,7 @@ class PrivacyReport:
     undecided: str = ""
 
     def system_loss(self, kind: Kind, measure: Measure) -> float | None:
-        """Return the mean loss over all pairs of robots; None if there are no losses, or one is unknown."""
+        """Return the mean loss over all pairs of robots; None if there are no losses, or if one of them is unknown."""
         return mean([loss.by(measure) for loss in self.losses if loss.kind is kind])
 
     def loss_of(self, subject: str, kind: Kind, measure: Measure) -> float | None:
@@ -102,7 +102,7 @@ class PrivacyReport:
 
 
 def mean(losses: Sequence[float | None]) -> float | None:
-    """Return the mean of losses; None if there are none, or one is unknown."""
+    """Return the mean of losses; None if there are none, or if one of them is unknown."""
     known = [loss for loss in losses if loss is not None]
     return math.fsum(known) / len(known) if known and len(known) == len(losses) else None
 
@@ -116,7 +116,7 @@ def loss_between(
         observer: The robot that received the messages.
         subject: The robot whose secrets the messages concern.
         kind: The kind of secrets.
-        numbers: For each secret, the number of its states, and of those that are still possible.
+        numbers: For each secret, the number of its states, and the number of states that are still possible.
         known: Whether the loss is known.
     """
     hidden = [(states, possible) for states, possible in numbers if states > 1]

@@ -1,4 +1,4 @@
-"""Measures the privacy loss of a recorded run, assuming that only its receiver can read a message."""
+"""Measures the privacy loss in a recorded run, assuming that only the receiver of a message can read it."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class PrivacyError(RobochocError):
 
 
 def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: int | None = None) -> PrivacyReport:
-    """Return the privacy loss of a run.
+    """Return the privacy loss in a run.
 
     Args:
         journal: The journal, including the robots' problems.
         options: Inputs besides the journal (`replay/rebuild.py`).
-        number: The number of the run, from 1; None for the last one.
+        number: The number of the run, from 1; None for the last run.
 
     Raises:
         PrivacyError: if the run does not exist, or required data are missing.
@@ -63,7 +63,7 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
 
 
 class _RunMeasurement:
-    """The measurement of one run: its observers process all messages, and `report` computes the losses."""
+    """Measures one run: its observers process all messages, and `report` computes the losses."""
 
     def __init__(self, journal: Journal, runs: Sequence[RecordedRun], number: int, robots: RebuiltRobots) -> None:
         self._journal = journal
@@ -110,7 +110,7 @@ class _RunMeasurement:
         )
 
     def _branches(self) -> Mapping[str, Sequence[str]]:
-        """Return for each robot the robots whose values are in its partial assignments."""
+        """For each robot, return the robots whose values are in its partial assignments."""
         order = self._team.order
         if not self._robots.protocol.traits.tree:
             return dict.fromkeys(order, order)
@@ -170,7 +170,7 @@ class _RunMeasurement:
                 yield from _there(loss_between(observer.name, subject, kind, numbers, known=known))
 
     def _numbers(self, observer: Observer, subject: str, secret: Secret) -> tuple[int, int]:
-        """Return the numbers of all and of possible states of a secret. The true state must be possible."""
+        """Return the number of all states of a secret, and of those still possible. The true state must be possible."""
         possible = observer.knowledge[secret]
         if not possible.contains(self._secrets.truths[secret]):
             raise self._wrong(observer, subject, "problem")
@@ -185,7 +185,7 @@ class _RunMeasurement:
         )
 
     def _decisions(self) -> tuple[dict[str, Value], str]:
-        """Return the values of the robots in the answer, or none and the reason."""
+        """Return the values of the robots in the answer and an empty text, or no values and the reason."""
         outcome = self._journal.outcome
         if self._number < self._runs:
             return {}, "only the last run of a journal has the team's decision"

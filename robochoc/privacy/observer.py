@@ -1,4 +1,4 @@
-"""A robot as an observer of other robots: the conclusions from the messages that it receives."""
+"""A robot as an observer of other robots: draws conclusions from the messages that it receives."""
 
 from __future__ import annotations
 
@@ -31,20 +31,21 @@ from robochoc.protocols.wording import is_withdrawn
 
 Channel = tuple[type, str, str]
 _DECIDING = (Performative.CANCEL, Performative.REQUEST)
-"""The acts by which a robot may set values of others: permanently, or (for the receiver) temporarily."""
+"""The acts by which a robot may set values of other robots: permanently, or temporarily in case of the receiver."""
 
 
 class RunFacts(NamedTuple):
-    """The facts of a run that all its observers know.
+    """The facts about a run that all its observers know.
 
     Attributes:
         secrets: The secrets of the team.
         order: All robots, the highest priority first.
-        branches: By robot, the robots whose values are in its partial assignments.
+        branches: For each robot, the robots whose values are in its partial assignments.
         fixed_holders: As in `Reception`.
         minimises: As in `Reception`.
-        one_sided: Costs in messages may be those of one robot's part of a partially known constraint. Then only proofs
-            about single robots count, since own costs and totals include both sides (`protocols/disclosure.py`).
+        one_sided: Costs in messages may be the costs of one robot's part of a partially known constraint. Then only
+            proofs about single robots count, because own costs and totals include both sides
+            (`protocols/disclosure.py`).
     """
 
     secrets: TeamSecrets
@@ -56,7 +57,7 @@ class RunFacts(NamedTuple):
 
 
 class _LastValue(NamedTuple):
-    """An observer's latest information on a robot's value: one of `values`, restricted by the statement `cases`."""
+    """An observer's latest information about a robot's value: one of `values`, restricted by the statement `cases`."""
 
     stamp: tuple[int, ...]
     values: tuple[Value, ...]
@@ -64,7 +65,7 @@ class _LastValue(NamedTuple):
 
 
 class Observer:
-    """The observer `name`, with its possible `values`. `without_rule`: the received types of messages without rules."""
+    """The observer `name`, with its possible `values`. `without_rule` has the received message types without a rule."""
 
     def __init__(self, facts: RunFacts, name: str, values: Sequence[Value]) -> None:
         self.name = name
@@ -77,7 +78,7 @@ class Observer:
         self._last_values: dict[str, _LastValue] = {}
 
     def sends(self, receiver: str, message: Message) -> None:
-        """Process a message that the observer sends. It knows the values of others that it sets by the message."""
+        """Process a message that the observer sends. It knows the values that the message sets in others."""
         self._store(message, self.name, receiver)
         if message.act.performative not in _DECIDING:
             return
@@ -96,13 +97,13 @@ class Observer:
             self._learn(proof)
 
     def loses(self, sender: str, message: Message) -> None:
-        """Forget the value of a robot if a lost message has a newer one."""
+        """Forget the value of a robot if a lost message contains a newer one."""
         for proof in self._proofs(message, sender, self.name) or ():
             if isinstance(proof, HasValue | HasCompatibleValue):
                 self._last_values.pop(proof.robot, None)
 
     def _store(self, message: Message, sender: str, receiver: str) -> None:
-        """Store the last message on a channel, by its type and the type's bases."""
+        """Store the last message on a channel, by the message's type and the base classes of this type."""
         for kind in type(message).__mro__:
             if issubclass(kind, Message):
                 self._last[kind, sender, receiver] = message
@@ -211,7 +212,7 @@ def _is_of_one_robot(proof: Proof) -> bool:
 
 
 class _ObservedMessage(Reception):
-    """A message as received by an observer."""
+    """A message as an observer receives it."""
 
     def __init__(
         self,

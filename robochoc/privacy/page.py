@@ -10,11 +10,11 @@ from robochoc.system.plain_text import counted, listed
 
 _CELL, _SMALL_CELL = 34, 16
 MOST_NUMBERED = 40
-"""With more robots, the cells are small and have no numbers."""
+"""With more robots than this, the cells are small and have no numbers."""
 _LONGEST_LABEL, _LETTER = 16, 7.5
-"""The longest name that is not cut, in characters; the maximum width of a letter, in pixels."""
+"""The maximum length of an uncut name, in characters; the maximum width of a letter, in pixels."""
 _DARK = 0.55
-"""The smallest loss whose cell is dark, with a white number."""
+"""The smallest loss with a dark cell and a white number."""
 _STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
@@ -37,7 +37,7 @@ _SECRETS = {
 
 
 def page_of(report: PrivacyReport, measure: Measure) -> str:
-    """Return the page with a heat map by `measure` for each kind of secrets."""
+    """Return the page with a heat map of `measure` for each kind of secrets."""
     title = html.escape(f"Privacy loss: {report.team}, {report.protocol}")
     head = (
         f'<meta charset="utf-8"><title>{title}</title>'
@@ -71,7 +71,7 @@ def _body(report: PrivacyReport, measure: Measure) -> Iterator[str]:
 
 
 def _legend() -> str:
-    """Return an SVG legend of the colours."""
+    """Return an SVG legend for the colours."""
     losses = (0.0, 0.25, 0.5, 0.75, 1.0, None)
     cells = "".join(_cell(_CELL * place + 1, 1, _CELL, loss) for place, loss in enumerate(losses))
     beside = _CELL * len(losses) + 8
@@ -127,7 +127,7 @@ def _cells(
 
 
 def _cell(x: int, y: int, width: int, loss: float | None) -> str:
-    """Return a square, redder for a larger loss, grey for an unknown one, with a number if there is room."""
+    """Return a square: redder for a larger loss, grey for an unknown loss; with a number if there is room."""
     filled = 'class="unknown"' if loss is None else f'fill-opacity="{loss:.3f}"'
     square = f'<rect x="{x}" y="{y}" width="{width}" height="{width}" {filled}/>'
     if width < _CELL:

@@ -2,7 +2,8 @@
 
 A secret is a cost: an integer from 0 to a known maximum, or `INFINITE`. Its possible costs are a range of finite costs,
 and possibly infinity. Statements narrow them until nothing changes (bounds consistency): all statements are used, but
-each only considers the bounds of its secrets. So no true cost is ever excluded, but not every false cost is.
+each statement considers only the bounds of its secrets. So true costs are never excluded, but some false costs may
+remain.
 """
 
 from __future__ import annotations
@@ -42,17 +43,17 @@ class PossibleCosts(NamedTuple):
         return self.infinite if cost == INFINITE else self.least <= cost <= self.most
 
     def at_least(self, cost: float) -> PossibleCosts:
-        """Return the remaining states if the secret is at least `cost`."""
+        """Return the possible costs that remain if the secret is at least `cost`."""
         least = self.most + 1 if cost == INFINITE else max(self.least, math.ceil(cost))
         return PossibleCosts(least, self.most, self.infinite)
 
     def at_most(self, cost: float) -> PossibleCosts:
-        """Return the remaining states if the secret is at most `cost`, which is finite."""
+        """Return the possible costs that remain if the secret is at most `cost`, which is finite."""
         return PossibleCosts(self.least, min(self.most, math.floor(cost)), infinite=False)
 
 
 ANY = PossibleCosts(0, 2**53, infinite=False)
-"""Any finite cost: the sum of all costs is below 2^53 (`solver/exact_costs.py`)."""
+"""Any finite cost; the sum of all costs is below 2^53 (`solver/exact_costs.py`)."""
 
 
 class AtLeast(NamedTuple):
@@ -77,7 +78,7 @@ class OneAtMost(NamedTuple):
 
 
 class CostCase(NamedTuple):
-    """A possible case: all secrets in `finite` are finite, and in each item of `broken` at least one is infinite."""
+    """A possible case: all secrets in `finite` are finite, and each item in `broken` has an infinite one."""
 
     finite: Terms
     broken: tuple[Terms, ...]
@@ -118,7 +119,7 @@ class Knowledge:
         self._statements[type(statement), statement] = statement  # tuples of different types may be equal
 
     def open_cases(self, statement: OneCase) -> list[int]:
-        """Return the indices of the possible cases."""
+        """Return the indices of the cases that are still possible."""
         return [place for place, case in enumerate(statement.cases) if self._may_be(case)]
 
     def settle(self) -> None:
@@ -152,7 +153,7 @@ class Knowledge:
                 assert_never(never)
 
     def _at_least(self, terms: Terms, least: float) -> list[Secret]:
-        """Raise the least cost of each term to `least` minus the largest costs of the others."""
+        """Raise the smallest possible cost of each term to `least` minus the largest costs of the other terms."""
         changed: list[Secret] = []
         unbounded = [secret for secret in terms if self[secret].infinite]
         if len(unbounded) > 1:
@@ -164,7 +165,7 @@ class Knowledge:
         return changed
 
     def _at_most(self, terms: Terms, most: float) -> list[Secret]:
-        """Lower the largest cost of each term to `most` minus the smallest costs of the others."""
+        """Lower the largest possible cost of each term to `most` minus the smallest costs of the other terms."""
         changed: list[Secret] = []
         total = self._minimum(terms)
         for secret in terms if total < INFINITE else ():
@@ -193,7 +194,7 @@ class Knowledge:
 
 
 def _statements_by_secret(statements: Sequence[Statement]) -> Mapping[Secret, list[int]]:
-    """Return for each secret the indices of the statements about it."""
+    """Return, for each secret, the indices of the statements about it."""
     found: dict[Secret, list[int]] = {}
     for place, statement in enumerate(statements):
         for secret in dict.fromkeys(_secrets(statement)):

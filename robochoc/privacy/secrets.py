@@ -1,8 +1,8 @@
-"""The secrets of a team: the parts of the robots' problems that other robots do not know initially.
+"""The secrets of a team: the parts of the robots' problems that are initially unknown to other robots.
 
-Besides the robots' values there are two kinds of secrets. First, the cost of each declared value of a robot by its
+Besides the robots' values there are two kinds of secrets. First, the cost of each declared value of a robot in its
 private constraints (`INFINITE` for an impossible value), which no other robot knows. Second, the cost of each
-combination of declared values by a shared constraint, which the robots of its scope know; in a partially known
+combination of declared values in a shared constraint, which the robots in its scope know; in a partially known
 constraint, each robot knows only its part.
 """
 
@@ -33,10 +33,10 @@ class TooManySecretsError(RobochocError, ValueError):
 
 
 class _ConstraintSecrets(NamedTuple):
-    """The secrets of a shared constraint, one for each combination of values.
+    """The secrets in a shared constraint, one for each combination of values.
 
-    `places` are the robots of its variables with the variables' indices; `knowing` are the robots that know the
-    constraint.
+    `places` contains, for each variable of the constraint, its robot and its index; `knowing` are the robots that know
+    the constraint.
     """
 
     places: tuple[tuple[str, int], ...]
@@ -46,15 +46,15 @@ class _ConstraintSecrets(NamedTuple):
 
 
 class TeamSecrets:
-    """The secrets of a team, numbered. `truths` are the true costs.
+    """The numbered secrets of a team. `truths` are the true costs.
 
     Attributes:
-        declared: By robot, all combinations of declared values of its interface variables, in ascending order, and the
-            withdrawn value if robots may withdraw.
-        charges: The secret costs of values by private constraints, by robot and value.
-        entries: By robot, the secrets in its shared constraints.
+        declared: For each robot, all combinations of declared values of its interface variables, in ascending order,
+            and the withdrawn value if robots may withdraw.
+        charges: The secret costs of values in private constraints, by robot and value.
+        entries: For each robot, the secrets in its shared constraints.
         most: The largest finite cost.
-        neighbours: By robot, the robots that share a constraint with it, or are linked with it by a file.
+        neighbours: For each robot, the robots that share a constraint with it, or are linked with it in a file.
     """
 
     def __init__(self, team: CompiledTeam, parameters: RunParameters) -> None:
@@ -62,10 +62,10 @@ class TeamSecrets:
         self.declared: dict[str, tuple[Value, ...]] = {}
         self.charges: dict[str, dict[Value, Secret]] = {}
         self.entries: dict[str, dict[Secret, frozenset[str]]] = {}
-        """Each with the robots that know it initially."""
+        """Each secret with the robots that know it initially."""
         self.neighbours: dict[str, set[str]] = {robot.name: set() for robot in team.team.robots}
         self.withdrawing: set[Secret] = set()
-        """Costs of withdrawing, and of values that look like withdrawal: not counted, and never narrowed."""
+        """The costs of withdrawing, and of values that look like withdrawal: not counted, and never narrowed."""
         self._shared: dict[str, list[_ConstraintSecrets]] = {robot.name: [] for robot in team.team.robots}
         self._team = team.team
         self._may_withdraw = parameters.withdrawal_cost is not None
@@ -98,11 +98,11 @@ class TeamSecrets:
         return [secret for secret in found if secret not in self.withdrawing]
 
     def unknown_entries(self, subject: str, observer: str) -> list[Secret]:
-        """Return the entries of constraints that `subject` knows, but `observer` does not know initially."""
+        """Return the entries in constraints that `subject` knows, but `observer` does not know initially."""
         return [one for one, knowing in self.entries[subject].items() if subject in knowing and observer not in knowing]
 
     def own_cost(self, robot: str, value: Value, view: View) -> Terms:
-        """Return the secrets whose sum is the own cost of a value of `robot` in `view` (`protocols/disclosure.py`)."""
+        """Return the secrets whose sum is the own cost of `value` of `robot` in `view` (`protocols/disclosure.py`)."""
         charge = self.charges[robot].get(value)
         terms = [] if charge is None else [charge]
         return tuple(terms + self._between({**view, robot: value}, self._shared[robot]))
@@ -110,14 +110,14 @@ class TeamSecrets:
     def filtered(self, robot: str, value: Value, other: str, theirs: Value, *, parts_only: bool) -> Terms:
         """Return the secrets for a pair of values in the constraints between two robots that `robot` knows.
 
-        With `parts_only`, only its parts of partially known constraints count.
+        With `parts_only`, only the parts of partially known constraints that `robot` knows count.
         """
         view = {robot: value, other: theirs}
         own = [one for one in self._shared[robot] if robot in one.knowing]
         return tuple(self._between(view, [one for one in own if not parts_only or one.knowing == {robot}]))
 
     def among(self, view: View) -> Terms:
-        """Return the secrets of `view` in all constraints among its robots."""
+        """Return the secrets for `view` in all constraints among the robots in `view`."""
         shared = {id(one): one for robot in view for one in self._shared[robot]}
         return tuple(self._between(view, list(shared.values())))
 
@@ -134,7 +134,7 @@ class TeamSecrets:
                 yield dict(zip(view, values, strict=True))
 
     def _matching(self, robot: str, value: Value) -> Sequence[Value]:
-        """Return the declared values of `robot` that equal `value` except where it is None."""
+        """Return the declared values of `robot` that equal `value` wherever `value` is not None."""
         if is_withdrawn(value) or None not in value:
             return [value]
         return [
@@ -175,7 +175,7 @@ class TeamSecrets:
         self.entries[robot.name] = {}
 
     def _link(self, robot: str, other: str) -> None:
-        """Make two robots neighbours that a file links, even if a scenario has left no constraint between them."""
+        """Make two robots that a file links neighbours, even if a scenario has left no constraint between them."""
         self.neighbours[robot].add(other)
         self.neighbours[other].add(robot)
 

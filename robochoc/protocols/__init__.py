@@ -1,10 +1,10 @@
-"""Distributed Constraint Reasoning Protocols unit: one file a protocol, each naming its paper.
+"""Distributed Constraint Reasoning Protocols unit: each protocol is one file that names its paper.
 
 `protocol.py` declares the interface. Protocols are grouped in families, one folder each; `shared` contains parts that
 several families use. A protocol's file contains its messages and settings as well, except where mypyc compiles the
 protocol: then its messages are in `X_messages.py`.
 
-Everything here is pure: no clock, no chance, no process, no input or output (import-linter sees to it).
+Everything here is pure: no clock, no random numbers, no processes, no input or output (enforced by import-linter).
 
 The names below are public, for authors of protocols. They are imported on first use.
 """
@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from robochoc.system.lazy_names import lazy_names
 
-TYPE_CHECKING = False  # start-up
+TYPE_CHECKING = False  # faster start-up
 if TYPE_CHECKING:
     from robochoc.protocols.acts import Act, Performative
     from robochoc.protocols.chance import Chance

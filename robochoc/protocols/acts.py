@@ -1,4 +1,4 @@
-"""The communicative acts of FIPA00037, and the acts of messages of several protocols."""
+"""The communicative acts of FIPA00037, and the acts shared by messages of several protocols."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 
 class Performative(StrEnum):
-    """The name of a communicative act. It is written in capitals, and read in any case."""
+    """The name of a communicative act, written in capitals; case is ignored when it is read."""
 
     ACCEPT_PROPOSAL = "accept-proposal"
     AGREE = "agree"
@@ -34,14 +34,14 @@ class Performative(StrEnum):
 
 
 class Act(NamedTuple):
-    """The act of a type of message: its performative, and the reason for it."""
+    """The communicative act of a message type: its performative, and why this performative fits."""
 
     performative: Performative
     why: str
 
 
 INFORM = Act(Performative.INFORM, "every message informs the receiver")
-"""The act of a message whose class declares no other."""
+"""The act of a message whose class declares no act."""
 
 TELL_VALUE = Act(Performative.INFORM, "the receiver learns the sender's value")
 TELL_DOMAIN = Act(Performative.INFORM, "the receiver learns the sender's values")

@@ -6,7 +6,7 @@ halves of a BLAKE2b digest of seed and name, so similar names have independent s
 nothing else: not on the runtime, nor on other robots' draws. Plain Python computes a number from two words of state in
 a third of a microsecond; numpy computes the same ones for all robots at once (`communication/arrays/cycle_run.py`).
 
-Secrets must not depend on it: see `key_stream.py`.
+Secrets must not depend on this generator: see `key_stream.py`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ MASK: Final = 0xFFFF_FFFF_FFFF_FFFF
 FIRST_FACTOR: Final = 0xBF58_476D_1CE4_E5B9
 SECOND_FACTOR: Final = 0x94D0_49BB_1331_11EB
 UNIT: Final = 2.0**-53
-"""The distance between neighbouring numbers: they are k / 2**53."""
+"""The distance between neighbouring random numbers: every random number is k / 2**53."""
 
 _ALTERNATING: Final = 0xAAAA_AAAA_AAAA_AAAA
 _FEWEST_TRANSITIONS: Final = 24
@@ -30,7 +30,7 @@ _FEWEST_TRANSITIONS: Final = 24
 def key_and_step(seed: int, name: str) -> tuple[int, int]:
     """Return the two words that determine the numbers of the robot `name`; the step is odd.
 
-    As in the paper's `mixGamma`, a step whose bits change too seldom is replaced by one whose bits change often.
+    As in `mixGamma` of the paper, a step whose bits change too seldom is replaced by one whose bits change often.
     """
     digest = blake2b(f"{seed} {name}".encode(), digest_size=16).digest()
     step = int.from_bytes(digest[8:], "little") | 1
@@ -40,12 +40,12 @@ def key_and_step(seed: int, name: str) -> tuple[int, int]:
 
 
 def one_of(chance: Callable[[], float], choices: Sequence[T]) -> T:
-    """Return a random one of `choices`; with a single choice, no random number is drawn."""
+    """Return a random element of `choices`; with a single choice, no random number is drawn."""
     return choices[0] if len(choices) == 1 else choices[int(chance() * len(choices))]
 
 
 class Chance:
-    """The stream of one robot: each call returns the next number, uniform in [0, 1) with 53 bits."""
+    """The random stream of one robot: each call returns the next number, uniform in [0, 1) with 53 bits."""
 
     __slots__ = ("_state", "_step")
 

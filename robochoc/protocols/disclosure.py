@@ -1,4 +1,4 @@
-"""The statements about robots' problems with which messages declare what their receivers learn (`Message.proves`).
+"""Statements about robots' problems: messages declare with them what their receivers learn (`Message.proves`).
 
 Each message type declares its own rule. Its proofs are true statements, each on its own: about the problem, which does
 not change during a run, and about the value that a robot has chosen. `robochoc/privacy` adds up the consequences.
@@ -23,13 +23,14 @@ from robochoc.model.problem import Value
 M = TypeVar("M")
 INFINITE = math.inf
 View = Mapping[str, Value]
-"""Values by robot; None where a variable does not matter."""
+"""Values by robot; None if a variable does not matter."""
 
 
 class HasValue(NamedTuple):
     """`robot` has chosen `value`, and keeps it until the observer receives another value.
 
-    Of several such statements about a robot the one with the largest `stamp` counts, and the last of these.
+    If several such statements concern the same robot, the one with the largest `stamp` is valid; among equal stamps,
+    the last one.
     """
 
     robot: str
@@ -41,8 +42,8 @@ class HasCompatibleValue(NamedTuple):
     """`robot` has chosen a value that is compatible with exactly the values of `other` whose bits are set in `allowed`.
 
     The bits are in the order of `other`'s declared values. Only constraints between these two robots that `robot` knows
-    count; with `parts_only` its parts of partially known ones. The statement is valid until the observer receives
-    another one, as in `HasValue`.
+    count; if `parts_only` is true, only the parts of partially known constraints that `robot` knows. The statement is
+    valid until the observer receives another one, as in `HasValue`.
     """
 
     robot: str
@@ -52,14 +53,14 @@ class HasCompatibleValue(NamedTuple):
 
 
 class HasOnly(NamedTuple):
-    """These values, and no others, are possible for `robot`; the observer then knows them by their places."""
+    """These values, and no others, are possible for `robot`; the observer then knows them by their indices."""
 
     robot: str
     values: tuple[Value, ...]
 
 
 class Pays(NamedTuple):
-    """The own cost of `value` of `robot` in `view` is from `least` to `most`."""
+    """The own cost of `value` of `robot` in `view` is between `least` and `most`."""
 
     robot: str
     value: Value
@@ -69,7 +70,7 @@ class Pays(NamedTuple):
 
 
 class PartPays(NamedTuple):
-    """The parts of `robot` in partially known constraints with `other` charge `cost` for these values of both."""
+    """The parts of `robot` in partially known constraints with `other` charge `cost` for this pair of values."""
 
     robot: str
     value: Value
@@ -87,7 +88,7 @@ class EveryValuePays(NamedTuple):
 
 
 class SomeValuePays(NamedTuple):
-    """There is a value of `robot` whose own cost in `view` is at most `most`."""
+    """At least one value of `robot` has an own cost of at most `most` in `view`."""
 
     robot: str
     view: View
@@ -95,36 +96,36 @@ class SomeValuePays(NamedTuple):
 
 
 class Total(NamedTuple):
-    """The values of all robots in `view`, with all constraints among them, cost `cost` together."""
+    """The total cost of the values of all robots in `view`, in all constraints among these robots, is `cost`."""
 
     view: View
     cost: float
 
 
 class Clash(NamedTuple):
-    """A hard constraint among the robots of `view`, all of them known values, is broken."""
+    """A hard constraint among the robots in `view`, whose values are all known, is broken."""
 
     view: View
 
 
 Proof = HasValue | HasCompatibleValue | HasOnly | Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash
 NOTHING: tuple[Proof, ...] = ()
-"""The proofs of a message without any. It has a rule, unlike a message whose `proves` returns None."""
+"""The proofs of a message that proves nothing. Such a message has a rule, unlike one whose `proves` returns None."""
 AT_THE_END = (2**62,)
 """The stamp of a final value."""
 FINITE = float(2**53)
-"""The upper bound of a cost that is only known to be finite: above all costs of a problem."""
+"""The upper bound on a cost that is only known to be finite. It exceeds all costs in a problem."""
 
 
 class Reception(ABC):
-    """A received message in its context: its sender, and the knowledge of its receiver, the observer.
+    """A received message in its context: its sender, and the knowledge of the observer that receives it.
 
     Attributes:
         sender: The sender of the message.
         receiver: The observer.
         order: All robots, the highest priority first.
-        branch: The robots whose values are in a partial assignment of the sender, the highest first.
-        fixed_holders: Each constraint is checked by the lowest robot of its scope, and the order does not change.
+        branch: The robots whose values appear in a partial assignment from the sender, the highest first.
+        fixed_holders: Each constraint is checked by the lowest robot in its scope, and the order does not change.
         minimises: The run minimises costs, or the number of robots that withdraw.
         max_cost: The highest finite cost of a secret.
     """
@@ -143,7 +144,7 @@ class Reception(ABC):
 
     @abstractmethod
     def values(self, robot: str) -> Sequence[Value] | None:
-        """Return the possible values of `robot`, in its own order, if the observer already knows them."""
+        """Return the possible values of `robot`, in its declared order, if the observer already knows them."""
 
     @abstractmethod
     def width(self, robot: str) -> int:
@@ -151,14 +152,14 @@ class Reception(ABC):
 
     @abstractmethod
     def last(self, kind: type[M], sender: str, receiver: str) -> M | None:
-        """Return the last message of type `kind` on a channel with the observer at one end."""
+        """Return the last message of type `kind` between `sender` and `receiver`, one of which is the observer."""
 
     def is_lowest(self, robot: str) -> bool:
         """Return whether no robot has lower priority than `robot`."""
         return bool(self.order) and self.order[-1] == robot
 
     def is_only_neighbour(self) -> bool:
-        """Return whether the sender shares constraints with the receiver alone."""
+        """Return whether the receiver is the only neighbour of the sender."""
         return {*self.neighbours(self.sender)} == {self.receiver}
 
 
@@ -168,7 +169,7 @@ def can_take(robot: str, value: Value) -> Proof:
 
 
 def partial_assignment(robots: Sequence[str], values: Sequence[Value]) -> list[Proof]:
-    """Return the proofs of a consistent partial assignment: each value is compatible with those before it.
+    """Return the proofs in a consistent partial assignment: each value is compatible with the values before it.
 
     Args:
         robots: The robots, the highest first; there may be more of them than values.
@@ -185,10 +186,10 @@ def partial_assignment(robots: Sequence[str], values: Sequence[Value]) -> list[P
 def table_proves(
     axes: Sequence[str], cells: Iterable[tuple[Sequence[int], float]], reception: Reception
 ) -> Sequence[Proof]:
-    """Return the proofs of `cells` of the sender's table: places on its axes, and the least cost with these values.
+    """Return the proofs in `cells` of the sender's table: indices on its axes, and the least cost with these values.
 
-    Robots whose values the receiver does not know are left out of the views: an upper bound on the cost of some value
-    of the sender with one of their values is also one without them.
+    Robots whose values the receiver does not know are left out of the views: if some value of the sender has a bounded
+    cost together with one of their values, the same bound holds without them.
     """
     sender = reception.sender
     near = [(robot, reception.values(robot)) for robot in reception.neighbours(sender) if robot not in axes]

@@ -1,6 +1,6 @@
 """The base of protocols that continue when the problem changes.
 
-It is apart from `protocol.py`, which is compiled: such a protocol has two bases, and mypyc allows one.
+It is separate from `protocol.py`, which is compiled: such a protocol has two base classes, and mypyc allows only one.
 """
 
 from __future__ import annotations
@@ -14,23 +14,23 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class DynamicProtocol(Protocol):
-    """A protocol that continues when the problem changes, with the results that are still valid.
+    """A protocol that continues when the problem changes and reuses the results that are still valid.
 
-    Between two epochs the host calls `change`, and once all robots have changed, `resume`. Other protocols start again
+    Between two epochs the host calls `change` and, when all robots have changed, `resume`. Other protocols start again
     on the changed problem.
     """
 
     @abstractmethod
     def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """Adopt the changed problem, and drop all that depends on anything `invalidated`. Send nothing.
+        """Adopt the changed problem, and drop everything that depends on anything `invalidated`. Send nothing.
 
-        No robot searches meanwhile. A verdict that is still valid after the changes is kept, and ends the epoch at
-        once.
+        No robot searches in the meantime. A verdict that is still valid after the changes is kept, and ends the epoch
+        at once.
         """
 
     @abstractmethod
     def resume(self, *, lossless: bool) -> None:
-        """Continue the search; called before any message.
+        """Continue the search; called before any message is received.
 
         Args:
             lossless: No message of the previous epoch was lost.

@@ -1,7 +1,7 @@
-"""A robot's knowledge of the search besides its own value: for the collected result only, not for other robots.
+"""A robot's knowledge about the search besides its own value, for the collected result only, not for other robots.
 
-A protocol that minimises may be asked before it ends. Each protocol reports what it has: the cheapest assignment so
-far, a lower bound, its place in the pseudo-tree that the robots have built, or its values in each cycle.
+A protocol that minimises may be queried before it ends. Each protocol reports what it has: the cheapest assignment so
+far, a lower bound, the robot's position in the pseudo-tree that the robots have built, or its values in each cycle.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ class Incumbent(msgspec.Struct, frozen=True):
 
 
 class Trail(msgspec.Struct, frozen=True):
-    """The values of a robot in each cycle of a synchronous protocol: entries (cycle, place of the value).
+    """The values of a robot in each cycle of a synchronous protocol, as pairs (cycle, index of the value).
 
-    There is an entry for each change of the value. All cycles up to `cycle` are final.
+    There is a pair for each change of the value. The values up to `cycle` are final.
     """
 
     entries: list[tuple[int, int]]
@@ -30,14 +30,14 @@ class Trail(msgspec.Struct, frozen=True):
 
 
 class Listing(msgspec.Struct, frozen=True):
-    """The places of a robot's values in the optima that its tree lists, at most `limit` of them."""
+    """The indices of a robot's values in the optima that its tree lists (at most `limit` optima)."""
 
     places: list[int]
     limit: int
 
 
 class Findings(msgspec.Struct, frozen=True):
-    """A robot's knowledge of the whole search; None for information that it, or its protocol, does not have.
+    """A robot's knowledge about the whole search; None for information that the robot or its protocol does not have.
 
     `bound` is a lower bound on the cost of every assignment of its robots (for a root: those of its tree; for the first
     robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, as it may need more than 64

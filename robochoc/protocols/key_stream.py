@@ -1,9 +1,10 @@
-"""The source of random keys for private protocols: the host gives each robot one, `Protocol.secret`.
+"""The source of random keys for private protocols: the host gives each robot a source, `Protocol.secret`.
 
-Across machines it is the operating system's (`secrets.randbits`): the keys cannot be predicted, and a run cannot be
-repeated. In the simulator and in processes all robots belong to one user, and nothing is secret from that user. There
-the source is a `KeyStream`, determined by the run's seed, so that runs can be repeated and replayed. It is BLAKE2b in
-counter mode, keyed by the seed and the robot's name: without the seed, known keys reveal nothing about other keys.
+Across machines the source is that of the operating system (`secrets.randbits`): the keys cannot be predicted, and a run
+cannot be repeated. In the simulator and in processes all robots belong to one user, and nothing is secret from that
+user. There the source is a `KeyStream`, determined by the run's seed, so that runs can be repeated and replayed. It is
+BLAKE2b in counter mode, keyed by the seed and the robot's name: without the seed, known keys reveal nothing about other
+keys.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ _BLOCK = 64
 
 
 class KeyStream:
-    """The repeatable source of one robot: each call draws a number of the given bits."""
+    """The repeatable source of keys for one robot: each call draws a number with the given number of bits."""
 
     def __init__(self, seed: int, name: str) -> None:
         self._key = blake2b(f"keys {seed} {name}".encode()).digest()
         self._drawn = 0
 
     def __call__(self, bits: int) -> int:
-        """Return the next number, from 0 up to below 2 to the power of `bits` (512 at most)."""
+        """Return the next number, at least 0 and less than 2 to the power of `bits` (at most 512)."""
         if not 0 < bits <= 8 * _BLOCK:
             raise ValueError(f"cannot draw {bits} bits at a time; it must be 1 to {8 * _BLOCK}")
         self._drawn += 1

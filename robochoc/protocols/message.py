@@ -1,7 +1,8 @@
 """Messages between robots, and their envelope.
 
-A protocol defines its own messages as subclasses of `Message`, named as in its paper. They travel as msgpack (msgspec):
-compact, and validated against their declared types when they are decoded. Foreign bytes can only fail to decode.
+A protocol defines its own messages as subclasses of `Message`, named as in its paper. Messages are sent as msgpack
+(msgspec): compact, and validated against their declared types when they are decoded. Bytes from an unknown source can
+at worst fail to decode.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from robochoc.protocols.wording import Wording
 if TYPE_CHECKING:
     from robochoc.protocols.disclosure import Proof, Reception
 
-__all__ = ["Envelope", "Message", "Value", "encode"]  # `Value`: for the authors of protocols
+__all__ = ["Envelope", "Message", "Value", "encode"]  # `Value` is exported for the authors of protocols
 
 
 class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
-    """Base of all messages of all protocols; the class's name is its type on the wire.
+    """The base class of the messages of all protocols; the class's name is its type on the wire.
 
     A class declares all that is special about its messages: fields, `act`, sentence, proofs. The sniffer, FIPA ACL, the
-    exports and the measure of privacy use these declarations.
+    exports and the privacy measure use these declarations.
     """
 
     act: ClassVar[Act] = INFORM
@@ -33,26 +34,26 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     backtracks: ClassVar[bool] = False
     """True if the message is a backtrack: its sender has no value left."""
     shareable: ClassVar[bool] = False
-    """True if its receivers change nothing in it: the simulator then passes the same object to all of them."""
+    """True if its receivers do not modify the message: the simulator then passes the same object to all of them."""
 
     proves_nothing: ClassVar[bool] = False
     """True if its receivers learn nothing about other robots' problems from the message."""
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for overrides
-        """Return the message as the sender's sentence: `V1.1 = 1 from now on`. Empty: its fields are shown."""
+        """Return the message as a sentence of the sender: `V1.1 = 1 from now on`. If empty, the fields are shown."""
         return ""
 
     def proves(self, reception: Reception) -> Sequence[Proof] | None:  # noqa: ARG002 - for overrides
-        """Return the proofs that the message gives its receiver about other robots (`protocols/disclosure.py`).
+        """Return what the message proves to its receiver about other robots (`protocols/disclosure.py`).
 
-        None: there is no rule, and the receiver's knowledge is unknown. A message with `proves_nothing` needs no
-        override.
+        None means that there is no rule, so the receiver's knowledge is unknown. A message with `proves_nothing` needs
+        no override.
         """
         return () if self.proves_nothing else None
 
 
 class Envelope(NamedTuple):
-    """One message in transit: sender, receiver, encoded content, and the sender's NCCC clock."""
+    """A message in transit: its sender, its receiver, its encoded content, and the sender's NCCC clock."""
 
     sender: str
     receiver: str
@@ -64,5 +65,5 @@ _encoder = msgspec.msgpack.Encoder()
 
 
 def encode(message: Message) -> bytes:
-    """Return the content of `message` as it travels, and as it is counted in bytes."""
+    """Return the content of `message` as it is sent, and as its bytes are counted."""
     return _encoder.encode(message)

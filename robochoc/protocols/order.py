@@ -9,10 +9,10 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class PriorityOrder:
-    """The names of all robots, the highest priority first. Static, and the same for every robot of a run.
+    """The names of all robots, the highest priority first. The order is static and the same for every robot in a run.
 
-    `tree` is the pseudo-tree that the order induces; None unless the protocol requires it (`Traits.tree`). `rank` is
-    the place of each robot; if it is passed (by `TeamKnowledge`), all robots share the mapping.
+    `tree` is the pseudo-tree that the order induces; None unless the protocol requires it (`Traits.tree`). `rank` maps
+    each robot to its position; if it is passed (by `TeamKnowledge`), all robots share the mapping.
     """
 
     def __init__(
@@ -26,13 +26,13 @@ class PriorityOrder:
         self.tree = None if links is None else PseudoTree.induced(self.names, links)
 
     def lowest(self, names: Iterable[str]) -> str:
-        """Return the lowest-priority robot of `names`. Raises `ValueError` if `names` is empty."""
+        """Return the lowest-priority robot in `names`. Raises `ValueError` if `names` is empty."""
         return max(names, key=self.rank.__getitem__)
 
     def depth(self, names: Iterable[str]) -> int:
-        """Return the place of the lowest-priority robot of `names`; -1 if `names` is empty."""
+        """Return the position of the lowest-priority robot in `names`; -1 if `names` is empty."""
         deepest = -1
-        for name in names:  # most often there are one or two, and a loop is faster than `max` of an iterator
+        for name in names:  # usually there are one or two names, and then a loop is faster than `max` of an iterator
             place = self.rank[name]
             if place > deepest:  # noqa: PLR1730 - faster
                 deepest = place
@@ -43,9 +43,9 @@ class PseudoTree:
     """A forest in which robots that share a constraint are on one branch.
 
     It is the tree that a total order induces (the elimination tree; Dechter, "Constraint Processing", 2003, Section
-    4.5). A robot's tree parent is the lowest robot above it that shares a constraint with it or with a robot below it
-    in the tree. Priority decreases from the roots to the leaves. `parents` maps each robot to its tree parent (None: a
-    root).
+    4.5). The tree parent of a robot is the lowest robot above it that shares a constraint with it or with a robot below
+    it in the tree. Priority decreases from the roots to the leaves. `parents` maps each robot to its tree parent (None
+    for a root).
     """
 
     def __init__(self, order: Sequence[str], parents: Mapping[str, str | None]) -> None:
@@ -58,7 +58,7 @@ class PseudoTree:
 
     @classmethod
     def induced(cls, order: Sequence[str], links: Mapping[str, Iterable[str]]) -> PseudoTree:
-        """Return the tree that `order` induces; `links` maps each robot to its neighbours of higher priority."""
+        """Return the tree induced by `order`; `links` maps each robot to its neighbours with higher priority."""
         rank = {name: place for place, name in enumerate(order)}
         above = {name: set(links[name]) for name in order}
         parents: dict[str, str | None] = {}
@@ -71,7 +71,7 @@ class PseudoTree:
 
     @property
     def roots(self) -> list[str]:
-        """The roots: one for each connected component."""
+        """The roots, one for each connected component."""
         return [name for name, parent in self.parents.items() if parent is None]
 
     def ancestors(self, name: str) -> list[str]:

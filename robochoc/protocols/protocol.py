@@ -1,9 +1,9 @@
 """The interface of protocols: a state machine that receives and sends messages.
 
-A host (see `communication/host.py`) drives it: it calls `start` once, then for each packet of waiting messages
-`receive` for each message, and `settle` when the inbox has been drained. Sent messages collect in `outbox`, which the
-host empties. A protocol never reads the time or draws random numbers by itself, and behaves the same in a simulator and
-on a robot.
+A host (see `communication/host.py`) drives the protocol: it calls `start` once; then, for each batch of waiting
+messages, it calls `receive` for each message, and `settle` when the inbox has been drained. Sent messages are collected
+in `outbox`, which the host empties. A protocol never reads the time or draws random numbers by itself, and behaves the
+same in a simulator and on a robot.
 """
 
 from __future__ import annotations
@@ -24,60 +24,61 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Protocol(ABC):
-    """One robot's side of a protocol.
+    """The part of a protocol that runs on one robot.
 
-    Subclasses declare `messages`, the union of the message types that they receive, and their `traits`: properties and
-    capabilities. The docstring of their module is shown by `robochoc protocols NAME`.
+    Subclasses declare `messages`, the union of the message types that they receive, and `traits`, their properties and
+    capabilities. `robochoc protocols NAME` shows the docstring of their module.
     """
 
     messages: ClassVar[Any]
     traits: ClassVar[Traits] = Traits()
     settings: ClassVar[Settings] = NO_SETTINGS
-    """The defaults; the host replaces them by the given settings before `start`."""
+    """The default settings; the host replaces them by the given settings before `start`."""
     chance: Callable[[], float]
-    """Draws from [0, 1), seeded for each robot; set by the host before `start`. Secrets must not depend on it."""
+    """Draws a number from [0, 1), seeded for each robot; set by the host before `start`. Secrets must not depend on it.
+    """
     secret: Callable[[int], int]
-    """Draws a number of the given bits, for keys (`protocols/key_stream.py`); set by the host before `start`."""
+    """Draws a number of the given bit length, for keys (`protocols/key_stream.py`); set by the host before `start`."""
     numbered_values: ClassVar[bool] = False
-    """True if the robots never receive others' values, only numbers of assignments; `view` contains these numbers."""
+    """True if robots never receive the values of other robots, only indices of assignments; `view` contains these."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem
         self.order = order
         self.outbox: list[tuple[str, Message]] = []
-        """Receivers and messages."""
+        """The receivers and messages that wait to be sent."""
         self.checks_at_send: list[int] = []
         """For each message in the outbox: `problem.checks` at the time of sending. The host computes the message's
         clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
         self.value: int | None = None
-        """This robot's value, as its place in `problem.values`; None: unassigned. Messages contain the value itself."""
+        """This robot's value, as its index in `problem.values`; None: unassigned. Messages contain the value itself."""
         self.verdict: Verdict | None = None
         """Set when this robot alone can decide the result of the search, for example by deriving the empty nogood."""
 
     @abstractmethod
     def start(self) -> None:
-        """Start the search; called once, before any message."""
+        """Start the search; called once, before any message is received."""
 
     @abstractmethod
     def receive(self, sender: str, message: Message) -> None:
         """Process one message."""
 
     def settle(self) -> None:  # noqa: B027 - optional
-        """Decide on the whole view; called when the inbox has been drained."""
+        """Decide, based on the whole view; called when the inbox has been drained."""
 
     def miss(self, sender: str) -> None:  # noqa: B027 - optional
-        """Record that a message of `sender` is lost; its next message follows the lost one."""
+        """Record that a message from `sender` was lost; the next message from `sender` follows the lost one."""
 
     def go_on(self) -> bool:
-        """Continue without the awaited messages, as no more will arrive. Return False if that is impossible.
+        """Continue without the awaited messages, because no more will arrive. Return False if that is impossible.
 
         It must return False after finitely many calls.
         """
         return False
 
     def send(self, receiver: str, message: Message) -> None:
-        """Send `message` to `receiver`; its clock does not include later checks."""
-        # A replay has its own kind of list: for a `list`, mypyc would not call its `append`.
+        """Send `message` to `receiver`; the clock of the message does not include later checks."""
+        # A replay uses its own kind of list: on a `list`, mypyc would bypass an overridden `append`.
         outbox: MutableSequence[tuple[str, Message]] = self.outbox
         outbox.append((receiver, message))
         self.checks_at_send.append(self.problem.checks)
@@ -105,20 +106,20 @@ class Protocol(ABC):
 
     @property
     def findings(self) -> Findings:
-        """This robot's knowledge of the whole search besides its own value. May be read at any time."""
+        """This robot's knowledge about the whole search besides its own value. May be read at any time."""
         return NO_FINDINGS
 
-    # Optional: what a replay shows of the state (`replay/inspection.py`), which finds agent views, nogood stores,
-    # contexts and partial assignments by itself. None of these may check constraints or change the state.
+    # Optional: the state that a replay shows (`replay/inspection.py`). The replay finds agent views, nogood stores,
+    # contexts and partial assignments by itself. None of these methods may check constraints or change the state.
 
     @property
     def checked_against(self) -> Mapping[str, Value] | None:
-        """The values of others against which this robot's values are checked; None: all that it knows."""
+        """The other robots' values against which this robot's values are checked; None: all values that it knows."""
         return None
 
     @property
     def kept_nogoods(self) -> Iterable[Mapping[str, Value]]:
-        """The nogoods outside a `NogoodStore`: assignments that cannot all hold, this robot's included."""
+        """The nogoods outside a `NogoodStore`: assignments, including this robot's, that cannot all hold."""
         return ()
 
     def value_notes(self, index: int) -> Mapping[str, float]:  # noqa: ARG002 - used by overrides

@@ -1,7 +1,7 @@
-"""Requirements of a problem on a protocol: costs, and the kinds of constraints that a robot has.
+"""The requirements of a problem that its protocol must meet: costs, and the kinds of constraints that a robot has.
 
 A run checks all robots before it starts (`run/compatibility`). Across machines only the robot itself knows its
-constraints, so each robot checks its own. Both import this module.
+constraints, so each robot checks its own. Both checks import this module.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _TWO = 2
 
 
 def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -> str:
-    """Return a feature of `robot` that a protocol with these `traits` does not support; empty if there is none.
+    """Return a feature of `robot` that a protocol with these `traits` does not support; empty if all are supported.
 
     Args:
         robot: The robot with its constraints.

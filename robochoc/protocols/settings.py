@@ -1,4 +1,4 @@
-"""Settings of protocols (`--set NAME=VALUE`): their base class, and the reading of values given as text."""
+"""Settings of protocols (`--set NAME=VALUE`): their base class, and a parser for values given as text."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ MOST = 10**12
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The base of a protocol's settings: fields of simple types, each with a default.
+    """The base class for the settings of a protocol: fields of simple types, each with a default.
 
-    A subclass's docstring explains its fields; `robochoc protocols NAME` shows it. `__post_init__` raises `ValueError`
-    for invalid values. `may_be_infinite` names the fields that accept `inf`.
+    A subclass explains its fields in its docstring, which `robochoc protocols NAME` shows. `__post_init__` raises
+    `ValueError` for invalid values. `may_be_infinite` names the fields that accept `inf`.
     """
 
     may_be_infinite: ClassVar[frozenset[str]] = frozenset()
@@ -33,17 +33,18 @@ class SettingsError(RobochocError, ValueError):
 
 
 class HasSettings(typing.Protocol):
-    """A protocol, as far as its settings are concerned (`protocol.py` imports this module)."""
+    """The attributes of a protocol that concern its settings (`protocol.py` imports this module)."""
 
     @property
     def settings(self) -> Settings:
-        """The defaults, or after `equip` the given values."""
+        """The default settings, or the given settings after `equip`."""
 
 
 def equip(protocol: HasSettings, given: Mapping[str, str]) -> None:
-    """Give one robot's protocol the settings that are `given`. Raises `SettingsError`."""
+    """Apply the `given` settings to one robot's protocol. Raises `SettingsError`."""
     if given:
-        # For mypyc settings belong to the class, not to its objects. Protocols with settings are not compiled.
+        # mypyc treats settings as an attribute of the class, not of its objects. Protocols with settings are not
+        # compiled.
         setattr(protocol, "settings", read_settings(type(protocol), given))  # noqa: B010
 
 

@@ -1,4 +1,4 @@
-"""Properties and capabilities of a protocol: its row in `robochoc protocols`."""
+"""Properties and capabilities of a protocol: its row in the list printed by `robochoc protocols`."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ ENDS_WITH_PROOF = (Verdict.NO_SOLUTION,)
 ENDS_WITH_EITHER = (Verdict.SOLUTION, Verdict.NO_SOLUTION)
 """One robot decides either result of the search, for example the last robot that a token reaches."""
 UNDECLARED = (Verdict.SOLUTION, Verdict.NO_SOLUTION, Verdict.UNKNOWN)
-"""The default of `concludes`. It never contains `optimal`: a run reports that for a `solution` with a proof."""
+"""The default of `concludes`. It never contains `optimal`: a run reports `optimal` for a `solution` with a proof."""
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,10 @@ class Traits:
         costs: It minimises costs (a DCOP).
         n_ary: Constraints may be over more than two robots.
         partially_known: It accepts partially known constraints (PKC).
-        asymmetric: Their parts may have costs: each side pays its own part, and the sum is minimised.
-        shared_scopes: Every robot of a constraint's scope knows the constraint, because the order of the robots changes
-            during the search. Otherwise only the lowest robot of the scope knows it.
+        asymmetric: The parts of partially known constraints may have costs: each side pays its own part, and the sum is
+            minimised.
+        shared_scopes: Every robot in a constraint's scope knows the constraint, because the order of the robots changes
+            during the search. Otherwise only the lowest robot in the scope knows it.
         writes_to_non_neighbours: Its robots also send messages to robots with which they share no constraint.
             Otherwise access control across machines prevents it.
         tree: It works on a pseudo-tree.
@@ -43,11 +44,11 @@ class Traits:
         secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
         needs: A required module of an extra, and the command to install it. A run without it is refused.
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
-        arrays: It has a form for whole teams at once (`communication/arrays`).
+        arrays: It has an array implementation that runs a whole team at once (`communication/arrays`).
         bears_loss: It continues when messages are lost in transit (`Protocol.miss`, `Protocol.go_on`).
         allocates: It accepts only task allocations: teams whose only shared constraints are that a task is done by at
             most one robot, and in which each robot may do none (`solver/exclusions.py`).
-        congestion: It also accepts task allocations in which several robots may do a task, each pair at a cost.
+        congestion: It also accepts task allocations in which several robots may do a task, at a cost for each pair.
         drops_only: The protocol accepts only constraints that are dropped when a robot is absent (`model/absence.py`).
             Its robots withdraw one after the other, so earlier decisions could break a restated constraint.
         privacy: The information that neighbours do not receive.
@@ -82,7 +83,7 @@ class Traits:
 
     @property
     def lacks(self) -> str:
-        """Return the missing dependency and how to install it, in words; empty if there is none."""
+        """Return the missing dependency and how to install it, as text; empty if nothing is missing."""
         if self.needs is None or find_spec(self.needs[0]) is not None:
             return ""
         return f"{self.needs[0]}, which is not installed; run: {self.needs[1]}"
@@ -90,7 +91,7 @@ class Traits:
     def conclusion_error(self, verdict: str) -> str:
         """Return an error text if no robot of this protocol may end the search with `verdict`; otherwise empty.
 
-        The protocol itself, the parent of processes, and the master across machines all apply this rule.
+        The protocol itself, the parent process of the robots, and the master across machines all apply this rule.
         """
         if verdict in self.concludes:
             return ""

@@ -1,7 +1,7 @@
-"""Parts of the sentences in which messages are shown: values with the names of their variables, costs, nogoods.
+"""Parts of the sentences that show messages: values with the names of their variables, costs, nogoods.
 
-`Message.in_words` uses them. A message may come from a journal of unknown origin. So long lists are cut, and values of
-unknown robots are named, too.
+`Message.in_words` uses them. A message may come from a journal of unknown origin, so long lists are cut, and values of
+unknown robots get names too.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def costs_text(costs: Iterable[float]) -> str:
 
 
 def incumbent_text(cost: float) -> str:
-    """Return a clause about the incumbent, the best solution so far, of this cost; infinity: there is none."""
+    """Return a clause about the incumbent, the best solution so far, with this cost; infinity: there is none."""
     return "no solution is known yet" if math.isinf(cost) else f"the best solution so far costs {cost_text(cost)}"
 
 
@@ -41,18 +41,18 @@ def is_withdrawn(value: RobotValue) -> bool:
 
 
 class Wording(NamedTuple):
-    """The sender and the receiver of a message, and the names for its sentence.
+    """The sender and the receiver of a message, and the names to use in its sentence.
 
     `order` and `interfaces` are empty if the team is unknown.
 
     Attributes:
         sender: The robot that sent the message.
-        receiver: The robot that it is addressed to.
+        receiver: The robot that receives it.
         order: All robots, the highest priority first.
-        interfaces: By robot, the variables whose values its messages contain.
-        branch: The robots whose values a partial assignment contains, the highest first: the priority order; in a
+        interfaces: For each robot, the variables whose values appear in its messages.
+        branch: The robots whose values appear in a partial assignment, the highest first: the priority order; in a
             protocol on the order's pseudo-tree, the sender's ancestors and the sender.
-        symbols: By symbolic variable, the names of its values.
+        symbols: For each symbolic variable, the names of its values.
     """
 
     sender: str
@@ -80,7 +80,7 @@ class Wording(NamedTuple):
         return symbols[value] if 0 <= value < len(symbols) else str(value)
 
     def facts(self, robot: str, value: RobotValue) -> list[str]:
-        """Return a robot's value variable by variable, such as `V1.1 = 2`, or `V1 withdraws`."""
+        """Return the value of a robot, one text for each variable: `V1.1 = 2`, or `V1 withdraws`."""
         if is_withdrawn(value):
             return [f"{robot} withdraws"]
         return [f"{name} = {part}" for name, part in self.parts(robot, value)]
@@ -98,7 +98,7 @@ class Wording(NamedTuple):
         return self.assigned(along(self.branch, values))
 
     def condition(self, lhs: Mapping[str, RobotValue]) -> str:
-        """Return a nogood's left side as a condition, `as long as V1.1 = 2, `; empty if there is none.
+        """Return the left side of a nogood as a condition, `as long as V1.1 = 2, `; empty if there is none.
 
         Variables that do not matter are left out.
         """
@@ -126,7 +126,7 @@ class Wording(NamedTuple):
         return f"as long as {listed(facts)}, " if facts else ""
 
     def domain(self, values: Sequence[RobotValue]) -> str:
-        """Return the values that the sender may take: `V2.1 is 1, 2 or 3`."""
+        """Return the possible values of the sender: `V2.1 is 1, 2 or 3`."""
         names = self.interfaces.get(self.sender, ())
         flying = [value for value in values if not is_withdrawn(value)]
         withdrawn = ", or I withdraw" if len(flying) < len(values) else ""
@@ -140,6 +140,6 @@ class Wording(NamedTuple):
 
 
 def along(names: Sequence[str], things: Sequence[T]) -> list[tuple[str, T]]:
-    """Return each thing with its robot, in the order of `names`; further robots are numbered."""
+    """Return each thing with its robot, in the order of `names`; robots beyond the list are numbered."""
     known = [*names[: len(things)], *(f"robot {place + 1}" for place in range(len(names), len(things)))]
     return list(zip(known, things, strict=True))

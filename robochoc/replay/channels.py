@@ -1,10 +1,11 @@
-"""Restores the messages of a recorded run, by channel, for their second delivery.
+"""Restores the messages of a recorded run, channel by channel, so that they can be delivered again.
 
 The n-th message received on a channel is the n-th message sent on it. A journal contains the fields of messages instead
-of their bytes. Its binary form preserves the fields, and messages are encoded from them. Its text form changes infinite
-numbers, bytes, and keys that are not strings; there messages are decoded by their types first. The type is not used for
-preserved fields, because in a `float` field a protocol may have sent 0, which is encoded as an integer. The recorded
-size of the message shows whether the restoration was successful. Otherwise the message of the replayed sender is used.
+of their bytes. The binary form of a journal preserves the fields, and messages are encoded from them. The text form
+changes infinite numbers, bytes, and keys that are not strings; in this case messages are first decoded by their types.
+The type is not used for preserved fields, because in a `float` field a protocol may have sent 0, which is encoded as an
+integer. The recorded size of the message shows whether the restoration was successful. Otherwise the message of the
+replayed sender is used.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from robochoc.protocols.protocol import Protocol
 Edge = tuple[str, str]
 
 _UNFIT = (msgspec.MsgspecError, RecursionError, UnicodeError, TypeError, OverflowError)
-"""Raised for fields that do not belong to a message: those of a journal are untrusted."""
+"""Raised for fields that do not match a message: the fields in a journal are untrusted."""
 
 _encode = msgspec.msgpack.Encoder().encode
 
@@ -57,7 +58,7 @@ class MessageDecoder:
         return None
 
     def same(self, recorded: Sent, replayed: Sent) -> bool:
-        """Return whether a replayed message has the `recorded` fields, in either form of journal."""
+        """Return whether a replayed message has the `recorded` fields, in the binary or the text form of a journal."""
         if recorded.type != replayed.type or list(recorded.content) != list(replayed.content):
             return False
         fields, again = list(recorded.content.values()), list(replayed.content.values())
@@ -71,21 +72,21 @@ class MessageDecoder:
 
     def _unchanged(self, fields: list[Any]) -> bytes:
         content = _encode(fields)
-        self._decoder.decode(content)  # raises if it is not a message of the protocol
+        self._decoder.decode(content)  # raises if the content is not a message of the protocol
         return content
 
     def _through_type(self, fields: list[Any]) -> bytes:
         return _encode(self._decoder.decode(_encode(fields)))
 
     def _through_json(self, fields: list[Any]) -> bytes:
-        """Return the fields after a round trip through JSON, which turns bytes and keys into text."""
+        """Return the fields after conversion to JSON and back, which turns bytes and keys into text."""
         return _encode(msgspec.convert(fields, self._union, str_keys=True))
 
 
 class RecordedChannels:
-    """The messages of a run or an epoch with these `events`, by channel.
+    """The messages in a run or an epoch with these `events`, by channel.
 
-    A message that was sent again in the replay is delivered instead of the recorded one.
+    If the replay has sent a message again, that message is delivered instead of the recorded one.
     """
 
     def __init__(self, events: Iterable[AnyEvent], decoder: MessageDecoder) -> None:
@@ -93,7 +94,7 @@ class RecordedChannels:
         self._recorded: dict[Edge, deque[Sent]] = {}
         self._again: dict[Edge, deque[bytes]] = {}
         self._ahead: dict[Edge, int] = {}
-        """The number of messages of a channel that were delivered before they were sent again."""
+        """For each channel, the number of messages that were delivered before they were sent again."""
         for event in events:
             if isinstance(event, Sent):
                 self._recorded.setdefault((event.sender, event.receiver), deque()).append(event)
@@ -119,7 +120,7 @@ class RecordedChannels:
         return True
 
     def deliver(self, received: Received) -> tuple[Sent | None, Envelope | None]:
-        """Return the record of a received message, and its envelope for the replay; None if missing."""
+        """Return the record of a received message, and its envelope for the replay; None for what is missing."""
         edge = (received.sender, received.receiver)
         recorded = self._recorded.get(edge)
         if not recorded:

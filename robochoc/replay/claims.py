@@ -1,8 +1,8 @@
 """Compares the header and the outcome of a journal with the results of its steps.
 
-All steps may be equal while the header or the outcome is from another run. Metrics are counted again from the replayed
-steps. The verdict and the values are those of the protocol objects at the end. An answer published during the search
-(`--improve`) may be older: it is checked with the constraints, and must be as good.
+Even if all steps are equal, the header or the outcome may be from another run. Metrics are counted again from the
+replayed steps. The verdict and the values must be those of the protocol objects at the end. An answer published during
+the search (`--improve`) may be older: it is checked against the constraints, and must be equally good.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ from robochoc.verification.checker import RefutedError, assignment_cost, violati
 
 _COUNTS = ("messages", "bytes", "ncccs", "checks", "largest")
 _COUNTS_IN_FIRST_VERSION = _COUNTS[:-1]
-"""The counts in the first version of journals."""
+"""The counts in the first version of the journal format."""
 ANY_DEADLINE = 0.0
 """A journal does not contain limits: the robots' values at its end may be an answer at a deadline."""
 
 
 class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
-    """A claim of the journal (`recorded`) that differs from the replay's result (`replayed`)."""
+    """A claim in the journal (`recorded`) that differs from the replay's result (`replayed`)."""
 
     what: str
     recorded: object
@@ -50,7 +50,7 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """A replayed run of `team` with its answer; None if the journal does not suffice for one."""
+    """A replayed run of `team` with its answer; the answer is None if the journal does not contain enough data."""
 
     run: RecordedRun
     team: Team
@@ -63,11 +63,11 @@ def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None
 
 
 def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_complete: bool) -> Iterator[Contradiction]:
-    """Yield the claims of the journal that differ from the results of its steps.
+    """Yield the claims in the journal that differ from the results of its steps.
 
     Args:
         journal: The journal.
-        runs: Its runs, replayed.
+        runs: The replayed runs in the journal.
         is_complete: Whether all robots were replayed to the end. Otherwise the runs' answers are unknown.
     """
     header, outcome = journal.header, journal.outcome
@@ -95,7 +95,7 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_com
 
 
 def _may_be_incomplete(outcome: Outcome) -> bool:
-    """Return whether the counts may lack steps of robots that were computing at the end of the search.
+    """Return whether the counts may lack the steps of robots that were still computing at the end of the search.
 
     This is possible if a deadline or an event has ended the search.
     """
@@ -103,7 +103,7 @@ def _may_be_incomplete(outcome: Outcome) -> bool:
 
 
 def _exceeding(whose: str, recorded: Metrics, replayed: Metrics, names: Sequence[str]) -> Iterator[Contradiction]:
-    """Yield recorded counts that exceed those of the steps."""
+    """Yield the recorded counts that exceed the counts in the replayed steps."""
     for name in names:
         left, right = getattr(recorded, name), getattr(replayed, name)
         every = left if isinstance(left, dict) else {name: left}
@@ -113,7 +113,7 @@ def _exceeding(whose: str, recorded: Metrics, replayed: Metrics, names: Sequence
 
 
 def _last_runs(runs: Sequence[ReplayedRun]) -> dict[int, ReplayedRun]:
-    """Return the last run of each epoch, by its number. Preprocessing belongs to the epoch of the following search."""
+    """Return the last run in each epoch, by its number. Preprocessing belongs to the epoch of the following search."""
     found: dict[int, ReplayedRun] = {}
     number = -1
     for one in runs:
@@ -131,11 +131,11 @@ def _header_contradictions(
 ) -> Iterator[Contradiction]:
     """Yield contradictions between the header and the robots' parameters.
 
-    The first run is one of `placed_by` if the search was omitted because a robot had no solution by itself.
-    Preprocessing before the search is not a run of the protocol.
+    If `placed_by` is given, the search was omitted because a robot had no solution by itself, and the first run is by
+    one of these protocols. Preprocessing before the search is not a run of the protocol.
     """
     names = [run.began.protocol for run in runs if run.began and run.began.protocol != DisAC.__name__]
-    # The class may also be one that is not installed under a name.
+    # The class may also be one that is not registered under a name.
     found = protocol_by_class(names[0], [header.protocol]) if names else None
     if found is not None and found[0] not in (header.protocol, placed_by):
         yield Contradiction(what="the header's protocol", recorded=header.protocol, replayed=found[0])
@@ -151,7 +151,7 @@ def _header_contradictions(
 
 def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> Iterator[Contradiction]:
     replayed = last.answer
-    if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # limits are not in a journal
+    if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # a journal does not contain limits
         return
     if recorded.improvements:
         yield from _published_contradictions(whose, recorded, replayed, last.team)
@@ -163,7 +163,7 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
 
 
 def _published_contradictions(whose: str, recorded: Answer, replayed: Answer, team: Team) -> Iterator[Contradiction]:
-    """Yield the contradictions of an answer that was published during the search, or is better than its end."""
+    """Yield the contradictions in an answer that was published during the search, or is better than the final one."""
     withdrawn = recorded.withdrawn
     faults = [*violations(team, recorded.assignment, withdrawn)]
     if faults:
@@ -221,7 +221,7 @@ def _places(run: RecordedRun, outcome: Outcome) -> bool:
 
 
 def _verdict(events: Sequence[AnyEvent], concluded: set[str]) -> Verdict:
-    """Return the verdict that a robot has concluded; else a solution, if all messages were received."""
+    """Return the verdict that a robot has concluded; otherwise `solution`, if all messages were received."""
     if len(concluded) == 1:
         return Verdict(concluded.pop())
     under_way = sum(isinstance(event, Sent) - isinstance(event, Received) for event in events)

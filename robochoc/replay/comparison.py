@@ -1,4 +1,4 @@
-"""Comparison of a replayed step with its record."""
+"""Compares a replayed step with its record."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class StepDifference(msgspec.Struct, frozen=True, kw_only=True):
     """The first event that differs between journal and replay.
 
     Attributes:
-        run: The number of the run or epoch, from 0 on.
+        run: The number of the run or epoch, counted from 0.
         protocol: The name of the protocol's class.
         robot: The robot of the event.
-        step: The number of the robot's step, over the whole journal, from 0 on.
-        packet: The messages received in the step; empty for the robot's start.
-        recorded: The event in the journal; None if it has no more events of this step.
-        replayed: The event in the replay; None if it has no more events of this step.
-        raised: The exception raised by the protocol, with its place in the code; otherwise empty.
+        step: The number of the robot's step, counted from 0 over the whole journal.
+        packet: The messages received in the step; empty for the step in which the robot starts.
+        recorded: The event in the journal; None if the journal has no more events in this step.
+        replayed: The event in the replay; None if the replay has no more events in this step.
+        raised: The exception raised by the protocol, with its file and line; otherwise empty.
     """
 
     run: int
@@ -49,7 +49,8 @@ class StepDifference(msgspec.Struct, frozen=True, kw_only=True):
 class StepComparison:
     """Compares the events of steps. Times are not compared.
 
-    The first version of journals had another order of events, and messages had the clock of the step's end.
+    In the first version of the journal format, the events had another order, and messages had the clock at the end of
+    the step.
     """
 
     def __init__(self, decoder: MessageDecoder, header: Header | None) -> None:
@@ -90,7 +91,7 @@ class StepComparison:
 
 
 def _place_in_first_version(event: AnyEvent) -> int:
-    """Return a sort key: in the first version of journals, decisions came before messages."""
+    """Return a sort key: in the first version of the journal format, decisions came before messages."""
     match event:
         case Received():
             return 0

@@ -1,8 +1,8 @@
-"""A robot's state at one moment, in words. Inspection changes nothing, and its checks are not counted.
+"""A robot's state at one moment, as text. Inspection changes nothing, and its checks are not counted.
 
 Agent views, nogood stores, partial assignments and contexts are found by the names and types of the protocol's
-attributes. A protocol can describe other special attributes itself (`protocols/protocol.py`). All others are shown by
-`safe_repr`.
+attributes. A protocol can describe other special attributes itself (`protocols/protocol.py`). All other attributes are
+shown by `safe_repr`.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiled_core import attributes_of
 
 MOST_VALUES = 60
-"""The most values of the robot that are shown besides the present one."""
+"""The maximum number of values of the robot that are shown besides the current one."""
 MOST_NOGOODS = 60
 MOST_SEEN = 200
-"""The most robots whose values are shown."""
+"""The maximum number of robots whose values are shown."""
 MOST_ELSE = 40
 ALWAYS = "what holds whatever the others take"
 VIEWS = ("view", "cpa", "path", "assignments", "context")
-"""Attributes in which protocols store the known values of others."""
+"""Attributes in which protocols store the known values of other robots."""
 _KNOWN = {
     *(
         "problem",
@@ -56,7 +56,7 @@ class Inspector:
 
     def __init__(self, part: AgentProblem) -> None:
         self._part = part
-        self._problem = LocalProblem(part)  # separate, so that its checks are not counted
+        self._problem = LocalProblem(part)  # a separate problem, so that its checks are not counted
         self._own = ValueText(part.interfaces)
         self.agent = part.robot.name
         self._ranks = part.known.rank
@@ -95,7 +95,7 @@ class Inspector:
         return (0, rank) if rank is not None else (1, natural_key(robot))
 
     def message_text(self, sender: str, message: Message, receiver: str = "") -> str:
-        """Return a message in words. The receiver is this robot unless `receiver` is given."""
+        """Return a message as text. The receiver is this robot unless `receiver` is given."""
         fields = {name: getattr(message, name) for name in message.__struct_fields__}
         value, lhs = as_value(fields.get("value")), fields.get("lhs")
         if value is not None and isinstance(lhs, Mapping):
@@ -123,7 +123,7 @@ class Inspector:
         return [*shown, (f"and {more:,} more", None)] if more else shown
 
     def own_value(self, protocol: Protocol, index: int) -> str:
-        """Return the value at `index` in words, with its cost if any value has one."""
+        """Return the value at `index` as text, with its cost if any value has a cost."""
         text = self._own.own_value_text(self.agent, protocol.problem.values[index])
         notes = protocol.value_notes(index)
         if notes:
@@ -151,7 +151,7 @@ class Inspector:
         return ("a try: nobody below could go on with it", ()) if protocol.tried(index) else None
 
     def nogoods(self, protocol: Protocol) -> list[str]:
-        """Return the stored nogoods in words: while V1.1 = 2: V2.1 != 3."""
+        """Return the stored nogoods as text: while V1.1 = 2: V2.1 != 3."""
         found = [
             f"while {lhs}: {against}" if lhs else f"{against}, whatever the others take"
             for lhs, against in islice(self._nogoods(protocol), MOST_NOGOODS + 1)
@@ -159,7 +159,7 @@ class Inspector:
         return [*found[:MOST_NOGOODS], "and more"] if len(found) > MOST_NOGOODS else found
 
     def more(self, protocol: Protocol) -> dict[str, str]:
-        """Return all other attributes of the protocol; for built-in protocols public and not empty ones only."""
+        """Return all other attributes of the protocol; for built-in protocols, only public non-empty ones."""
         ours = type(protocol).__module__.startswith("robochoc.")
         skipped = {*_KNOWN, safely(lambda: self._view_in(protocol), "")}
         told: dict[str, str] = {}
@@ -174,14 +174,14 @@ class Inspector:
                 told.setdefault(name.lstrip("_"), safe_repr(thing))
         return told
 
-    # Knowledge of others
+    # Knowledge about other robots
 
     def _others(self, protocol: Protocol) -> ValueText:
-        """Return the words for others' values: some protocols (DisFC) send numbers of assignments instead."""
+        """Return the formatter for the values of others: some protocols (DisFC) send numbers of assignments instead."""
         return NumberedValueText(self._part.interfaces) if protocol.numbered_values else self._own
 
     def _view_in(self, protocol: Protocol) -> str:
-        """Return the name of the attribute that holds others' values; empty if there is none."""
+        """Return the name of the attribute that contains the values of others; empty if there is none."""
         there = attributes_of(protocol)
         return next((name for name in VIEWS if isinstance(there.get(name), Mapping | list | tuple)), "")
 
@@ -193,13 +193,13 @@ class Inspector:
         return self._pairs(attributes_of(protocol)[name], protocol.order.names)
 
     def _pairs(self, kept: Mapping[str, object] | Sequence[object], order: Sequence[str]) -> dict[str, Value]:
-        """Return the values in `kept`, by name; a sequence holds those of the first robots in `order`."""
+        """Return the values in `kept`, by name; a sequence contains the values of the first robots in `order`."""
         pairs = kept.items() if isinstance(kept, Mapping) else zip(order, kept, strict=False)
         found = {who: value for who, thing in pairs if (value := _value_in(thing)) is not None}
         return {who: value for who, value in found.items() if who in self._part.interfaces}
 
     def _seen(self, protocol: Protocol) -> dict[str, Value]:
-        """Return the others' values that the robot checks its values against; without a view, those in messages."""
+        """Return the others' values against which the robot checks its own; without a view, the values in messages."""
         known = protocol.checked_against
         if known is None:
             known = self._known(protocol)

@@ -1,4 +1,4 @@
-"""The reasons for a robot's new value, or for its conclusion of the search, in words, one line each."""
+"""The reasons for a robot's new value, or for its conclusion of the search, as text, one line each."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from robochoc.system.compiled_core import attributes_of
 
 MOST_REASONS = 8
 MOST_BACKTRACKS = 3
-"""The most backtracks shown for a step. A robot may backtrack repeatedly."""
+"""The maximum number of backtracks shown for a step. A robot may backtrack repeatedly."""
 MOST_TOGETHER = 3
-"""The most values listed for a common reason."""
+"""The maximum number of values listed for a common reason."""
 
 _CONCLUDED = {
     Verdict.NO_SOLUTION: "that there is no solution",
@@ -29,7 +29,7 @@ _CONCLUDED = {
 
 
 class _DeadEnd(NamedTuple):
-    """A moment without a remaining value: the reasons that exclude the values, and the message sent then."""
+    """A moment in which no value remains: the reasons that exclude the values, and the message sent then."""
 
     ruled_out: list[str]
     kind: str
@@ -44,7 +44,7 @@ class _DeadEnd(NamedTuple):
 
 
 class Reasons:
-    """Explains a robot's changes: inspects it before a step, at each message it sends, and after the step."""
+    """Explains a robot's changes: inspects the robot before a step, at each message it sends, and after the step."""
 
     def __init__(self, inspector: Inspector, protocol: Protocol) -> None:
         self._inspector = inspector
@@ -62,7 +62,7 @@ class Reasons:
             return  # the message excludes a value of another robot
         ruled_out = safely(self._ruled_out, [])
         if self._dead_ends and self._dead_ends[-1].ruled_out == ruled_out:
-            self._dead_ends[-1].receivers.append(receiver)  # AWC sends a nogood to all its robots
+            self._dead_ends[-1].receivers.append(receiver)  # AWC sends a nogood to all robots in it
         elif len(self._dead_ends) <= MOST_BACKTRACKS:
             said = safely(lambda: self._inspector.message_text(self._inspector.agent, message, receiver), "")
             self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
@@ -90,7 +90,7 @@ class Reasons:
         return store if isinstance(store, NogoodStore) else None
 
     def _ruled_out(self) -> list[str]:
-        """Return the reasons that exclude the values, each with its values."""
+        """Return the reasons that exclude values, each with the values it excludes."""
         count = len(self._protocol.problem.values)
         by_reason: dict[str, list[str]] = {}
         for index in range(min(count, MOST_VALUES)):
@@ -140,7 +140,7 @@ class Reasons:
         return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
 
     def _is_first(self, index: int) -> bool:
-        """Return whether all earlier values are ruled out; false if values have costs."""
+        """Return whether all earlier values are ruled out; False if values have costs."""
         protocol, store = self._protocol, self._store()
         if protocol.traits.costs:
             return False
@@ -152,7 +152,7 @@ class Reasons:
         return all(against[:-1]) and not against[-1]
 
     def _is_hopeless(self) -> bool:
-        """Return whether all own values are ruled out, for any values of other robots."""
+        """Return whether all own values are ruled out whatever the values of other robots are."""
         store = self._store()
         if store is None:
             return False
@@ -171,13 +171,13 @@ def _by(reason: str) -> str:
 
 
 def _last(received: Sequence[tuple[Sent, Message]]) -> list[tuple[Sent, Message]]:
-    """Return each robot's last message about itself in one packet, and all nogoods."""
+    """Return, from one packet, each robot's last message about itself, and all nogoods."""
     latest = {sent.sender: place for place, (sent, message) in enumerate(received) if not hasattr(message, "lhs")}
     return [pair for place, pair in enumerate(received) if hasattr(pair[1], "lhs") or latest[pair[0].sender] == place]
 
 
 def _together(values: Sequence[str]) -> str:
-    """Return values in words, joined, with `was` or `were`."""
+    """Return values as text, joined, with `was` or `were`."""
     if len(values) == 1:
         return f"{values[0]} was"
     more = len(values) - MOST_TOGETHER

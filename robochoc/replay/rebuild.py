@@ -1,4 +1,4 @@
-"""The robots of each recorded run, rebuilt from their recorded problems."""
+"""Rebuilds the robots of each recorded run from their recorded problems."""
 
 from __future__ import annotations
 
@@ -42,11 +42,11 @@ _UNCOMPILED = (
     UnsupportedError,
     SettingsError,
 )
-"""Raised for robots that cannot be compiled, or whose settings do not fit."""
+"""Raised for robots that cannot be compiled, or whose settings are invalid."""
 
 
 class CannotReplayError(RobochocError):
-    """A run cannot be replayed, with the reason and a hint. `broken`: the journal is damaged."""
+    """A run cannot be replayed; contains the reason and a hint. `broken`: the journal is damaged."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:
         super().__init__(why)
@@ -54,15 +54,15 @@ class CannotReplayError(RobochocError):
 
 
 class ReplayOptions(NamedTuple):
-    """Inputs of a replay besides the journal.
+    """Inputs to a replay besides the journal.
 
     Attributes:
-        team: The team in files, for journals without the robots' problems.
-        protocols: Protocols by their classes' names, to be used instead of the installed ones.
+        team: The team from its files, for journals without the robots' problems.
+        protocols: Protocols by their class names, to be used instead of the installed ones.
         settings: The settings of the protocol, if the journal does not record them.
         limits: Limits for robots whose private constraints need a solver (`solver/compile.py`).
-        cache: Their cached solutions.
-        solver: The solver's process.
+        cache: The cache of solutions for these robots.
+        solver: The process of the solver.
     """
 
     team: Team | None = None
@@ -77,12 +77,12 @@ class RebuiltRobots(NamedTuple):
     """The robots of one run, ready to start.
 
     Attributes:
-        protocol: Their protocol.
-        hosts: Their hosts, by name.
+        protocol: The protocol of the robots.
+        hosts: The hosts of the robots, by robot name.
         parts: Each robot's part of the problem.
         lossless: Whether no message of the previous epoch was lost.
-        continuing: Robots that continue with their results of the previous epoch.
-        compiled: Their compiled team.
+        continuing: Robots that continue with their results from the previous epoch.
+        compiled: The compiled team of the robots.
     """
 
     protocol: type[Protocol]
@@ -102,7 +102,7 @@ def reads_files(events: Iterable[AnyEvent]) -> bool:
 class Rebuilder:
     """Creates the robots of each run in turn. Robots that continue into an epoch remain the same objects.
 
-    `only` are the robots to create; None for all. Raises `CannotReplayError` for a run in which messages may be lost.
+    `only` names the robots to create; None for all. Raises `CannotReplayError` for a run in which messages may be lost.
     """
 
     def __init__(self, header: Header | None, options: ReplayOptions, only: Collection[str] | None = None) -> None:
@@ -138,7 +138,7 @@ class Rebuilder:
         return RebuiltRobots(protocol, hosts, parts, lossless, continuing, epoch.compiled)
 
     def _protocol(self, run: RecordedRun) -> type[Protocol]:
-        """Return the protocol of the run; in a master's journal, that of the header."""
+        """Return the protocol of the run; in a master's journal, the protocol in the header."""
         asked = self._header.protocol if self._header else None
         if run.began is None:
             return self._named(asked or "")
@@ -168,7 +168,7 @@ class Rebuilder:
         return Epoch(compiled, invalidated_of(given), frozenset(given.fresh), run_parameters_of(given))
 
     def _from_files(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
-        """Return the epoch of the team in files, without the robots lost before."""
+        """Return the epoch of the team in the files, without the robots lost earlier."""
         if self._options.team is None:
             raise CannotReplayError(
                 "the journal lacks the robots' problems, as in a run across machines;"
@@ -199,7 +199,7 @@ class Rebuilder:
         return team
 
     def _without_lost(self, team: Team) -> Team:
-        """Return `team` without the robots lost before. Across machines, the others keep their interfaces."""
+        """Return `team` without the robots lost earlier. Across machines, the other robots keep their interfaces."""
         on_network = self._header is not None and self._header.runtime == "network"
         left = without_robots(team, self._lost, with_files=on_network)
         return keep_interfaces(left, team) if on_network else left
@@ -219,7 +219,7 @@ class Rebuilder:
 
 
 def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epoch: Epoch) -> Host:
-    """Return the host of the previous epoch if it continues, or a new one. Raises `CannotReplayError`."""
+    """Return the host from the previous epoch if it continues, or a new host. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
         if before is None or name in epoch.restarted:

@@ -1,6 +1,6 @@
 """Replay: the protocol objects of a recorded run process its packets again.
 
-A protocol is a pure state machine. With the same packets it must send the same messages again. If it does not, the
+A protocol is a pure state machine. Given the same packets, it must send the same messages again. If it does not, the
 protocol has changed, or the journal was altered. All events of robots are compared except for their times: received
 messages, decisions, incumbents, conclusions, sent messages and their sizes, NCCC clocks and constraint checks.
 """
@@ -24,7 +24,7 @@ from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import runs_of
 
 PROGRESS_EVERY = 256
-"""Steps between two reports of progress."""
+"""The number of steps between two progress reports."""
 
 
 class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
@@ -42,17 +42,17 @@ class ReplayResult:
 
     Attributes:
         runs: The number of runs and epochs that were started.
-        robots: The number of robots in them.
+        robots: The number of robots in these runs.
         steps: The number of steps that were replayed and found equal.
-        messages: The number of messages sent in them.
+        messages: The number of messages sent in these steps.
         unfinished: The number of steps that are incomplete in the journal; their recorded part was compared.
         difference: The first difference; None if there is none.
         stopped: Robots that could not be replayed to the end.
         damage: The reason why the journal ends early; None if it does not.
         ended: Whether the journal contains the end of the run.
-        contradictions: Claims of header and outcome that differ from the results of the steps.
-        truncated: Whether the only damage is a missing end.
-        decided_before: The run was decided without any step, because a robot has no solution by itself.
+        contradictions: Claims in the header and the outcome that differ from the results of the steps.
+        truncated: Whether the only damage is that the end of the journal is missing.
+        decided_before: Whether the run was decided without any step, because a robot has no solution by itself.
     """
 
     runs: int
@@ -70,7 +70,7 @@ class ReplayResult:
 
     @property
     def identical(self) -> bool:
-        """Whether something was replayed, and all of it was equal."""
+        """Whether at least one step was replayed, and all steps were equal."""
         return self.steps > 0 and not self.differs
 
     @property
@@ -87,7 +87,7 @@ def replay(
     Args:
         journal: The journal.
         options: Inputs besides the journal.
-        progress: Is called with the progress.
+        progress: Called with the progress.
 
     Raises:
         CannotReplayError: if the robots cannot be rebuilt.

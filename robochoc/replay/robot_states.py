@@ -32,7 +32,7 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
     Attributes:
         step: The number of the step.
         value: The values of the robot's variables; empty if it has none.
-        view: The known state of other robots, as pairs (robot, words).
+        view: The known state of other robots, as pairs (robot, text).
         domain: Each value of the robot, with the reason that excludes it.
         nogoods: The stored nogoods.
         more: Everything else that the protocol stores, by name.
@@ -62,13 +62,13 @@ def states_of(
     If the journal lacks the next messages to the robot, `more` of the last state contains the reason.
 
     Args:
-        journal: A journal, or events sorted as in one. Events of `robot` and messages to it are sufficient if
+        journal: A journal, or events sorted as in a journal. Events of `robot` and messages to it are sufficient if
             `everything` is given.
         robot: The robot's name.
         options: Inputs besides the journal.
         header: The journal's header, if `journal` is only events.
-        since: The number of the first step to yield a state for.
-        everything: Returns the events of all robots; called if they turn out to be needed.
+        since: The number of the first step for which a state is yielded.
+        everything: Returns the events of all robots; called only if they are needed.
 
     Raises:
         CannotReplayError: if there is nothing to replay, or the installed protocol is not the recorded one.
@@ -95,7 +95,7 @@ class _MissingContentError(Exception):
 
 
 class _Player:
-    """Replays the robot's steps, and inspects it after each; `alone`, or with all other robots."""
+    """Replays the robot's steps, and inspects the robot after each step; `alone`, or with all other robots."""
 
     def __init__(self, header: Header | None, robot: str, options: ReplayOptions, *, alone: bool) -> None:
         self._rebuilder = Rebuilder(header, options, {robot} if alone else None)
@@ -157,7 +157,7 @@ class _Player:
         )
 
     def _last(self, step: RecordedStep, why: str, since: int) -> RobotState | None:
-        """Return a last state without content, except for the reason of the end."""
+        """Return a last state that contains only the reason why the replay ends."""
         if step.robot != self._robot:
             return None
         self._step += 1

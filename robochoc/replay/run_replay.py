@@ -1,4 +1,4 @@
-"""The replay of one recorded run with its packets."""
+"""Replays one recorded run with its packets."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ from robochoc.system.errors import RobochocError
 SIMULATED = "simulator"
 """The runtime whose schedules may delay messages. The delay of a message advances the receiver's clock."""
 MAX_EXTRA_MESSAGES = 10_000
-"""Messages that a replayed step may send beyond those recorded."""
+"""The maximum number of messages that a replayed step may send beyond those recorded."""
 
 Listener = Callable[[str, Message], None]
-"""Called with the receiver and the message when the protocol sends it, within the step."""
+"""Called within the step, with the receiver and the message, when the protocol sends a message."""
 
 
 class NoEndError(RobochocError):
@@ -33,7 +33,7 @@ class NoEndError(RobochocError):
 class ReplayStopsError(RobochocError):
     """A robot cannot be replayed any further.
 
-    `needs_sender`: a message to it can only be restored by replaying its sender.
+    `needs_sender`: a message to this robot can only be restored by replaying its sender.
     """
 
     def __init__(self, why: str, *, needs_sender: bool = False) -> None:
@@ -42,7 +42,7 @@ class ReplayStopsError(RobochocError):
 
 
 class _Outbox(list[tuple[str, Message]]):
-    """An outbox of limited size, since most faulty protocols send messages endlessly."""
+    """An outbox of limited size, because most faulty protocols send messages endlessly."""
 
     def __init__(self, most: int, listener: Listener) -> None:
         super().__init__()
@@ -50,7 +50,7 @@ class _Outbox(list[tuple[str, Message]]):
         self._listener = listener
 
     def append(self, sent: tuple[str, Message]) -> None:
-        """Add one message. Raises `NoEndError` if there are too many."""
+        """Add one message. Raises `NoEndError` if there are too many messages."""
         if len(self) >= self._most:
             raise NoEndError(f"{len(self):,} messages in one step, which may never end")
         super().append(sent)
@@ -72,9 +72,9 @@ class RunReplay:
         self._started: set[str] = set()
 
     def steps(self) -> Iterator[RecordedStep]:
-        """Yield the steps in their order; each must be played before the next.
+        """Yield the steps in order; each must be played before the next is requested.
 
-        Across machines clocks differ, so a message may seem to be received before it was sent. Such a step is delayed.
+        Clocks differ across machines, so a message may seem to be received before it was sent. Such a step is delayed.
         """
         waiting: dict[str, deque[RecordedStep]] = {}
         for step in steps_of(self.run.events):
@@ -87,7 +87,7 @@ class RunReplay:
             yield from steps
 
     def _enabled_steps(self, waiting: dict[str, deque[RecordedStep]]) -> Iterator[RecordedStep]:
-        """Yield the delayed steps that can be played now; each may enable another one."""
+        """Yield the delayed steps that can be played now; each of these may enable another step."""
         moved = True
         while moved:
             moved = False
@@ -103,7 +103,7 @@ class RunReplay:
 
         Args:
             step: The step.
-            number: Its number among its robot's steps.
+            number: The step's number among the steps of its robot.
             listener: Called for each message that the protocol sends.
 
         Raises:
@@ -157,13 +157,13 @@ class RunReplay:
         self.received_messages.append((message, self._decoder.message(envelope.content)))
 
     def _delay(self, host: Host, received: Received, events: list[AnyEvent]) -> None:
-        """Advance the clock by the delay of a message: only the recorded clock shows it."""
+        """Advance the clock by the delay of a message: only the recorded clock shows this delay."""
         if self._simulated and received.clock > host.clock and events and isinstance(events[-1], Received):
             host.catch_up(received.clock)
             events[-1] = msgspec.structs.replace(events[-1], clock=received.clock)
 
     def _finish_step(self, host: Host, step: RecordedStep) -> Sequence[Envelope]:
-        """Let the robot settle, or start unless it has started before."""
+        """Call the robot's `settle`, or `start` if it has not started before."""
         sent: Sequence[Envelope] = ()
         if step.received and (step.is_complete or step.done):
             sent = host.settle()

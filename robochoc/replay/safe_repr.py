@@ -15,7 +15,7 @@ from robochoc.system.compiled_core import attributes_of
 
 MAX_DEPTH = 3
 MAX_ENTRIES = 12
-"""The maximum number of shown items of a collection."""
+"""The maximum number of items shown in a collection."""
 MAX_LENGTH = 200
 """The maximum number of characters."""
 _CONTEXT = (LocalProblem, PriorityOrder, AgentProblem)
@@ -76,7 +76,7 @@ class _Repr(reprlib.Repr):
 
 
 def _as_builtin(thing: object) -> dict[object, object] | list[object] | set[object] | None:
-    """Return a collection of another type as a built-in one; None if it is not a collection."""
+    """Return a collection of another type as a built-in collection; None if `thing` is not a collection."""
     if isinstance(thing, Mapping):
         return dict(islice(thing.items(), MAX_ENTRIES + 1))
     if isinstance(thing, AbstractSet):

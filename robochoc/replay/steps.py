@@ -1,7 +1,7 @@
-"""Groups the events of a journal by run, and those of a run by the steps of its robots.
+"""Groups the events in a journal by run, and the events in a run by the steps of its robots.
 
-In a step, a robot processes one packet: it receives the messages, decides, sends messages, and settles. Its start is a
-step without received messages. The last step may be incomplete if the journal or the robot ends early.
+In a step, a robot processes one packet: it receives the messages, decides, sends messages, and settles. The start of a
+robot is a step without received messages. The last step may be incomplete if the journal or the robot ends early.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from robochoc.journal.events import (
 )
 
 RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
-"""The events of a robot, in its own order."""
+"""The events of one robot, in the order of that robot."""
 
 
 class RecordedRun(NamedTuple):
-    """A run or an epoch, counted from 0. In a master's journal it has no `Began` and no `Given`."""
+    """A run or an epoch, counted from 0. A run in a master's journal has no `Began` and no `Given`."""
 
     number: int
     began: Began | None
@@ -37,7 +37,7 @@ class RecordedRun(NamedTuple):
 
 
 class RecordedStep(NamedTuple):
-    """One step of one robot: the messages received, the events after that, and whether it is complete."""
+    """One step of one robot: the received messages, the events after them, and whether the step is complete."""
 
     robot: str
     received: Sequence[Received]
@@ -46,7 +46,7 @@ class RecordedStep(NamedTuple):
 
 
 def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
-    """Yield the runs in order, omitting those without problems and events of robots."""
+    """Yield the runs in order, omitting runs without problems and without events of robots."""
     number = 0
     run = RecordedRun(0, None, None, [])
     for event in events:
@@ -69,7 +69,7 @@ def _is_one(run: RecordedRun) -> bool:
 
 
 def steps_of(events: Iterable[AnyEvent]) -> Iterator[RecordedStep]:
-    """Yield the steps of one run in the order of their ends, then incomplete ones."""
+    """Yield the steps in one run in the order of their ends, then the incomplete steps."""
     open_still: dict[str, list[RobotEvent]] = {}
     for event in events:
         robot = actor(event)

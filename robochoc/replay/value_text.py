@@ -1,4 +1,4 @@
-"""Values, views and nogoods in words, with the names of variables: V1.1 = 2."""
+"""Values, views and nogoods as text, with the names of variables: V1.1 = 2."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from robochoc.protocols.message import Value
 from robochoc.solver.agent_problem import Interfaces
 
 LONGEST = 200
-"""The most characters of a phrase; longer ones are cut."""
+"""The maximum number of characters in a phrase; longer phrases are cut."""
 MOST_NAMED = 12
-"""The most robots in a phrase."""
+"""The maximum number of robots in a phrase."""
 
 
 def cut(text: str, longest: int = LONGEST) -> str:
@@ -25,25 +25,25 @@ class ValueText:
         self._interfaces = interfaces
 
     def value(self, robot: str, value: Sequence[int | None]) -> str:
-        """Return `value` of `robot` in words: V1.1 = 2, V1.2 = 1."""
+        """Return `value` of `robot` as text: V1.1 = 2, V1.2 = 1."""
         return self._pairs(robot, value, "=", ", ") or f"{robot}: any value"
 
     def against(self, robot: str, value: Sequence[int | None]) -> str:
-        """Return the exclusion of `value` for `robot` in words: V1.1 != 2."""
+        """Return the exclusion of `value` for `robot` as text: V1.1 != 2."""
         known = [part for part in value if part is not None]
         if len(known) == 1:
             return self._pairs(robot, value, "!=", "")
         return f"not {self._pairs(robot, value, '=', ', ')}" if known else f"{robot} cannot take part"
 
     def all(self, values: Mapping[str, Sequence[int | None]] | Iterable[tuple[str, Sequence[int | None]]]) -> str:
-        """Return several robots' values in words: V1.1 = 2 and V2.1 = 3; empty if there are none."""
+        """Return the values of several robots as text: V1.1 = 2 and V2.1 = 3; empty if there are none."""
         pairs = list(values.items() if isinstance(values, Mapping) else values)
         named = [self._pairs(robot, value, "=", " and ") or f"any value of {robot}" for robot, value in pairs]
         more = [f"{len(named) - MOST_NAMED:,} more"] if len(named) > MOST_NAMED else []
         return cut(" and ".join([*named[:MOST_NAMED], *more]))
 
     def own_value_text(self, robot: str, value: Sequence[int | None]) -> str:
-        """Return the value of a robot in words; "withdraws" if all its components are None."""
+        """Return the value of a robot as text; "withdraws" if all its components are None."""
         return self._pairs(robot, value, "=", ", ") or ("withdraws" if value else "shows no variable")
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:
@@ -60,7 +60,7 @@ def is_value(thing: object) -> bool:
 
 
 def as_value(thing: object) -> Value | None:
-    """Return `thing` as a robot's value; None if it is not one."""
+    """Return `thing` as a robot's value; None if `thing` is not a value."""
     return thing if is_value(thing) else None  # type: ignore[return-value]  # checked by `is_value`
 
 

@@ -1,1 +1,1 @@
-"""Constraint Solver unit: a robot's own problem, made ready for protocols."""
+"""Constraint Solver unit: compiles each robot's own problem for the protocols, and solves whole teams."""

@@ -1,4 +1,4 @@
-"""ACE in a process of its own, which receives tasks and returns solutions.
+"""ACE in a separate process, which receives tasks and returns solutions.
 
 ACE (https://github.com/xcsp3team/ace, bundled with pycsp3) is a Java program. One process with one warm JVM serves
 all tasks of a run; the first task that is not small starts it. The process runs `solver/ace_process.py`; small tasks
@@ -61,7 +61,7 @@ LONGEST_WAIT_S = 1e6
 """`select` does not accept timeouts of 1e300 seconds, which users may set."""
 REPORT_TIME_S = 1.0
 TASKS = 400
-"""The number of tasks after which the process is restarted: ACE leaks memory with every problem."""
+"""The number of tasks after which the process is restarted: ACE leaks memory with each problem."""
 
 
 class SolvedBy(StrEnum):
@@ -74,7 +74,7 @@ class SolvedBy(StrEnum):
 
 @dataclass(frozen=True)
 class SolverAnswer:
-    """The number of solutions, whether there are no others, and (unless only counted) the solutions."""
+    """The number of solutions, whether there are no others, and (unless only counted) the solutions themselves."""
 
     found: int
     complete: bool
@@ -84,10 +84,10 @@ class SolverAnswer:
 
 @dataclass(frozen=True)
 class Query:
-    """The part of a network that remains to be solved: `asked`, the network of the variables at `places`.
+    """The part of a network that remains to be solved: `asked`, the network of the variables at positions `places`.
 
     These are the variables with tables after propagation. The others are `free`: every combination of their values
-    extends every solution. The query is for up to `limit` solutions, or for their number (`count_only`).
+    extends every solution. The query asks for up to `limit` solutions, or for their number (`count_only`).
     """
 
     asked: Network
@@ -96,7 +96,7 @@ class Query:
     limit: int | None
     count_only: bool
     costs: Costs
-    """The variables at `places` whose codes are minimised. For `free` ones, the smallest code comes first."""
+    """The variables at `places` whose codes are minimised. For the `free` variables, the smallest code comes first."""
 
     @property
     def trivial(self) -> bool:
@@ -121,12 +121,12 @@ class Query:
         return cls(asked, places, free, limit, count_only, paid)
 
     def rows(self, numbers: Sequence[int]) -> list[Codes]:
-        """Return the solutions of `asked` in `numbers`, the concatenation of their codes."""
+        """Return the solutions of `asked` from `numbers`, the concatenation of their codes."""
         width = len(self.asked.domains)
         return [tuple(numbers[start : start + width]) for start in range(0, len(numbers), width)]
 
     def answered(self, found: int, *, complete: bool, solutions: Sequence[Codes], means: SolvedBy) -> SolverAnswer:
-        """Return the answer for the whole network from the answer for `asked`."""
+        """Return the answer for the whole network, computed from the answer for `asked`."""
         total = found * math.prod(len(domain) for domain in self.free.values())
         wanted = total if self.limit is None else min(total, self.limit)
         whole = () if self.count_only else tuple(itertools.islice(self._combined(solutions), wanted))
@@ -141,10 +141,10 @@ class Query:
 
 
 class AceProcess:
-    """ACE's process, started by the first task that is not small; small tasks are enumerated without it.
+    """The ACE process, started by the first task that is not small; small tasks are enumerated without it.
 
-    With `always`, ACE solves small tasks as well. `close`, or leaving the context, ends the process and removes its
-    files. Without `java` it can only `export`.
+    With `always`, ACE also solves small tasks. `close`, or leaving the context, ends the process and removes its files.
+    Without `java` the process can only `export`.
     """
 
     def __init__(self, *, java: bool = True, always: bool = False) -> None:
@@ -176,7 +176,7 @@ class AceProcess:
         return self._process.pid if self._process else None
 
     def start(self) -> None:
-        """Start the process, if it is not running, so that it is warm for the first task."""
+        """Start the process, if it is not running yet, so that it is warm for the first task."""
         if self._socket is None:
             self._start()
 
@@ -222,12 +222,12 @@ class AceProcess:
         costs: Costs = (),
         deadline: float | None = None,
     ) -> bool:
-        """Send a task to the solver. Call `answer` before the next task.
+        """Send a task to the solver. Call `answer` before sending the next task.
 
-        With `costs`, the answer is one solution that minimises the sum of these codes.
+        With `costs`, the answer is one solution that minimises the sum of the codes at these positions.
 
         Returns:
-            Whether the answer is pending. False: propagation or enumeration found it without ACE.
+            Whether the answer is pending. If False, propagation or enumeration has found it without ACE.
 
         Raises:
             SolverMissingError: if Java is not available.
@@ -273,11 +273,11 @@ class AceProcess:
             raise SolverLostError("the constraint solver stopped before its search was complete")
         numbers = array("i")
         numbers.frombytes(message.solutions)
-        rows = sorted(question.rows(numbers))  # in the order of enumerated solutions
+        rows = sorted(question.rows(numbers))  # the order in which enumeration returns solutions
         return question.answered(message.found, complete=message.complete, solutions=rows, means=SolvedBy.ACE)
 
     def abort(self) -> SolverTimeoutError:
-        """End the process, since the time is over, and return the error with the best solution so far."""
+        """End the process, because the deadline has passed, and return the error with the best solution so far."""
         question, output = self._question, b""
         if question is not None and question.costs and self._folder is not None:
             with suppress(OSError):
@@ -293,7 +293,7 @@ class AceProcess:
     def export(self, network: Network, names: Sequence[str], costs: Codes = ()) -> bytes:
         """Return `network` as an XCSP3 document that minimises the sum of the variables at `costs`.
 
-        Variables are called `names`. Raises the errors of `solve`.
+        `names` are the names of the variables. Raises the errors of `solve`.
         """
         paid = tuple((place, 1) for place in costs)
         self._send_task(AceExport(list(names), _task(network, None, count_only=True, strategy="default", costs=paid)))
@@ -323,9 +323,9 @@ class AceProcess:
         self._searching = False
 
     def _small(self, question: Query) -> SolverAnswer | None:
-        """Return the answer by enumeration. None: it takes too many steps.
+        """Return the answer by enumeration. None: enumeration takes too many steps.
 
-        The steps take no longer than a query to ACE, including its start if it is not running.
+        The step limit is about the time of a query to ACE, including the start of ACE if it is not running.
         """
         budget = Budget(STEPS_EACH + (self._steps_left if self._socket is None else 0))
         try:
@@ -348,7 +348,7 @@ class AceProcess:
     def _start(self) -> None:
         self._folder = PrivateFolder()
         ours, theirs = socket.socketpair()
-        # The solver reads from this pipe, whose other end only this process has, and so ends with this process.
+        # The solver reads from this pipe, whose other end only this process has, so the solver ends with this process.
         watched, self._lifeline = os.pipe()
         try:
             with (self._folder.path / "stderr").open("wb") as stderr:
@@ -371,7 +371,7 @@ class AceProcess:
         self._socket = ours
 
     def _send_task(self, task: ToAce, deadline: float | None = None) -> None:
-        if self._searching:  # for an abandoned task
+        if self._searching:  # for a task that was abandoned
             self.close()
         self.start()
         body = msgspec.msgpack.encode(task)
@@ -383,7 +383,7 @@ class AceProcess:
         except TimeoutError:  # the process does not read before it has started
             self._question = None
             raise self.abort() from None
-        except OSError:  # it hung up, perhaps after sending an error
+        except OSError:  # the process hung up, perhaps after sending an error
             self._receive_message(time.monotonic() + REPORT_TIME_S)
             self._raise_lost()
         self._tasks += 1
@@ -425,7 +425,7 @@ class AceProcess:
         return message
 
     def _raise_lost(self) -> None:
-        """Raise `SolverLostError` with the cause of the process's end."""
+        """Raise `SolverLostError` with the reason why the process ended."""
         status, output = None, ""
         if self._process is not None and self._folder is not None:
             with suppress(subprocess.TimeoutExpired):
@@ -445,7 +445,7 @@ def _left_s(deadline: float | None) -> float | None:
 
 
 def _in_xcsp3(formula: Formula) -> str:
-    """Return `formula` as a predicate of XCSP3 without negative numbers."""
+    """Return `formula` as an XCSP3 predicate without negative numbers."""
     if isinstance(formula, Junction):
         return f"{'and' if formula.every else 'or'}({','.join(map(_in_xcsp3, formula.parts))})"
     left: list[str] = []

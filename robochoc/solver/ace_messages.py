@@ -1,4 +1,4 @@
-"""The messages between ACE's process and its parent: msgpack, each after its length. Without the parent's imports."""
+"""The messages between ACE's process and its parent: msgpack, each after its length. Needs no parent's imports."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ LENGTH = struct.Struct("!Q")
 _VALUES = re.compile(rb"<values>([^<]*)</values>")
 
 Strategy = Literal["default", "static"]
-"""ACE's search strategy: its default (weighted degrees, restarts), or the static order of the variables."""
+"""ACE's search strategy: its default (weighted degrees, restarts), or a static variable order."""
 
 
 def codes_of(output: bytes, width: int) -> array[int]:
-    """Return the codes of all solutions in ACE's output, `width` for each. Raises `ValueError`."""
+    """Return the codes of all solutions in ACE's output, `width` codes for each. Raises `ValueError`."""
     numbers = array("i", map(int, b" ".join(_VALUES.findall(output)).split()))
     if len(numbers) % width:
         raise ValueError("values are missing in ACE's answer")
@@ -29,7 +29,7 @@ def codes_of(output: bytes, width: int) -> array[int]:
 
 
 class EncodedTable(msgspec.Struct, frozen=True, array_like=True):
-    """An `encoding.Table` whose rows are at the index `rows` of the task's `rows`."""
+    """An `encoding.CodeTable` whose rows are at the index `rows` in the `rows` of the task."""
 
     scope: tuple[int, ...]
     allowed: bool
@@ -37,18 +37,18 @@ class EncodedTable(msgspec.Struct, frozen=True, array_like=True):
 
 
 class AceTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """Solve this network: all solutions up to `limit`, or only their number, or a cheapest one.
+    """Solve this network: return all solutions up to `limit`, or only their number, or a cheapest solution.
 
     Attributes:
         domains: The codes of each variable.
         tables: The tables.
         rows: The rows of the tables.
-        different: Scopes on which all values differ.
+        different: Scopes in which all values differ.
         limit: The maximum number of solutions.
         count_only: Whether only the number is returned.
         strategy: ACE's search strategy.
-        costs: Positions of variables with units: the cost is the sum of their codes times the units.
-        formulas: Predicates of XCSP3 over `x0`, `x1`, ...
+        costs: Positions of variables, with units: the cost is the sum of their codes times the units.
+        formulas: XCSP3 predicates over `x0`, `x1`, ...
     """
 
     domains: list[list[int]]
@@ -63,14 +63,14 @@ class AceTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class AceExport(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """Write this network as an XCSP3 document; variables are called `names`, and codes are values."""
+    """Write this network as an XCSP3 document; `names` are the names of the variables, and codes are values."""
 
     names: list[str]
     task: AceTask
 
 
 class AceSolutions(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """`found` solutions, `complete` if there are no others; `solutions` are their codes, four bytes each.
+    """`found` solutions, `complete` if there are no others; `solutions` contains their codes, four bytes each.
 
     If costs are minimised: at most one solution, `complete` if none is cheaper.
     """

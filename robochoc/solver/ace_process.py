@@ -44,22 +44,22 @@ from robochoc.solver.ace_messages import (
 from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 JVM_OPTIONS = (
-    "-XX:+UseSerialGC",  # two cores, small heaps: the collector that starts fastest
-    "-XX:+IgnoreUnrecognizedVMOptions",  # for other versions
+    "-XX:+UseSerialGC",  # two cores, small heaps: this collector starts fastest
+    "-XX:+IgnoreUnrecognizedVMOptions",  # for other Java versions
     "-XX:+UnlockDiagnosticVMOptions",
-    "-XX:-BytecodeVerificationRemote",  # ACE is as trusted as Python's packages; a fifth of the start-up time
+    "-XX:-BytecodeVerificationRemote",  # ACE is trusted like Python packages; saves a fifth of the start-up
     "-Xmx2g",
     "-Xss16m",
     "-Xrs",  # this process handles signals, not the JVM
-    "-XX:+DisableAttachMechanism",  # with -Xrs its socket would stay in the temporary folder
+    "-XX:+DisableAttachMechanism",  # with -Xrs, the socket of the attach mechanism would stay in the temporary folder
     "-XX:-UsePerfData",  # no statistics file in the temporary folder
     "-XX:ErrorFile=/dev/null",
     "-XX:-CreateCoredumpOnCrash",
     "--enable-native-access=ALL-UNNAMED",
 )
 ACE_OPTIONS = ("-s=all", "-xc=false", "-npc", "-v=-1", "-omv=false", "-riv=false")
-"""No colours, only the answer, and every variable with its value."""
-# The last two: with removed variables, the heuristic for a given order fails an assertion.
+"""No colours, only the answer, and the value of every variable."""
+# The last two options are needed because, with removed variables, the heuristic for a given order fails an assertion.
 STRATEGIES: dict[Strategy, tuple[str, ...]] = {
     "default": (),
     "static": ("-varh=Lexico", "-r_c=2000000000", "-ng=NO", "-pal=2", "-dsp=false", "-dss=0"),
@@ -68,7 +68,7 @@ HEAD_USES = 40
 """The number of models after which a new `Head` is created. A `Head` keeps every model in memory."""
 MOST = 2**63 - 1
 MINIMISE = ("-os=DECREASING",)
-"""ACE's default. Stated explicitly, so that these models have a separate `Head`."""
+"""ACE's default value. Stated explicitly, so that these models have a separate `Head`."""
 
 
 def main() -> None:
@@ -91,12 +91,12 @@ def main() -> None:
             link.send(answer(task))
         except Exception as error:  # noqa: BLE001 - any error, Java's included, is reported to the parent
             link.send(AceFailed(f"{type(error).__name__}: {error}"))
-    # The thread notices the parent's end too, but may not finish before the program ends.
+    # The thread also notices the end of the parent, but may not finish before the program ends.
     shutil.rmtree(folder, ignore_errors=True)
 
 
 def _end_with_the_parent(lifeline: int, folder: Path) -> None:
-    """End when the parent has ended. A search of ACE cannot be interrupted otherwise."""
+    """End this process when the parent has ended. A search by ACE cannot be interrupted otherwise."""
     os.read(lifeline, 1)
     shutil.rmtree(folder, ignore_errors=True)
     os._exit(1)
@@ -129,7 +129,7 @@ class _Ace:
     """ACE in this process's JVM."""
 
     def __init__(self, folder: Path) -> None:
-        # Uses two cores: Python imports while the JVM loads its classes.
+        # Uses two cores: Python imports modules while the JVM loads its classes.
         with ThreadPoolExecutor(1) as thread:
             models = thread.submit(_Models)
             self._java = _started_java()
@@ -144,7 +144,7 @@ class _Ace:
         self._printer = self._java.JClass("java.io.PrintStream")
         self._system = self._java.JClass("java.lang.System")
         self._heads: dict[tuple[str, ...], tuple[Any, int]] = {}
-        # A small task loads the classes needed by all tasks, while the parent prepares the first.
+        # A small task loads the classes needed by all tasks, while the parent prepares the first task.
         self.solve(AceTask([[0, 1], [0, 1]], [EncodedTable((0, 1), False, 0)], [[[0, 0]]], [], None, False, "static"))
 
     def answer(self, task: ToAce) -> FromAce:
@@ -165,7 +165,7 @@ class _Ace:
         return AceSolutions(found, b"d COMPLETE EXPLORATION" in printed, solutions)
 
     def _minimise(self, width: int) -> AceSolutions:
-        """Return the cheapest solution, the last in ACE's output, which the parent may read meanwhile."""
+        """Return the cheapest solution, the last one in ACE's output, which the parent may read meanwhile."""
         output = self._file(str(self._best))
         try:
             self._run(("-xe", *ACE_OPTIONS, *MINIMISE), None, output)
@@ -178,7 +178,7 @@ class _Ace:
         return AceSolutions(len(last) // width, b"d COMPLETE EXPLORATION" in printed, last.tobytes())
 
     def _run(self, options: tuple[str, ...], limit: int | None, output: Any) -> int:  # noqa: ANN401 - a Java object
-        """Return the number of solutions found by ACE, up to `limit`, and print to `output`."""
+        """Run ACE with its output sent to `output`; return the number of solutions found, up to `limit`."""
         self._system.setOut(self._printer(output))
         self._input.loadArguments([str(self._model), *options])
         head, uses = self._heads.get(options, (None, 0))
@@ -245,7 +245,7 @@ class _Models:
         self._entities, self._constraints, self._variables, self._xcsp = entities, constraints, variables, xcsp
 
     def answer(self, task: ToAce) -> FromAce:
-        """Return a document. Solving requires Java."""
+        """Return an XCSP3 document. Solving requires Java."""
         if not isinstance(task, AceExport):
             raise TypeError("this process was started without Java")
         return AceExported(self.document(task.task, task.names))
@@ -259,7 +259,7 @@ class _Models:
         variables = [self._variable(name, codes) for name, codes in zip(names, task.domains, strict=True)]
         posted, last = [], -1
         for table in task.tables:
-            if table.rows != last:  # the keys of its caches are hashes, and hash(-1) == hash(-2)
+            if table.rows != last:  # the cache keys are hashes, and hash(-1) == hash(-2)
                 constraints.ConstraintExtension.cache.clear()
                 constraints.ConstraintExtension.cache_for_knowing_if_hybrid.clear()
                 last = table.rows

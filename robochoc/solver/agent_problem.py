@@ -1,6 +1,6 @@
 """The problem of one agent: its robot's file, and the common knowledge of all robots.
 
-An agent receives nothing else, neither in the simulator nor in a process of its own.
+An agent receives nothing else, either in the simulator or in a separate process.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_co
 from robochoc.solver.explanation import KeyedConstraint, constraints_above
 
 Interfaces = Mapping[str, tuple[str, ...]]
-"""The interface variables of each robot, which its neighbours know, by the robot's name."""
+"""For each robot, by name, the interface variables, which its neighbours know."""
 
 Links = Mapping[str, tuple[str, ...]]
 """The parents of each robot."""
 
 
 _NO_SETTINGS: Mapping[str, str] = {}
-"""A plain dictionary, since it is sent to other processes; never modified."""
+"""A plain dictionary, because it is sent to other processes; never modified."""
 
 
 class RunParameters(NamedTuple):
@@ -47,15 +47,15 @@ DEFAULT_PARAMETERS = RunParameters()
 
 @dataclass(frozen=True)
 class TeamKnowledge:
-    """The common knowledge of all robots of a team. All robots of a process, and of its forks, share one object.
+    """The common knowledge of all robots in a team. All robots in a process, and in its forks, share one object.
 
     Attributes:
         order: The names of all robots in priority order, the highest first.
         interfaces: The interface variables of all robots.
         domains: The declared domains of all interface variables.
         links: The parents of each robot, for protocols on a pseudo-tree.
-        rank: The position of each robot in the order. Other processes compute it themselves.
-        owners: The robot of each interface variable. Other processes compute it themselves.
+        rank: The position of each robot in the order. Other processes recompute it.
+        owners: The robot of each interface variable. Other processes recompute it.
     """
 
     order: tuple[str, ...]
@@ -66,7 +66,7 @@ class TeamKnowledge:
     owners: Mapping[str, str] = field(init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Compute `rank` and `owners` once for all robots: for each robot, the time would be quadratic."""
+        """Compute `rank` and `owners` once for all robots: computing them for each robot would take quadratic time."""
         object.__setattr__(self, "rank", {name: place for place, name in enumerate(self.order)})
         owners = {variable: robot for robot, shown in self.interfaces.items() for variable in shown}
         object.__setattr__(self, "owners", owners)
@@ -82,10 +82,10 @@ class AgentProblem(NamedTuple):
     Attributes:
         own: The robot, with its compiled domain.
         known: The common knowledge of all robots.
-        copies: The totally known constraints of lower robots on its variables, for protocols in which all robots of a
-            scope know a constraint.
+        copies: Totally known constraints of lower robots on variables of this robot, for protocols in which all robots
+            in a scope know the constraint.
         pkc_holders: The parents with a part of a partially known constraint with this robot. Both robots know that the
-            constraint exists. Neither knows the other's part.
+            constraint exists. Neither robot knows the other's part.
         parameters: The parameters of the run.
     """
 
@@ -112,7 +112,7 @@ class AgentProblem(NamedTuple):
 
     @property
     def domain(self) -> CompiledDomain:
-        """Its compiled domain."""
+        """The compiled domain of the robot."""
         return self.own.domain
 
 
@@ -123,12 +123,12 @@ def agent_problems(
     shared_scopes: bool = False,
     tree: bool = False,
 ) -> dict[str, AgentProblem]:
-    """Return the problem of each agent of `team`, by the robot's name, in priority order.
+    """Return the problem of each agent in `team`, by the robot's name, in priority order.
 
     Args:
         team: The team. Only compiled robots get a problem.
         parameters: The parameters of the run.
-        shared_scopes: Whether every robot of a constraint's scope knows the constraint.
+        shared_scopes: Whether every robot in a constraint's scope knows the constraint.
         tree: Whether all robots know the parents of each robot.
     """
     compiled = ensure_compiled(team)

@@ -1,9 +1,9 @@
 """A cache of solved networks in the user's cache folder.
 
-A file is named by the digest of the network and of the versions that determine the answer, so other versions use other
-files. It begins with the digest of its content and repeats its name: truncated, changed and misplaced files are
-detected, removed and written again. Files are written under another name and renamed, so concurrent runs see only
-complete files. Nothing in them is executed or unpickled.
+The name of a file is the digest of the network and of the versions that determine the answer, so other versions use
+other files. The file begins with the digest of its content and repeats its name: truncated, changed and misplaced files
+are detected, removed and written again. Files are written under another name and then renamed, so concurrent runs see
+only complete files. Nothing in them is executed or unpickled.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ class _Entry(msgspec.Struct, frozen=True, array_like=True):
 
 
 class SolutionCache:
-    """The cache in `folder`, which is created when needed. Errors of reading and writing are ignored."""
+    """The cache in `folder`, which is created when needed. Errors in reading and writing are ignored."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self._folder = folder
 
     @cached_property
     def folder(self) -> Path:
-        """The folder of its files; determined on first use, since most robots need no solver."""
+        """The folder of the cache files; determined on first use, because most robots need no solver."""
         return self._folder or cache_folder()
 
     @cached_property
@@ -51,7 +51,7 @@ class SolutionCache:
         return FORMAT, _solver_version()
 
     def key(self, network: Network) -> str:
-        """Return the key of `network`: equal for equal networks of any robot or team."""
+        """Return the key of `network`. Equal networks have equal keys, whatever their robot or team."""
         return _digest(msgspec.msgpack.encode((self._versions, network))).hex()
 
     def get(self, network: Network) -> tuple[Codes, ...] | None:

@@ -1,8 +1,8 @@
 """The central solver: solves a whole team's problem, counts its solutions or minimises its cost, by ACE if it is large.
 
-Unlike robots, it reads every file. It confirms or refutes the verdict of a team, and counts solutions. Components
-without common constraints are solved separately. Large ones go to ACE with explicit cliques (`solver/cliques.py`). Two
-strategies run in parallel, and the first answer counts.
+Unlike the robots, the central solver reads every file. It confirms or refutes the verdict of a team, and counts
+solutions. Components without common constraints are solved separately. Large components are sent to ACE with explicit
+cliques (`solver/cliques.py`). Two strategies run in parallel, and the first answer counts.
 """
 
 from __future__ import annotations
@@ -28,15 +28,15 @@ from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_c
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 MAX_CLIQUE_ROWS = 20_000
-"""The maximum number of solutions of a clique that becomes a table; others become an allDifferent."""
+"""The maximum number of solutions of a clique that becomes a table; other cliques become an allDifferent."""
 TABLE_PATIENCE_S = 20.0
-"""The maximum time for all tables of cliques together."""
+"""The maximum total time for computing the tables of cliques."""
 MAX_ORBITS = 20_000
 """The maximum number of solutions, up to symmetry, that are listed for counting. If there are more, ACE counts."""
 MANY_ROWS = 100_000
 """The number of table rows from which ACE is started immediately, while the first task is prepared."""
 HEDGE_S = 5.0
-"""The time without an answer, in seconds, after which the other strategy starts in parallel."""
+"""The time without an answer, in seconds, after which the second strategy starts in parallel."""
 _TICK_S = 0.2
 NO_SOLUTIONS = SolverAnswer(0, complete=True, solutions=())
 
@@ -62,7 +62,7 @@ class CentralAnswer:
 
 @dataclass(frozen=True)
 class _SearchRequest:
-    """Find up to `limit` solutions, or their number. `in_order`: first with the static variable order."""
+    """Find up to `limit` solutions, or their number. `in_order`: try the static variable order first."""
 
     limit: int | None = None
     count_only: bool = False
@@ -78,17 +78,17 @@ class TeamSolver(Protocol):
 
     @property
     def name(self) -> str:
-        """The name in messages."""
+        """The name of the solver in messages."""
 
     def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
-        """See `CentralSolver.solve`."""
+        """Solve `team`. See `CentralSolver.solve`."""
 
 
 class CentralSolver:
-    """Solves teams: small ones by enumeration, others (with `always_ace` all) by ACE.
+    """Solves teams: small ones by enumeration, others (all teams with `always_ace`) by ACE.
 
-    `deadline` is on the monotonic clock; `progress` is called while ACE works. A given warm `solver` is left running,
-    and its own setting determines whether it enumerates small tasks.
+    `deadline` is on the monotonic clock; `progress` is called while ACE works. If a warm `solver` is given, it is left
+    running, and its own setting determines whether it enumerates small tasks.
     """
 
     name = CENTRAL_SOLVER
@@ -119,7 +119,7 @@ class CentralSolver:
                 are then minimised together. Withdrawn robots have no values.
 
         Returns:
-            The answer. If the deadline passed, its verdict is `unknown`, with the best solution so far.
+            The answer. If the deadline has passed, its verdict is `unknown`, with the best solution so far.
 
         Raises:
             SolverMissingError: if ACE is needed, and Java is not available.
@@ -156,7 +156,7 @@ class CentralSolver:
         return CentralAnswer(Verdict.SOLUTION, {name: assignment[name] for name in team.variables})
 
     def _minimum(self, team: Team, parts: list[WeightedComponent]) -> CentralAnswer:
-        """Return the cheapest solution of all `parts`, which are independent."""
+        """Return the cheapest solution of the independent components in `parts`."""
         parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
         cost = bound = constant_costs(team)
         assignment: dict[str, int] | None = {}
@@ -180,7 +180,7 @@ class CentralSolver:
         return CentralAnswer(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
 
     def _cheapest(self, part: WeightedComponent, ace: AceProcess) -> tuple[Codes | None, bool]:
-        """Return the cheapest solution found, if any, and whether that is proven."""
+        """Return the cheapest solution found, if any, and whether it is proven to be optimal."""
         network = part.network
         if network.impossible:
             return None, True
@@ -234,7 +234,7 @@ class CentralSolver:
         return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, request)
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
-        """Return all solutions of a clique. None: there are too many, or it takes too long."""
+        """Return all solutions of a clique. None: there are too many, or the search takes too long."""
         if clique not in self._tables:
             self._tables[clique] = self._known_or_solved(ace, clique)
         return self._tables[clique]

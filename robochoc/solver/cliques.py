@@ -1,8 +1,8 @@
 """Makes cliques in the binary tables of a network explicit.
 
 ACE prunes one table at a time. If tables forbid equal values between all pairs of some variables, an allDifferent
-prunes more; if they forbid more than that, as between the queens of a row, one table of the clique's solutions prunes
-most. The solutions of the network stay the same.
+prunes more; if they forbid more than that, as between the queens in a row, a single table with the clique's solutions
+prunes most. The solutions of the network stay the same.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.solver.propagation import is_small_permutation
 
 
 class Demand(StrEnum):
-    """The kind of a binary table: two variables differ, they differ and more, or something else."""
+    """The kind of a binary table: the two variables must differ, must differ and more, or something else."""
 
     DIFFER = "differ"
     DIFFER_AND_MORE = "differ and more"
@@ -48,7 +48,7 @@ def _demand(network: Network, table: CodeTable) -> Demand:
 
 
 def cliques(pairs: Iterable[Codes]) -> list[Codes]:
-    """Return cliques that cover all `pairs`; each is extended as long as it covers new pairs."""
+    """Return cliques that cover all `pairs`; each clique is extended as long as it covers new pairs."""
     neighbours: dict[int, set[int]] = {}
     for left, right in pairs:
         neighbours.setdefault(left, set()).add(right)
@@ -67,7 +67,7 @@ def cliques(pairs: Iterable[Codes]) -> list[Codes]:
 def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
     """Return `network` with an allDifferent for each clique of `ne`, and tables for cliques with more constraints.
 
-    Only cliques that need all their values become tables: these pay off, since few combinations are left.
+    Only cliques that need all their values become tables, because few combinations are left in these.
 
     `solutions` returns all solutions of a sub-network, or None if there are too many for a table.
     """
@@ -98,7 +98,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
 
 
 def _grown(clique: list[int], neighbours: dict[int, set[int]], open_still: dict[int, set[int]]) -> list[int]:
-    """Return `clique`, extended as long as a member covers new edges; members that cover most are added first."""
+    """Return `clique`, extended while a new member covers new edges; members that cover most edges are added first."""
     candidates = set.intersection(*(neighbours[name] for name in clique))
     while candidates:
         best = min(candidates, key=lambda name: (-len(open_still[name].intersection(clique)), name))
@@ -117,7 +117,7 @@ def _forbidden(network: Network, table: CodeTable) -> set[Codes]:
 
 
 def _within(network: Network, clique: Codes) -> Network:
-    """Return the part of `network` on the variables of `clique` alone."""
+    """Return the sub-network on the variables of `clique`."""
     place = {name: index for index, name in enumerate(clique)}
     tables = (
         replace(table, scope=tuple([place[name] for name in table.scope]))

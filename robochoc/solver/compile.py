@@ -28,7 +28,7 @@ PATIENCE_S = 60.0
 
 @dataclass(frozen=True)
 class CompileLimits:
-    """The limits of compiling one robot: the number of local solutions, and ACE's time in seconds.
+    """The limits for compiling one robot: the number of local solutions, and ACE's time in seconds.
 
     With `always_ace`, ACE also solves small local problems.
     """
@@ -39,7 +39,7 @@ class CompileLimits:
 
 
 class CompiledFrom(StrEnum):
-    """The source of a robot's local solutions; if there are several, the most expensive one."""
+    """The source of a robot's local solutions; if there are several, the most expensive source."""
 
     DIRECT = "direct"
     EQUAL = "equal"
@@ -82,7 +82,7 @@ class TeamCompileTimeoutError(RobochocError):
 
 @dataclass(frozen=True)
 class Compilation:
-    """One robot's compiled domain, its source, and the time of compiling."""
+    """One robot's compiled domain, the source of its solutions, and the time taken to compile it."""
 
     robot: str
     domain: CompiledDomain
@@ -93,8 +93,8 @@ class Compilation:
 class Compiler:
     """Compiles robots one after the other, with one cache and at most one solver process.
 
-    Leaving the context ends the process, unless it was given as `solver`. `deadline`, on the monotonic clock, is
-    common to all robots.
+    Leaving the context ends the process, unless it was given as `solver`. `deadline`, on the monotonic clock, is shared
+    by all robots.
     """
 
     def __init__(
@@ -180,7 +180,7 @@ class Compiler:
             raise CompileError(robot, str(lost)) from lost
 
     def _solver(self) -> AceProcess:
-        """Return the given solver, or one that is started on first use."""
+        """Return the given solver, or a solver that is started on first use."""
         from robochoc.solver.ace import AceProcess  # noqa: PLC0415 - start-up: most robots need no solver
 
         if self._given_solver:
@@ -191,10 +191,10 @@ class Compiler:
 
 
 class TeamCompiler:
-    """Compiles the teams of one run. `seconds` is the time of teams for which a solver was needed.
+    """Compiles the teams in one run. `seconds` is the time spent on teams that needed a solver.
 
-    `deadline` is on the monotonic clock, and may be changed. `stage` receives descriptions of the progress (None: there
-    are none). See `Compiler` for the other arguments.
+    `deadline` is on the monotonic clock, and may be changed. `stage` receives descriptions of the progress (None: no
+    descriptions). See `Compiler` for the other arguments.
     """
 
     seconds: float = 0.0

@@ -1,7 +1,7 @@
 """Compiled domains: all local solutions of a robot, grouped by the values of its interface variables.
 
-Paper, Section 4.1: a complex agent "can easily address and solve its local sub-problem and use solutions as a
-compiled domain". Neighbours see only the interface variables, so local solutions that agree on these are one value; a
+Paper, Section 4.1: a complex agent "can easily address and solve its local sub-problem and use solutions as a compiled
+domain". Neighbours see only the interface variables, so local solutions that agree on these variables are one value; a
 representative and the number of solutions are stored for each value.
 """
 
@@ -21,7 +21,7 @@ MAX_SOLUTIONS = 100_000
 """The default maximum number of local solutions of a robot."""
 
 SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
-"""Returns all solutions of a network of several variables, in codes, such as `AceProcess` in `solver/ace.py`."""
+"""Returns all solutions of a network with several variables, as codes; for example `AceProcess` in `solver/ace.py`."""
 
 
 class TooManySolutionsError(RobochocError):
@@ -42,7 +42,8 @@ class CompiledDomain:
     Attributes:
         variables: The names of all variables.
         values: The values of the interface variables, for each value of the robot.
-        solutions: The values of `variables` in the cheapest local solution (the lexicographically first) of each value.
+        solutions: For each value, the values of `variables` in the cheapest local solution (the lexicographically first
+            one).
         counts: The number of local solutions of each value.
         costs: The private cost of the cheapest local solution of each value.
         cheapest: The number of cheapest local solutions of each value.
@@ -61,11 +62,11 @@ class CompiledDomain:
         return sum(self.counts)
 
     def solution(self, index: int) -> dict[str, int]:
-        """Return the values of all variables for the value at `index`. Empty for the last index, withdrawal."""
+        """Return the values of all variables for the value at `index`; none for the last index, withdrawal."""
         return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
 
     def behind(self, value: Value) -> dict[str, int]:
-        """Return the same for a value of the interface variables. An unknown value means withdrawal."""
+        """Return the values of all variables for an interface value. An unknown value means withdrawal."""
         return self.solution(self.values.index(value) if value in self.values else len(self.values))
 
 
@@ -85,15 +86,15 @@ class _Group:
 
 
 def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int = MAX_SOLUTIONS) -> CompiledDomain:
-    """Return the compiled domain of `robot`, values in the order of its variables and their values.
+    """Return the compiled domain of `robot`, with values in the order of its variables and their values.
 
     Args:
         robot: The robot.
-        solve: Returns all solutions of a network. Called for variables connected by private constraints.
+        solve: Returns all solutions of a network. Called for variables that private constraints connect.
         limit: The maximum number of local solutions.
 
     Raises:
-        TooManySolutionsError: if there are more.
+        TooManySolutionsError: if there are more local solutions.
         UnsupportedError: if a network must be solved, and `solve` is missing.
     """
     soft = [constraint for constraint in robot.private if is_soft(constraint)]
@@ -124,7 +125,7 @@ def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None, limit:
 
 
 def _is_paid_in(constraint: Constraint, part: Component, first: Component) -> bool:
-    """Return whether `constraint` is on variables of `part`; constraints on constants only belong to the `first`."""
+    """Return whether `constraint` is on variables in `part`; constraints on constants only belong to the `first`."""
     return part is first if not constraint.variables else constraint.variables[0] in part.names
 
 
@@ -144,7 +145,7 @@ def _grouped(
 
 
 def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequence[_Group]]) -> CompiledDomain:
-    """Return all combinations of the components' groups."""
+    """Return the compiled domain with all combinations of the components' groups."""
     variables = tuple(variable.name for variable in robot.variables)
     place = {name: index for index, name in enumerate(itertools.chain.from_iterable(names))}
     order = [place[name] for name in variables]

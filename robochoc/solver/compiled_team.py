@@ -1,8 +1,8 @@
 """Teams and robots together with their compiled domains.
 
-The values of a robot depend on its interface variables, and these on the links of its team: the team of the files, the
-same team in another priority order, and the team after a change have different domains. So domains are never passed
-around alone. A `CompiledTeam` has the domains of exactly its team.
+The values of a robot depend on its interface variables, and these depend on the links in its team: the team in the
+files, the same team in another priority order, and the team after a change have different domains. So domains are never
+passed around alone. A `CompiledTeam` has the domains of exactly its team.
 """
 
 from __future__ import annotations
@@ -31,16 +31,16 @@ class CompiledRobot:
         object.__setattr__(self, "domain", compile_robot(robot))
 
     def relinked(self, robot: Robot, compile_robot: CompileRobot = compile_domain) -> CompiledRobot:
-        """Return `robot`, which is this robot with other links. It is recompiled only if its values differ."""
+        """Return `robot`, this robot with other links, compiled. It is recompiled only if its values differ."""
         same = _decisive(robot) == _decisive(self.robot)
         return CompiledRobot(robot, (lambda _: self.domain) if same else compile_robot)
 
 
 @dataclass(frozen=True, init=False)
 class CompiledTeam:
-    """A team in its priority order, and the compiled robots, by name.
+    """A team in its priority order, and its compiled robots by name.
 
-    `robots` are all robots of the team, unless `only` some were compiled.
+    `robots` contains all robots in the team, unless `only` some were compiled.
     """
 
     team: Team
@@ -49,7 +49,7 @@ class CompiledTeam:
     def __init__(
         self, team: Team, compile_robot: CompileRobot = compile_domain, only: Collection[str] | None = None
     ) -> None:
-        """Compile the robots of `team`, or `only` those with these names. Raises the errors of `compile_robot`."""
+        """Compile the robots in `team`, or `only` those with these names. Raises the errors of `compile_robot`."""
         named = [robot for robot in team.robots if only is None or robot.name in only]
         robots = {robot.name: CompiledRobot(robot, compile_robot) for robot in named}
         object.__setattr__(self, "team", team)

@@ -1,8 +1,9 @@
-"""Conflicts of all values of this robot at once, for compiled domains of thousands of values.
+"""Computes the conflicts of all values of this robot at once, for compiled domains with thousands of values.
 
-`LocalProblem.conflict` checks the constraints for one value. Here a few numpy operations compute all values: for each
-constraint a mask over this robot's domain, for each group of constraints with the same robots the first one that each
-value violates, and for a view the first of all, with the number of checks of the other method.
+`LocalProblem.conflict` checks the constraints for one value. Here a few numpy operations handle all values: they
+compute a mask over this robot's domain for each constraint, then the first constraint that each value violates for each
+group of constraints with the same robots, and then, for a view, the first violated constraint of all, with the same
+number of checks as `LocalProblem.conflict`.
 """
 
 from __future__ import annotations
@@ -25,14 +26,14 @@ _Seen = tuple[OtherValues | None, ...]
 
 
 class _Broken(NamedTuple):
-    """The first constraint of a group that each own value violates (the number of constraints, if none)."""
+    """For each own value, the first constraint in a group that it violates (the number of constraints, if none)."""
 
     first: NDArray[np.int32]
     constraints: list[tuple[SharedConstraint, OtherValues]]
 
 
 class _BrokenConstraints(NamedTuple):
-    """The number of checks and the first violated constraint (-1: none) of each own value."""
+    """For each own value, the number of checks and the first violated constraint (-1: none)."""
 
     checks: list[int]
     broken: list[int]
@@ -40,7 +41,7 @@ class _BrokenConstraints(NamedTuple):
 
 
 class ConflictTable:
-    """Looks up conflicts of the `size` values of a compiled domain; caches those of the last view."""
+    """Looks up the conflicts of the `size` values in a compiled domain; caches the conflicts for the last view."""
 
     def __init__(self, constraints: Sequence[SharedConstraint], size: int) -> None:
         self._size = size
@@ -55,7 +56,7 @@ class ConflictTable:
     ) -> tuple[int, SharedConstraint | None]:
         """Return the number of checks for the value at `index`, and the constraint that it violates in `view`, if any.
 
-        Constraints before number `first`, which begins a group, are skipped.
+        Constraints with numbers below `first`, the first constraint of a group, are skipped.
         """
         if (view, first) != self._view:
             self._view = dict(view), first
@@ -79,7 +80,7 @@ class ConflictTable:
 
 
 class _ConstraintGroup:
-    """Constraints with the same robots, in the order of checking."""
+    """Constraints with the same robots, in the order in which they are checked."""
 
     def __init__(self, constraints: Sequence[SharedConstraint]) -> None:
         self._constraints = constraints
@@ -88,7 +89,7 @@ class _ConstraintGroup:
         self._cache: OrderedDict[_Seen, _Broken] = OrderedDict()
 
     def broken(self, view: Mapping[str, Value]) -> _Broken:
-        """Return the first constraint that each own value violates, of those without unknown variables in `view`."""
+        """For each own value, return the first violated constraint without unknown variables in `view`."""
         seen = tuple([constraint.other_values(view) for constraint in self._constraints])
         kept = self._cache.get(seen)
         if kept is None:

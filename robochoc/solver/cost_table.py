@@ -1,4 +1,4 @@
-"""The costs of a constraint for all combinations of values as an array, for protocols that compute with tables.
+"""The cost array of a constraint for all combinations of values, for protocols that compute with tables.
 
 Costs are floats, since a violated hard constraint costs `inf`; integers up to 2^53 are exact (`exact_costs.py`). Tables
 have at most `MAX_TUPLES` entries.
@@ -19,9 +19,9 @@ Array = NDArray[np.float64]
 
 
 class CostTable(NamedTuple):
-    """The costs of the constraint called `key`: one axis for each robot of `agents`, the last for this robot's values.
+    """The costs of the constraint called `key`: one axis for each robot in `agents`, the last axis for this robot.
 
-    The indices of an axis follow the order of the robot's values.
+    The indices on an axis follow the order of the robot's values.
     """
 
     key: str

@@ -1,7 +1,7 @@
-"""OR-Tools as a second central solver: CP-SAT solves the whole team's problem in a process of its own.
+"""OR-Tools as a second central solver: CP-SAT solves the whole team's problem in a separate process.
 
-It receives the same tables over codes as ACE (`solver/encoding.py`, `solver/weighted.py`), but uses no cliques, no
-symmetries and no enumeration. The sum of costs is at most `weighted.MAX_TOTAL_COST`, far below 64 bits.
+CP-SAT receives the same tables over codes as ACE (`solver/encoding.py`, `solver/weighted.py`), but uses no cliques, no
+symmetries and no enumeration. The sum of costs is at most `weighted.MAX_TOTAL_COST`, which fits easily in 64 bits.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def is_installed() -> bool:
 
 
 class CpSatSolver:
-    """Solves teams by CP-SAT. Its process ends after each task; inside a context, it is reused for the next task.
+    """Solves teams with CP-SAT. The process ends after each task; inside a context, it is reused for the next task.
 
     `deadline` is on the monotonic clock; `progress` is called during the search.
     """
@@ -87,7 +87,7 @@ class CpSatSolver:
 
         Raises:
             SolverMissingError: if OR-Tools is not installed.
-            SolverLostError: if its process died.
+            SolverLostError: if the process died.
             UnsupportedError: if a constraint or its costs are too large, or `count` is true.
         """
         if count:
@@ -138,7 +138,7 @@ class CpSatSolver:
         return CentralAnswer(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
 
     def _cheapest(self, part: WeightedComponent) -> CpSatAnswer:
-        """Return CP-SAT's answer to one component."""
+        """Return CP-SAT's answer for one component."""
         network = part.network
         if not all(network.domains):
             return CpSatAnswer(None, proven=True)

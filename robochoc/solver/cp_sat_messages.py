@@ -1,4 +1,4 @@
-"""The messages between the process of OR-Tools and its parent: msgpack, each after its length. Without its imports."""
+"""The messages between the OR-Tools process and its parent: msgpack, each after its length. Imports neither."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ LENGTH = struct.Struct("!Q")
 
 
 class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
-    """A table: the allowed, or forbidden, code tuples `rows` of the variables at positions `scope`."""
+    """A table: `rows` are the allowed, or the forbidden, code tuples of the variables at positions `scope`."""
 
     scope: tuple[int, ...]
     allowed: bool
@@ -33,10 +33,10 @@ class CpSatJunction(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """Find one solution; with `costs`, one with the least sum of these codes.
+    """Find one solution; with `costs`, a solution with the least sum of the codes at these positions.
 
-    A cost is the position of a variable and the unit of its codes. `domains` has the codes of each variable, `deadline`
-    is on the monotonic clock, which all processes of a machine share (None: no limit).
+    A cost is the position of a variable and the unit of its codes. `domains` has the codes of each variable. `deadline`
+    is on the monotonic clock, which all processes on a machine share (None: no limit).
     """
 
     domains: tuple[tuple[int, ...], ...]
@@ -47,7 +47,7 @@ class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
 
 
 class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """The codes of a solution, if found; whether it (or that there is none) is proven; a lower bound on the cost."""
+    """The codes of a solution, if found; whether it is proven (or that there is none); a lower bound on the cost."""
 
     codes: tuple[int, ...] | None
     proven: bool

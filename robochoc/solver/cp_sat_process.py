@@ -1,7 +1,7 @@
 """The process of OR-Tools: CP-SAT (https://developers.google.com/optimization/cp/cp_solver) solves tables of codes.
 
-Started by `solver/cp_sat.py`, never imported: a search in native code ignores signals and does not free its memory,
-but its process can be ended.
+Started by `solver/cp_sat.py`, never imported: a search in native code ignores signals and does not free its memory, but
+its process can be ended.
 
     python -m robochoc.solver.cp_sat_process SOCKET
 """
@@ -34,7 +34,7 @@ from robochoc.solver.cp_sat_messages import (
 from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 WORKERS = 1
-"""One thread, for comparable measurements, and since robots need the other cores."""
+"""One thread, for comparable measurements, and because robots need the other cores."""
 
 
 def main() -> None:
@@ -98,7 +98,7 @@ def _solve(task: CpSatTask) -> CpSatAnswer:
 
 
 def _model_of(task: CpSatTask, cp_model: Any) -> tuple[Any, list[Any]]:  # noqa: ANN401 - imported late
-    """Return the model of a task, with domains, tables, formulas and the sum of costs, and its variables."""
+    """Return the CP-SAT model of a task, with domains, tables, formulas and the sum of costs, and its variables."""
     model = cp_model.CpModel()
     variables = [
         model.new_int_var_from_domain(cp_model.Domain.from_values(list(codes)), f"x{place}")
@@ -124,7 +124,7 @@ def _post(
     formula: CpSatComparison | CpSatJunction,
     given: tuple[Any, ...],
 ) -> None:
-    """Add `formula` to a model, enforced if the literals `given` are true."""
+    """Add `formula` to a model; it is enforced if the literals in `given` are true."""
     if isinstance(formula, CpSatComparison):
         total = sum(factor * variables[place] for place, factor in formula.terms)
         facts = {"le": total <= formula.bound, "eq": total == formula.bound, "ne": total != formula.bound}

@@ -1,7 +1,7 @@
 """Encodes constraints as tables over codes, the input of the solvers.
 
 Solvers may compute wrong results from values (ACE does, from negative ones; FINDINGS). So they compute with codes only:
-values become codes 0, 1, ... in ascending order, every constraint becomes the list of its allowed or forbidden code
+values become codes 0, 1, ... in ascending order, every constraint becomes a list of its allowed or forbidden code
 tuples, and unary constraints are applied to the domains first. Problems that differ only in names and in a shift of
 values become equal, so that one solution can be reused for all of them.
 """
@@ -25,7 +25,7 @@ from robochoc.solver.linear import FALSE, Formula, Operand, is_small, linear, op
 from robochoc.solver.splitting import MAX_TRIED, split
 
 Cost = int | float
-"""Integers stay integers: mypyc would convert them to a declared `float`, and 3.0 takes nine bytes on the wire."""
+"""Integers stay integers: mypyc would convert them to a declared `float`, and 3.0 takes nine bytes in a message."""
 
 MAX_TUPLES = 4_000_000
 """The maximum number of tuples of values for which a constraint is evaluated."""
@@ -51,7 +51,7 @@ class CodeTable:
 class Network:
     """A constraint network over codes: an ascending domain for each variable, and tables.
 
-    `different` lists scopes on which all values differ; it may repeat tables, but adds no constraint. `formulas` are
+    `different` lists scopes in which all values differ; it may repeat tables, but adds no constraint. `formulas` are
     constraints over positions of variables without tables.
     """
 
@@ -62,7 +62,7 @@ class Network:
 
     @property
     def impossible(self) -> bool:
-        """Return whether it obviously has no solution, without a search."""
+        """Return whether the network obviously has no solution, without a search."""
         return (
             not all(self.domains) or FALSE in self.formulas or any(one.allowed and not one.rows for one in self.tables)
         )
@@ -78,8 +78,8 @@ class Network:
 class Component:
     """A connected component of variables as a network; `values[code]` is the value of a code.
 
-    `names` are the variables in their given order, followed by additional ones of split constraints. If the network has
-    formulas, `values` are ranges, so that codes can be added up.
+    `names` are the variables in their given order, followed by the additional variables of split constraints. If the
+    network has formulas, `values` are ranges, so that codes can be added up.
     """
 
     names: tuple[str, ...]
@@ -101,10 +101,10 @@ def components(
 ) -> list[Component]:
     """Return the connected components of `variables` under the hard part of `constraints`.
 
-    Components are in the order of their first variables, the variables of each in their given order. All scopes contain
-    only `variables`. The variables of each scope in `together` are put into one component. With `may_split`, predicates
-    too wide for a table are split, with further variables (`solver/splitting.py`). With `may_add`, those that compare
-    sums become formulas (`solver/linear.py`).
+    Components are in the order of their first variables, and the variables of each component in their given order. All
+    scopes contain only `variables`. The variables of each scope in `together` are put into one component. With
+    `may_split`, predicates too wide for a table are split, with additional variables (`solver/splitting.py`). With
+    `may_add`, such predicates become formulas if they compare sums (`solver/linear.py`).
 
     Raises:
         UnsupportedError: if a constraint has too many tuples for a table.
@@ -142,7 +142,7 @@ def _is_small(part: Component) -> bool:
 
 
 def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
-    """Return `constraint` as a test of the values of the variables `names`; soft violations are allowed."""
+    """Return `constraint` as a test on the values of the variables `names`; soft violations are allowed."""
     definition = constraint.definition
     if not isinstance(definition, Predicate):
         price = cost_function(constraint, names)
@@ -155,7 +155,7 @@ def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[S
 def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], Cost]:
     """Return the cost of `constraint` as a function of the values of `names`.
 
-    The function returns 0 where the constraint holds, and `INFINITE` where a hard one is violated.
+    The function returns 0 if the constraint holds, and `INFINITE` if a hard constraint is violated.
     """
     definition = constraint.definition
     if isinstance(definition, Predicate):
@@ -170,7 +170,7 @@ def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Seq
 
 
 def max_cost(constraint: Constraint) -> Cost:
-    """Return the maximum finite cost of `constraint`; of a function, the bound of its expression."""
+    """Return the maximum finite cost of `constraint`; for a function, the bound on its expression."""
     match constraint.definition:
         case Relation() as relation:
             prices: tuple[Cost, ...] = (*relation.costs, relation.default_cost)
@@ -193,7 +193,7 @@ def is_soft(constraint: Constraint) -> bool:
 
 
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
-    """Return a test whether the predicate of `constraint` is true for values of `names`; undefined counts as false."""
+    """Return a test of the predicate of `constraint` on values of `names`; an undefined result counts as false."""
     arguments = _arguments(constraint, names)
     body = _body(predicate)
 
@@ -207,7 +207,7 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
 
 
 def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -> Callable[[Sequence[int]], Cost]:
-    """Return the cost as a function of values of `names`; undefined counts as `INFINITE`."""
+    """Return the cost as a function of values of `names`; an undefined result counts as `INFINITE`."""
     arguments = _arguments(constraint, names)
     body = _body(function)
 
@@ -248,7 +248,7 @@ def _forbids_something(constraint: Constraint) -> bool:
 
 
 def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
-    """Remove the values that a unary constraint forbids; a false constraint on constants empties all domains."""
+    """Remove the values forbidden by a unary constraint; a false constraint on constants empties all domains."""
     test = allows_function(constraint, constraint.variables)
     if constraint.variables:
         (name,) = constraint.variables
@@ -258,7 +258,7 @@ def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:
 
 
 def _connected(names: Iterable[str], scopes: Iterable[Sequence[str]]) -> list[list[str]]:
-    """Return the connected components of the graph of `scopes`, in the order of `names`."""
+    """Return the connected components of the graph with the edges `scopes`, in the order of `names`."""
     root = {name: name for name in names}
 
     def find(name: str) -> str:
@@ -321,7 +321,7 @@ class _Coder:
 
 
 def _formulas(constraints: Iterable[Constraint], domains: Mapping[str, list[int]]) -> Iterator[tuple[int, Formula]]:
-    """Yield the formulas of those `constraints` that compare sums and are too wide for a table, with their numbers."""
+    """Yield the formulas, with their numbers, of `constraints` that compare sums and are too wide for a table."""
     for number, constraint in enumerate(constraints):
         if math.prod(len(domains[name]) for name in constraint.variables) > MAX_ALLOWED_ROWS:
             formula = linear(constraint, domains)
@@ -330,7 +330,7 @@ def _formulas(constraints: Iterable[Constraint], domains: Mapping[str, list[int]
 
 
 def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *, may_split: bool) -> list[_Rows]:
-    """Return `constraints` as tables. With `may_split`, wide predicates are split: their variables enter `domains`."""
+    """Return `constraints` as tables. With `may_split`, wide predicates are split; this adds variables to `domains`."""
     tables = _Tables(domains)
     found: list[_Rows] = []
     budget = MAX_TRIED
@@ -357,7 +357,7 @@ class _Tables:
         self._made: dict[Hashable, _Rows | None] = {}
 
     def of(self, constraint: Constraint) -> _Rows | None:
-        """Return the allowed tuples of `constraint`, or (if it is large) the forbidden ones. None: it allows all."""
+        """Return the allowed tuples of `constraint`, or (if it is large) the forbidden ones. None: all are allowed."""
         scope = constraint.variables
         terms = tuple([scope.index(term) if isinstance(term, str) else (term,) for term in constraint.parameters])
         alike = id(constraint.definition), terms, tuple([tuple(self._domains[name]) for name in scope])

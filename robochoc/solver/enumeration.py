@@ -1,10 +1,10 @@
 """Enumerates the solutions of small networks in this process, without starting Java.
 
-A depth-first search that keeps every table arc consistent: the rows of a table are the bits of one integer, the rows
-with a value those of another, and the remaining rows are their conjunction (Demeulenaere, Hartert, Lecoutre, Perez,
-Perron, Regin and Schaus, "Compact-Table", CP 2016). The next variable is the one with the fewest values for its number
-of constraints (dom/deg: Bessiere and Regin, "MAC and combined heuristics", CP 1996). Costs are minimised by branch and
-bound; the bound is the sum of the minimum costs.
+A depth-first search that keeps every table arc consistent. The valid rows of a table are stored as a bit set in an
+integer, and so are the rows that contain each value; intersecting these sets gives the remaining rows (Demeulenaere,
+Hartert, Lecoutre, Perez, Perron, Regin and Schaus, "Compact-Table", CP 2016). The next variable is the one with the
+fewest values for its number of constraints (dom/deg: Bessiere and Regin, "MAC and combined heuristics", CP 1996). Costs
+are minimised by branch and bound; the bound is the sum of the minimum costs.
 
 The effort is limited in steps, not seconds: whether a network is solved here is the same on every machine. It is not
 predicted: the search starts, and stops when the steps are used up.
@@ -19,12 +19,12 @@ from robochoc.solver.encoding import Codes, CodeTable, Costs, Network
 from robochoc.system.errors import RobochocError
 
 STEPS_EACH = 100_000
-"""The maximum steps of every task: about as long as a query to a running ACE."""
+"""The maximum number of steps for each task: about as long as a query to a running ACE."""
 STEPS_BEFORE_ACE = 1_500_000
-"""The further steps of all tasks together before ACE is started: about as long as its start."""
+"""The additional steps for all tasks together before ACE is started: about as long as its start."""
 
 ROWS_A_STEP = 256
-"""The table rows that one step covers, for one value. Longer tables and wider domains take more steps."""
+"""The number of table rows that one step covers, for one value. Longer tables and wider domains take more steps."""
 PLACES_A_STEP = 4
 """The number of domains and tables that one step copies at every node. This also bounds the memory."""
 
@@ -34,14 +34,14 @@ class OutOfStepsError(RobochocError):
 
 
 class Budget:
-    """A maximum number of steps, of which `used` are used up."""
+    """A maximum number of steps, and the number already `used`."""
 
     def __init__(self, steps: int) -> None:
         self.steps = steps
         self.used = 0
 
     def spend(self, steps: int) -> None:
-        """Use `steps` more. Raises `OutOfStepsError` if fewer are left, and uses these up."""
+        """Use `steps` more steps. If fewer are left, use these up and raise `OutOfStepsError`."""
         self.used += steps
         if self.used > self.steps:
             self.used = self.steps
@@ -72,7 +72,7 @@ def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, 
             solutions += several
         if limit is not None and count > limit:
             return Enumeration(limit, complete=False, solutions=sorted(solutions)[:limit])
-        if count == limit and limit == 1:  # whether there are others does not matter
+        if count == limit and limit == 1:  # it does not matter whether there are others
             return Enumeration(1, complete=False, solutions=solutions)
     return Enumeration(count, complete=True, solutions=sorted(solutions))
 
@@ -87,7 +87,7 @@ def minimum_solution(network: Network, budget: Budget, costs: Costs) -> Codes | 
 
 
 class _Search:
-    """A search in one network: bit i of a domain stands for its i-th code, bit i of a table for its i-th row."""
+    """A search in one network: bit i in a domain means its i-th code, bit i in a table its i-th row."""
 
     def __init__(self, network: Network, budget: Budget) -> None:
         self._budget = budget
@@ -119,8 +119,8 @@ class _Search:
         self._left = [(1 << len(table.rows)) - 1 for table in network.tables]
 
     def _by_value(self, table: CodeTable) -> list[dict[int, int]]:
-        """Return, for each variable of `table` and each bit of its domain, the rows with that value."""
-        if not table.allowed:  # after propagation, these have too many allowed rows
+        """Return, for each variable of `table` and each bit in its domain, the rows with that value."""
+        if not table.allowed:  # after propagation, such tables have too many allowed rows
             self._budget.spend(self._budget.steps + 1)
         weight = 1 + len(table.rows) // ROWS_A_STEP
         self._budget.spend(sum(len(table.rows) + weight * len(self._bit[place]) for place in table.scope))
@@ -139,7 +139,7 @@ class _Search:
         stack = [(self._domains, self._left, place, bit)]
         while stack:
             domains, left, place, bit = stack.pop()
-            domains, left = [*domains], [*left]  # the node's siblings share them
+            domains, left = [*domains], [*left]  # sibling nodes share the old lists
             domains[place] = bit
             if not self._propagates(domains, left, [place]):
                 continue
@@ -192,7 +192,7 @@ class _Search:
         return sum([unit * self._code[place][domains[place] & -domains[place]] for place, unit in costs])
 
     def _next(self, domains: Sequence[int]) -> tuple[int, bool]:
-        """Return the variable to branch on (dom/deg; the first if all are assigned), and whether others remain."""
+        """Return the variable to branch on (dom/deg; the first if all are assigned), and whether others are open."""
         best, least, found = 0, 0.0, 0
         for place, domain in enumerate(domains):
             if domain & (domain - 1):
@@ -268,7 +268,7 @@ def _is_one(domain: int) -> bool:
 
 
 def _bits(domain: int) -> Iterator[int]:
-    """Yield the bits of `domain` from the lowest."""
+    """Yield the bits of `domain`, the lowest first."""
     while domain:
         bit = domain & -domain
         domain ^= bit
@@ -276,7 +276,7 @@ def _bits(domain: int) -> Iterator[int]:
 
 
 def _with(domains: Sequence[int], place: int, bit: int) -> list[int]:
-    """Return `domains` with a single value for the variable at `place`."""
+    """Return `domains` with only the value `bit` for the variable at `place`."""
     chosen = [*domains]
     chosen[place] = bit
     return chosen

@@ -1,4 +1,4 @@
-"""Errors of local problems and of constraint solvers. In a separate file, so that catching them imports no solver."""
+"""Errors of local problems and of constraint solvers. A separate file, so that catching them imports no solver."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ class UnsupportedError(RobochocError):
 
 
 class TooLargeError(UnsupportedError):
-    """The problem is too large for this protocol, which was only detectable during the search."""
+    """The problem is too large for this protocol, which could only be detected during the search."""
 
 
 class SolverMissingError(RobochocError):
@@ -18,7 +18,7 @@ class SolverMissingError(RobochocError):
 
 
 class SolverLostError(RobochocError):
-    """The solver's process died, or failed. The message contains the cause, if known."""
+    """The solver's process died or failed. The message contains the cause, if known."""
 
 
 class SolverTimeoutError(RobochocError):

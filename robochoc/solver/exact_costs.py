@@ -1,11 +1,11 @@
-"""The limit of costs that floats represent exactly. In a module without numpy, for a fast import."""
+"""The limit up to which floats represent costs exactly. A separate module without numpy, for a fast import."""
 
 from __future__ import annotations
 
 from robochoc.solver.errors import TooLargeError
 
 EXACT = 1 << 53
-"""Floats represent all integers below this exactly."""
+"""Floats represent all integers below this limit exactly."""
 
 
 def check_exact(most: float) -> None:

@@ -4,12 +4,12 @@ A *choice* is a value of a variable. Two choices of two robots exclude each othe
 forbids them together: `V1 = 3` and `V2 = 3` if no two robots do task 3. A team is a *task allocation* if
 
 - all shared constraints are of this kind, each over one variable of each of two robots, without costs;
-- choices that exclude each other directly or indirectly all exclude each other, except choices of the same robot: they
-  are the ways of doing one *task*, which is done by at most one robot;
+- choices that exclude each other directly or indirectly all exclude each other, except choices of the same robot: such
+  a set of choices contains the ways of doing one *task*, which is done by at most one robot;
 - each interface variable has a value that is not such a choice, so that a robot can leave all tasks to others.
 
-With *congestion*, several robots may do a task; each pair of them has a cost, the same for all pairs of the task.
-Exclusion is the same with an infinite cost.
+With *congestion*, several robots may do a task; each pair of them has a cost, the same for all pairs of robots that do
+the task. Exclusion is the same as an infinite cost.
 
 A robot can determine its tasks, and the other robots that can do them, from its own constraints.
 """
@@ -30,20 +30,20 @@ from robochoc.solver.explanation import constraints_above
 Choice = tuple[int, int]
 """The index of a variable in its robot's interface, and one of its values."""
 Pair = tuple[int, int]
-"""Values of two variables."""
+"""A value of each of two variables."""
 Column = tuple[int, ...]
 """The values of a variable."""
 Partners = dict[tuple[str, Choice], Cost]
-"""Choices of other robots, and their costs together with one choice of this robot."""
+"""Choices of other robots, with their costs in combination with one choice of this robot."""
 
 
 class SharedTask(NamedTuple):
-    """A task that at most one robot does; or several, with a `cost` for each pair.
+    """A task that at most one robot does; with congestion, several robots, at a `cost` for each pair.
 
     Attributes:
-        own: The choices of this robot that do it.
-        others: The choices of each other robot that do it. Robots are in priority order.
-        cost: The cost of each pair of robots that do it.
+        own: The choices of this robot that do the task.
+        others: The choices of each other robot that do the task. Robots are in priority order.
+        cost: The cost of each pair of robots that do the task.
     """
 
     own: tuple[Choice, ...]
@@ -52,9 +52,9 @@ class SharedTask(NamedTuple):
 
 
 def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tuple[SharedTask, ...]]:
-    """Return the number of constraint checks, and the tasks of the robot of `part`, sorted by its first choices.
+    """Return the number of constraint checks, and the tasks of the robot in `part`, sorted by its first choices.
 
-    One check for each pair of values of each constraint. `part.copies` must contain the constraints of lower robots.
+    Each pair of values in each constraint is one check. `part.copies` must contain the constraints of lower robots.
 
     Args:
         part: The robot's problem.
@@ -97,7 +97,7 @@ def _task(
 
 
 def allocation_fault(team: Team, *, congestion: bool = False) -> str:
-    """Return why `team` is not a task allocation (with `congestion`, if allowed); empty if it is one."""
+    """Return the reason why `team` is not a task allocation (with `congestion` if allowed); empty if it is one."""
     variables = {name: variable.domain for name, variable in team.variables.items()}
     exclusions = _Exclusions(team.owner, variables, congestion=congestion)
     excluded: dict[tuple[str, int], dict[tuple[str, int], Cost]] = defaultdict(dict)
@@ -120,7 +120,7 @@ def allocation_fault(team: Team, *, congestion: bool = False) -> str:
 
 
 def _scattered(excluded: Mapping[tuple[str, int], Mapping[tuple[str, int], Cost]], owner: Mapping[str, str]) -> str:
-    """Return an error if linked choices do not exclude each other, or at different costs; otherwise empty."""
+    """Return an error text if linked choices do not exclude each other, or have different costs; otherwise empty."""
     seen: set[tuple[str, int]] = set()
     for choice in excluded:
         if choice in seen:
@@ -143,9 +143,9 @@ def _scattered(excluded: Mapping[tuple[str, int], Mapping[tuple[str, int], Cost]
 
 
 class _Exclusions:
-    """Finds the forbidden pairs of constraints, and counts the checks. Equal constraints are evaluated once.
+    """Finds the pairs forbidden by constraints, and counts the checks. Equal constraints are evaluated once.
 
-    Robots of one process share the evaluations; each counts its own checks.
+    Robots in one process share the evaluations; each robot counts its own checks.
     """
 
     def __init__(self, owners: Mapping[str, str], domains: Mapping[str, Domain], *, congestion: bool) -> None:
@@ -160,7 +160,7 @@ class _Exclusions:
         self._found: dict[tuple[object, ...], tuple[tuple[Pair, Cost], ...]] = {}
 
     def scope(self, constraint: Constraint, robot: str) -> tuple[str, str]:
-        """Return the two variables of a `constraint` of `robot`. Raises `UnsupportedError`."""
+        """Return the two variables in a `constraint` of `robot`. Raises `UnsupportedError`."""
         names = constraint.variables
         apart = {self._owners.get(name) for name in names}
         if constraint.model == ConstraintModel.PKC or not len(names) == len(apart) == len(("one", "other")):
@@ -168,7 +168,7 @@ class _Exclusions:
         return names[0], names[1]
 
     def pairs(self, constraint: Constraint, one: str, other: str) -> tuple[tuple[Pair, Cost], ...]:
-        """Return the pairs of values of `one` and `other` with costs, infinite or of congestion, and the costs.
+        """Return the pairs of values of `one` and `other` that have costs (infinite or of congestion), and these costs.
 
         Raises:
             UnsupportedError: if congestion is not allowed, or there are too many pairs.
@@ -214,12 +214,12 @@ class _Exclusions:
 
 
 class _Row(NamedTuple):
-    """The costs of one value of a variable with the evaluated values of another.
+    """The costs of one value of a variable with the evaluated values of another variable.
 
     Attributes:
-        columns: The numbers of the columns whose values were all evaluated.
+        columns: The numbers of the columns whose values have all been evaluated.
         evaluated: The evaluated values of the other variable.
-        costs: Their costs, if not 0.
+        costs: The costs that are not 0, by the value of the other variable.
     """
 
     columns: set[int]
@@ -228,7 +228,7 @@ class _Row(NamedTuple):
 
 
 class Evaluations:
-    """A cache of costs for the robots of a process, since equal constraints occur in many files.
+    """A cache of costs for the robots in a process, because equal constraints occur in many files.
 
     Args:
         most: The number of pairs of values at which the cache is cleared.
@@ -247,7 +247,7 @@ class Evaluations:
         terms: tuple[object, ...],
         columns: tuple[Column, Column],
     ) -> tuple[tuple[Pair, Cost], ...]:
-        """Return the pairs of values of `columns` with costs, and the costs."""
+        """Return the pairs of values in `columns` that have costs, and these costs."""
         rows = self._rows.setdefault((constraint.definition, constraint.cost, terms), {})
         others, cost_of = columns[1], cost_function(constraint, names)
         number, wanted = self._columns.setdefault(others, len(self._columns)), frozenset(others)

@@ -1,7 +1,7 @@
 """Explanations of nogoods, and their invalidation by changes of the problem.
 
-A nogood derived from some constraints and domains holds as long as these are unchanged (DynABT: Omomowo, Arana and
-Ahriz 2008). Constraints and domains are identified by keys, the same in every robot.
+A nogood derived from constraints and domains holds as long as these are unchanged (DynABT: Omomowo, Arana and Ahriz
+2008). Constraints and domains are identified by keys, which are the same for every robot.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Invalidated(NamedTuple):
 
 
 def constraints_above(robot: Robot) -> Iterator[KeyedConstraint]:
-    """Yield the constraints of `robot` with its parents.
+    """Yield the constraints that `robot` shares with its parents.
 
-    Constraints of one name with one parent share a key: a scenario that removes one of them removes all.
+    Constraints with the same name and the same parent share a key: a scenario that removes one of them removes all.
     """
     for parent in robot.parents:
         for constraint in parent.constraints:
@@ -49,7 +49,7 @@ def parts_below(robot: Robot) -> Iterator[tuple[str, KeyedConstraint]]:
 
 
 def domain_key(agent: str) -> str:
-    """Return the key of an agent's domain, which explains that other values are impossible."""
+    """Return the key of an agent's domain; it explains that other values are impossible."""
     return f"{agent}="
 
 

@@ -1,4 +1,4 @@
-"""Filters: the values of another robot that are consistent with a value of this robot, without naming values.
+"""Filters: the values of another robot that are consistent with a value of this robot, without naming the values.
 
 A filter is a bitmap over the possible values of the other robot by common knowledge: the product of its interface
 variables' declared domains, in ascending order. Bit 0 of byte 0 is the first (Brito, Meisels, Meseguer and Zivan,
@@ -22,7 +22,7 @@ MAX_FILTER_BITS = 65_536
 class Filters:
     """Computes the filters that one robot sends, and the positions of its own values in received filters.
 
-    `constraints` are those with each receiver; other robots get a full filter.
+    `constraints` has the constraints with each receiver; other robots get a full filter.
 
     Raises:
         UnsupportedError: if the robot has too many values for a filter.
@@ -46,7 +46,7 @@ class Filters:
         """The position of each own value in filters."""
 
     def of(self, index: int, receiver: str) -> tuple[int, bytes]:
-        """Return the number of evaluated pairs, and the filter of `receiver` for this robot's value at `index`."""
+        """Return the number of evaluated pairs, and the filter sent to `receiver` for this robot's value at `index`."""
         made = self._made.get((index, receiver))
         if made is None:
             made = self._made[index, receiver] = self._filter(index, receiver)

@@ -1,8 +1,8 @@
 """Predicates as comparisons of sums for solvers, in place of tables that would be too large.
 
-A predicate on two tasks of a job shop, `or(le(add(x,50),y),le(add(y,61),x))`, has as many rows as the square of the
-horizon. Solvers handle its comparisons quickly. They receive only comparisons of sums with a constant, joined by `and`
-and `or`, without products and negative numbers, for which ACE computes wrong results.
+A predicate on two tasks in a job shop, `or(le(add(x,50),y),le(add(y,61),x))`, would have as many rows as the square of
+the horizon. Solvers handle its comparisons quickly. They receive only comparisons of sums with a constant, joined by
+`and` and `or`, without products and negative numbers, for which ACE computes wrong results.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from robochoc.model.expression.bounds import Interval
 from robochoc.solver.splitting import collect_terms, largest_value, with_arguments
 
 LARGEST = 2**29
-"""The maximum of all intermediate results, for the correctness of solvers with 32 bits."""
+"""The maximum of all intermediate results, so that solvers with 32-bit integers stay correct."""
 MAX_PARTS = 1000
 """The maximum number of comparisons in one predicate."""
 
 Operand = str | int
-"""A variable: its name, or its place in a network."""
+"""A variable: its name, or its position in a network."""
 Sign = Literal["le", "eq", "ne"]
 _NEGATED = {"le": "gt", "lt": "ge", "ge": "lt", "gt": "le", "eq": "ne", "ne": "eq"}
 
@@ -54,7 +54,7 @@ class _NotLinearError(Exception):
 
 
 def linear(constraint: Constraint, domains: Mapping[str, Sequence[int]]) -> Formula | None:
-    """Return a hard predicate as comparisons of sums. None: not possible.
+    """Return a hard predicate as comparisons of sums. None: this is not possible.
 
     Args:
         constraint: The predicate.
@@ -80,7 +80,7 @@ def linear(constraint: Constraint, domains: Mapping[str, Sequence[int]]) -> Form
 
 
 def is_small(formula: Formula, most: int) -> bool:
-    """Return whether all sums in `formula` of numbers up to `most`, on either side of a comparison, are small."""
+    """Return whether all sums in `formula`, with numbers up to `most`, are small on both sides of each comparison."""
     return all(
         sum(abs(factor) for _, factor in one.terms) * most + abs(one.bound) <= LARGEST for one in comparisons(formula)
     )
@@ -99,7 +99,7 @@ def conjuncts(formula: Formula) -> tuple[Formula, ...]:
 
 
 def operands(formula: Formula) -> tuple[Operand, ...]:
-    """Return the variables of `formula`, each once."""
+    """Return the variables in `formula`, each once."""
     return tuple(dict.fromkeys(name for one in comparisons(formula) for name, _ in one.terms))
 
 
@@ -110,9 +110,9 @@ def renamed(
 
     Args:
         formula: The formula.
-        names: The new names of variables. Others keep their names.
+        names: The new names of variables. Other variables keep their names.
         fixed: The values of variables that are left out.
-        shift: The amount by which a variable of the result is smaller than that of `formula`.
+        shift: The amount by which a variable in the result is smaller than the variable in `formula`.
     """
     match formula:
         case LinearComparison(terms, sign, bound):
@@ -134,7 +134,7 @@ def compared(terms: tuple[tuple[Operand, int], ...], sign: Sign, bound: int) -> 
 
 
 def joined(parts: Sequence[Formula], *, every: bool) -> Formula:
-    """Return a junction of `parts`, without junctions of the same kind within."""
+    """Return a junction of `parts`, without nested junctions of the same kind."""
     flat: list[Formula] = []
     for part in parts:
         flat += part.parts if isinstance(part, Junction) and part.every == every else [part]
@@ -144,7 +144,7 @@ def joined(parts: Sequence[Formula], *, every: bool) -> Formula:
 
 
 def holds(formula: Formula, values: Mapping[Operand, int]) -> bool:
-    """Return whether `formula` is true of `values`."""
+    """Return whether `formula` is true for `values`."""
     return renamed(formula, {}, values) == TRUE
 
 
@@ -197,7 +197,7 @@ def _is_piecewise(expression: Expression) -> bool:
 
 
 def _pieces(expression: Expression) -> tuple[str, tuple[Expression, ...]] | None:
-    """Return "max" or "min" and the arguments if `expression` is a maximum or minimum; None: it is a sum."""
+    """Return "max" or "min" and the arguments if `expression` is a maximum or minimum; None if it is a sum."""
     match expression:
         case Apply("min" | "max" as operator, parts):
             return operator, parts

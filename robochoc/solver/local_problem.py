@@ -1,12 +1,14 @@
 """A robot's local problem for protocols: one compiled variable, and the constraints that it checks.
 
 Paper, Section 4.1: every robot is one variable to a protocol. Its values are the robot's local solutions, projected on
-the interface variables that neighbours know (`solver/compiled_domain.py`). It checks the constraints shared with its
-parents (`solver/shared_constraint.py`), and its parts of partially known constraints (PKC), also with its children.
+the interface variables that neighbours know (`solver/compiled_domain.py`). The robot checks the constraints shared with
+its parents (`solver/shared_constraint.py`), and its parts of partially known constraints (PKC), also those with its
+children.
 
 Constraint checks are counted here, and only here (CompAPO adds checks of tables that others send): one check is one
 evaluation of one shared constraint for one value of this robot (Meisels, Kaplansky, Razgon and Zivan 2002). Private
-constraints, evaluated once when the domain is compiled, are not counted; nor are look-ups of nogoods and filters.
+constraints, evaluated once when the domain is compiled, are not counted; look-ups of nogoods and filters are not
+counted either.
 """
 
 from __future__ import annotations
@@ -49,7 +51,7 @@ class Charged(NamedTuple):
     Attributes:
         number: The constraint's index in `LocalProblem`.
         others: The values of the other robots' variables.
-        codes: A code for each own value, the same for values that the constraint does not distinguish.
+        codes: A code for each own value; values that the constraint does not distinguish have the same code.
         costs: The cost of each own value.
     """
 
@@ -60,7 +62,7 @@ class Charged(NamedTuple):
 
 
 MIN_TABLE_VALUES = 64
-"""The number of values from which conflicts are computed for all of them at once, by numpy."""
+"""The number of values from which numpy computes the conflicts of all values at once."""
 
 MAX_BOUNDED_ROWS = 65_536
 """The maximum number of combinations of values for which a constraint's minimum cost is computed."""
@@ -69,17 +71,18 @@ MAX_BOUNDED_ROWS = 65_536
 class LocalProblem:
     """The local problem of one robot: its compiled domain, its neighbours, and the constraints that it checks.
 
-    Constraints are sorted by their lowest robot, the highest first, so those with the robots above a given rank are a
-    prefix. Where robots may withdraw, the last value means withdrawal: all its parts are None, and constraints with it
-    are restated or dropped (`model/absence.py`).
+    Constraints are sorted by their lowest robot, the highest first, so the constraints with robots above a given rank
+    are a prefix. If robots may withdraw, the last value means withdrawal: all its parts are None, and constraints with
+    it are restated or dropped (`model/absence.py`).
 
     Attributes:
         values: The values of the interface variables. `solution(i)` has the values of all variables for `values[i]`.
         charges: The private cost of each value.
         parents: The parents in the file, in priority order.
         children: The children in the file, in priority order.
-        neighbours: The parents, children, and all robots in a constraint known to this robot, in priority order.
-        pkc_parents: The parents with a common partially known constraint, which need this robot's value too.
+        neighbours: The parents, children, and all robots in a constraint that this robot knows, in priority order.
+        pkc_parents: The parents that share a partially known constraint with this robot, and so need this robot's value
+            too.
         checks: The number of constraint checks so far.
     """
 
@@ -105,7 +108,7 @@ class LocalProblem:
         self._set_constraints(part, OwnValues(robot.interface, self.values))
 
     def _set_constraints(self, part: AgentProblem, own: OwnValues) -> None:
-        """Compile the constraints of `part` for the values `own`, and set all attributes that depend on them."""
+        """Compile the constraints in `part` for the values `own`, and set all attributes that depend on them."""
         robot, rank = part.robot, self._rank
 
         def ready(known: KeyedConstraint) -> SharedConstraint:
@@ -134,7 +137,7 @@ class LocalProblem:
         self._made_filters: Filters | None = None
 
     def allow_undeclared(self) -> None:
-        """Evaluate constraints for undeclared values of others from now on: domains may have changed since."""
+        """Evaluate constraints for undeclared values of others from now on, because domains may have changed."""
         for constraint in self._constraints:
             constraint.allow_undeclared()
 
@@ -146,7 +149,7 @@ class LocalProblem:
     def declared(self, robot: str) -> list[Value]:
         """Return all declared values of `robot`; the last is withdrawal if robots may withdraw.
 
-        Its private constraints may forbid some of them.
+        The private constraints of `robot` may forbid some of them.
         """
         names = self._part.known.interfaces[robot]
         values: list[Value] = [*itertools.product(*(self._part.known.domains[name] for name in names))]
@@ -162,7 +165,7 @@ class LocalProblem:
         return self._domain.solution(index)
 
     def conflict(self, index: int, view: Mapping[str, Value], since: int = -1) -> Conflict | None:
-        """Return the conflict of `values[index]` with `view`, from the first violated constraint. None: no conflict.
+        """Return the conflict of `values[index]` with `view` in the first violated constraint. None: no conflict.
 
         Constraints with unknown variables in `view` are skipped, and so are those whose lowest robot is above rank
         `since`: the caller knows that they hold. The order is that of their lowest robot, the highest first, so the
@@ -175,7 +178,7 @@ class LocalProblem:
     def conflicts_of(
         self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1
     ) -> list[tuple[Conflict, list[int]]]:
-        """Return the conflicts of the values at `indices`, each with its values, with the checks of `conflict`."""
+        """Return the conflicts of the values at `indices`, each with the values that have it. Checks as in `conflict`."""
         if self._table is not None:
             found: dict[int, tuple[Conflict, list[int]]] = {}
             for index in indices:
@@ -211,8 +214,8 @@ class LocalProblem:
     def gaps(self, index: int, sets: Mapping[str, Sequence[Value]]) -> Iterator[Gap]:
         """Yield the constraints that `values[index]` violates for some combination of the others' values in `sets`.
 
-        The order and the skipped constraints are those of `conflict`. One check for each combination that a constraint
-        distinguishes. Robots must not withdraw.
+        The order and the skipped constraints are those of `conflict`. Each combination that a constraint distinguishes
+        is one check. Robots must not withdraw.
         """
         for constraint in self._constraints:
             broken: list[Conflict] = []
@@ -224,7 +227,7 @@ class LocalProblem:
                 yield Gap(broken, allowed)
 
     def part_conflict(self, index: int, child: str, value: Value) -> Conflict | None:
-        """Return the conflict of `values[index]` with `value` of `child`, by this robot's parts of shared PKCs.
+        """Return the conflict of `values[index]` with `value` of `child` in this robot's parts of shared PKCs.
 
         None: the parts allow the pair. Unlike other conflicts, it contains this robot's value.
         """
@@ -258,17 +261,17 @@ class LocalProblem:
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
     def cost(self, index: int, view: Mapping[str, Value]) -> Cost:
-        """Return the cost of `values[index]` in `view`: its private cost, and constraints without unknown variables."""
+        """Return the private cost of `values[index]` plus its cost in `view`, in constraints without unknown variables."""
         return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
 
     def costs(self, view: Mapping[str, Value]) -> list[Cost]:
-        """Return the `cost` of every own value, with a check for each value and constraint."""
+        """Return the `cost` of every own value; each value and constraint is one check."""
         known = self._paid(view)
         self.checks += len(known) * len(self.values)
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
-        """Return the lexicographic cost of every own value: comparable also where hard constraints are violated."""
+        """Return the lexicographic costs of all own values, comparable even where hard constraints are violated."""
         known = self._paid(view)
         self.checks += len(known) * len(self.values)
         costs = list(map(sum, zip(self.charges, *known, strict=True)))
@@ -281,9 +284,9 @@ class LocalProblem:
         return robot in self._parts or robot in self.pkc_parents
 
     def own_side(self, index: int, robot: str, value: Value) -> LexicographicCost:
-        """Return the cost of `values[index]` in this robot's parts of constraints with `robot`, if it has `value`.
+        """Return the cost of `values[index]` in this robot's parts of constraints with `robot`, if `robot` has `value`.
 
-        These are parts of partially known constraints (PKC); `robot` pays for its own parts. One check for each part.
+        These are parts of partially known constraints (PKC); `robot` pays for its own parts. Each part is one check.
 
         Raises:
             ValueError: if `robot` cannot have the value.
@@ -294,18 +297,19 @@ class LocalProblem:
         return _lexicographic_cost([paid[index] for paid in known])
 
     def least_side(self, robot: str) -> list[Cost]:
-        """Return a lower bound, for each own value, on the cost of `own_side` over all values of `robot`.
+        """Return, for each own value, a lower bound on its cost in `own_side` over all values of `robot`.
 
-        Violated parts are infinite. As in `lower_bounds`, it is 0 if robots may withdraw, or have too many values.
+        Violated parts are infinite. As in `lower_bounds`, the bound is 0 if robots may withdraw, or have too many
+        values.
         """
         return self._at_least(self._parts.get(robot, ()))
 
     def refuse_value(self, robot: str, value: Value) -> None:
-        """Raise `ValueError` if `value`, which a message may contain, is not in the declared domains of `robot`."""
+        """Raise `ValueError` if `value`, received in a message, is not in the declared domains of `robot`."""
         names = self._part.known.interfaces.get(robot, ())
         if len(value) != len(names):
             raise ValueError(f"a value of {robot} has {len(names)} parts, not {len(value)}")
-        if any(part is not None for part in value):  # otherwise it is withdrawn
+        if any(part is not None for part in value):  # otherwise the robot is withdrawn
             domains = self._part.known.domains
             for name, part in zip(names, value, strict=True):
                 if part is None or part not in domains[name]:
@@ -314,7 +318,7 @@ class LocalProblem:
     def charged(self, view: Mapping[str, Value]) -> list[Charged]:
         """Return the costs in each constraint whose other variables are all known, with the checks of `costs`.
 
-        They add up to the `costs` without the private `charges`.
+        These costs add up to the `costs` without the private `charges`.
         """
         found = [
             Charged(number, others, constraint.codes, constraint.costs(others))
@@ -325,10 +329,10 @@ class LocalProblem:
         return found
 
     def least_and_most(self, number: int) -> tuple[Cost, Cost]:
-        """Return the minimum and maximum cost of the constraint with this `number`, infinite ones included.
+        """Return the minimum and maximum cost of the constraint with this `number`, including infinite costs.
 
-        They are over this robot's values and all declared values of the others. With more than `MAX_BOUNDED_ROWS`
-        combinations, they are 0 and the maximum in the constraint's definition.
+        The minimum and maximum are over this robot's values and all declared values of the others. With more than
+        `MAX_BOUNDED_ROWS` combinations, they are 0 and the maximum in the constraint's definition.
         """
         constraint = self._constraints[number]
         checks, least, most = constraint.least_and_most(self._part.known.domains, MAX_BOUNDED_ROWS)
@@ -338,13 +342,13 @@ class LocalProblem:
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], Cost]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
 
-        The maximum is over finite costs, whatever the domains are: nothing is checked. See `tables`.
+        The maximum is over finite costs, for any domains: nothing is checked. See `tables`.
         """
         known = {*robots}
         return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
     def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
-        """Return the data that determine `tables` for these `robots`, except their domains: equal for equal tables.
+        """Return the data that determine `tables` for these `robots`, except domains: equal data give equal tables.
 
         The data are this robot's values and their charges, and the constraints whose other robots are all in `robots`.
         """
@@ -354,7 +358,7 @@ class LocalProblem:
     def added(self, robot: str, view: Mapping[str, Value]) -> list[Cost] | None:
         """Return the cost that `robot`, the lowest in `view`, adds to each own value: the increase of `costs`.
 
-        None: no constraint becomes complete. All others in `view` must be higher. Checks are counted only for the
+        None: no constraint becomes complete. All other robots in `view` must be higher. Checks are counted only for the
         constraints that become complete.
         """
         depth = self._rank[robot]
@@ -385,9 +389,9 @@ class LocalProblem:
     def tables(self, domains: Mapping[str, Sequence[Value]], lowest: str | None = None) -> list[CostTable]:
         """Return a cost table for each constraint whose other robots are all in `domains`.
 
-        With `lowest`, only for constraints whose lowest other robot is this one.
+        With `lowest`, return only the tables of constraints whose lowest other robot is `lowest`.
 
-        One check for each combination that a constraint distinguishes. The tables, numpy arrays, do not include the
+        Each combination that a constraint distinguishes is one check. The tables, numpy arrays, do not include the
         private charges. See `solver/cost_table.py`, also for the size limit.
         """
         from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - numpy, needed for tables only
@@ -430,8 +434,8 @@ class LocalProblem:
     def look_ahead(self) -> None:
         """Evaluate the constraints that `allowed` will need, before other robots have sent their values.
 
-        These are the constraints in which one robot is lower than this one, for all declared values. Robots do this
-        simultaneously. If there are too many values, nothing is evaluated.
+        These are the constraints in which one robot is lower than this one, evaluated for all declared values. Robots
+        do this simultaneously. If there are too many values, nothing is evaluated.
         """
         own = self._rank[self.agent]
         declared = self._part.known.domains
@@ -452,11 +456,11 @@ class LocalProblem:
         return tasks
 
     def interchangeable(self, value: Value) -> Sequence[int]:
-        """Return the indices of all own values that agree with `value` wherever that is not None.
+        """Return the indices of all own values that agree with `value` wherever `value` is not None.
 
-        Neighbours that see nothing else cannot distinguish them: neighbourhood partial interchangeability
-        (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint
-        reasoning", AAMAS workshop DCR 2006).
+        Neighbours that see nothing else cannot distinguish these values: neighbourhood partial interchangeability
+        (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint reasoning",
+        AAMAS workshop DCR 2006).
         """
         if None not in value:
             index = self._place_of.get(value)
@@ -465,11 +469,11 @@ class LocalProblem:
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
     def _may_look_withdrawn(self, names: Sequence[str]) -> bool:
-        """Return whether withdrawal is a value of its own for a robot that shows `names`."""
+        """Return whether withdrawal is a separate value of a robot that shows `names` to its neighbours."""
         return self._part.parameters.withdrawal_cost is not None and bool(names)
 
     def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
-        """Return each constraint whose other variables are all known, and their values. Count a check for each."""
+        """Return each constraint whose other variables are all known, and their values. Each is one check."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
         self.checks += len(known)
         return known
@@ -514,7 +518,7 @@ class LocalProblem:
         return ConflictTable(self._constraints, len(self.values))
 
     def _added(self, waiting: Sequence[SharedConstraint], view: Mapping[str, Value]) -> list[Cost]:
-        """Return the cost of each own value in those constraints of `waiting` whose other variables are all known."""
+        """Return the cost of each own value in the constraints of `waiting` whose other variables are all known."""
         known = [(c, others) for c in waiting if (others := c.other_values(view)) is not None]
         self.checks += len(known) * len(self.values)
         return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])
@@ -526,5 +530,5 @@ def _summed(size: int, rows: Sequence[Sequence[Cost]]) -> list[Cost]:
 
 
 def _lexicographic_cost(prices: Sequence[Cost]) -> LexicographicCost:
-    """Return the total of `prices`."""
+    """Return the total of `prices` as a lexicographic cost."""
     return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])

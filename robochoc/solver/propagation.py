@@ -1,9 +1,9 @@
-"""Generalised arc consistency on tables, which makes them smaller and safe for ACE.
+"""Generalised arc consistency on tables, which makes the tables smaller and safe for ACE.
 
 ACE 2.6 counts wrongly if a table of forbidden tuples has a variable with one value, fails an assertion if its first
 propagation empties a table, and fails on small permutations (`tests/unit/solver/test_ace.py`;
-docs/explanation/design/solving.md, "ACE"). So these are removed: values without support, variables with one value,
-tables without effect; small permutations become tables.
+docs/explanation/design/solving.md, "ACE"). So values without support, variables with one value, and tables without
+effect are removed, and small permutations become tables.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ LARGEST_PERMUTATION = 5
 def propagate(network: Network) -> Network:
     """Return an equivalent arc consistent network; `impossible` if this proves that there is no solution.
 
-    Every variable in a table or a `different` has at least two values. Tables of forbidden tuples remain only if there
-    are more than `MAX_ALLOWED_ROWS` allowed ones.
+    Every variable in a table or a `different` has at least two values. Tables of forbidden tuples remain only if they
+    have more than `MAX_ALLOWED_ROWS` allowed tuples.
     """
     filtered = _Filter(network)
     if not filtered.run():
@@ -61,7 +61,7 @@ def _simplified(formulas: Sequence[Formula], domains: Sequence[Codes]) -> tuple[
 
 
 class _Filter:
-    """Removes values without support until none is left to remove."""
+    """Removes values without support until all remaining values have support."""
 
     def __init__(self, network: Network) -> None:
         self.domains = [set(domain) for domain in network.domains]
@@ -107,7 +107,7 @@ class _Filter:
         return all(domains)
 
     def _keep(self, place: int, values: set[int]) -> None:
-        """Restrict the domain at `place` to `values`, and check its tables again."""
+        """Restrict the domain at `place` to `values`, and mark its tables for another check."""
         if not self.domains[place] <= values:
             self.domains[place] &= values
             self._waiting.update(dict.fromkeys(self._tables_at[place]))
@@ -129,9 +129,9 @@ class _Filter:
 
 
 def is_small_permutation(scope: Codes, domains: Sequence[Codes]) -> bool:
-    """Return whether variables that all differ are few, and need all their values.
+    """Return whether variables that must all differ are few, and need all their values.
 
-    ACE converts these to tables itself, and fails if a variable lacks one of the values.
+    ACE converts such variables to tables itself, and fails if a variable lacks one of the values.
     """
     values = {code for place in scope for code in domains[place]}
     return len(scope) == len(values) <= LARGEST_PERMUTATION
@@ -152,7 +152,7 @@ def _allowing(table: CodeTable, domains: Sequence[Codes]) -> CodeTable:
 
 
 def _without_fixed(table: CodeTable, domains: Sequence[Codes]) -> CodeTable:
-    """Return `table` without variables that have one value, with which all its rows agree."""
+    """Return `table` without variables that have one value; all its rows agree with these values."""
     kept = [index for index, place in enumerate(table.scope) if len(domains[place]) > 1]
     if len(kept) == len(table.scope):
         return table

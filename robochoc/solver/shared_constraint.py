@@ -1,4 +1,4 @@
-"""A constraint shared with other robots, compiled for its checks; results are cached by the others' values."""
+"""A constraint shared with other robots, compiled for fast checks; results are cached by the others' values."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Conflict = Mapping[str, Value]
 """Assignments of other robots that exclude an own value: the left side of a nogood."""
 
 UNKNOWN = -1
-"""The value of a missing mask: a value in the scope is unknown, or a withdrawn robot drops the constraint."""
+"""The mask if there is none: a value in the scope is unknown, or a withdrawn robot drops the constraint."""
 
 OtherValues = tuple[int | None, ...]
-"""The values of other robots' variables in a constraint, in its order. None: withdrawn."""
+"""The values of other robots' variables in a constraint, in the constraint's order. None: withdrawn."""
 
 
 class Gap(NamedTuple):
-    """The combinations of others' values that violate a constraint with an own value, and those that satisfy it."""
+    """The combinations of the others' values that violate a constraint with an own value, and those that satisfy it."""
 
     broken: Sequence[Conflict]
     allowed: Sequence[Conflict]
@@ -33,8 +33,8 @@ class Gap(NamedTuple):
 class OwnValues:
     """This robot's compiled domain: `values` of the variables `names`, and the codes that constraints distinguish.
 
-    A constraint contains some of the variables; values that agree on these have the same code. Many constraints share
-    their codes.
+    A constraint contains some of the variables; values that agree on these variables have the same code. Many
+    constraints share their codes.
     """
 
     def __init__(self, names: Sequence[str], values: Sequence[Value]) -> None:
@@ -48,7 +48,7 @@ class OwnValues:
         return places, [self._names[place] for place in places]
 
     def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[Value]]:
-        """Return the code of each value, and the values at `places` of each code."""
+        """Return the code of each value, and, for each code, the values at `places`."""
         if places not in self._coded:
             codes: dict[Value, int] = {}
             coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
@@ -61,12 +61,12 @@ class OwnValues:
 
 
 def _plain(domain: Domain) -> Domain | range:
-    """Return `domain` as a range, which is faster, if it is a single one."""
+    """Return `domain` as a range, which is faster, if it consists of a single range."""
     return domain.ranges[0] if len(domain.ranges) == 1 else domain
 
 
 class SharedConstraint:
-    """A constraint on this robot's compiled variable and those of `agents` (in priority order).
+    """A constraint on this robot's compiled variable and the compiled variables of `agents` (in priority order).
 
     After `compile` it returns the values of this robot that are consistent with values of the others. Answers are
     computed on first use and cached: one for each combination of the others' variables in the constraint, however many
@@ -96,15 +96,15 @@ class SharedConstraint:
         self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
         self._only = self._seen[0] if len(self._seen) == 1 else None
         self._masks_by: dict[int, int] = {}
-        """If the others have one variable: `mask`, by its value."""
+        """If the others have one variable: the cache of `mask`, by the variable's value."""
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[Cost]] = {}
         self._costs_by: dict[int, list[Cost]] = {}
-        """If the others have one variable: `costs`, by its value."""
+        """If the others have one variable: the cache of `costs`, by the variable's value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
         self._counts_when_absent = False
         self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
-        """The costs of the constraint if the owners of these variables are absent. None: it is dropped."""
+        """The costs of the constraint if the owners of these variables are absent. None: the constraint is dropped."""
 
     def allow_absence(self) -> None:
         """Accept None as the value of withdrawn robots from now on (`model/absence.py`)."""
@@ -130,9 +130,9 @@ class SharedConstraint:
         return None if None in seen and not self._counts_when_absent else tuple(seen)
 
     def combined(self, sets: Mapping[str, Sequence[Value]]) -> Iterator[OtherValues]:
-        """Yield all combinations of the others' variables for values of each other robot in `sets`.
+        """Yield all combinations of the others' variables, for the values of each other robot in `sets`.
 
-        Nothing, if a robot has no values there. Equal combinations are yielded once.
+        Yields nothing if a robot has no values there. Equal combinations are yielded once.
         """
         columns = []
         for agent in self.agents:
@@ -190,7 +190,7 @@ class SharedConstraint:
 
     @property
     def definition(self) -> object:
-        """The constraint of the files: equal constraints have equal costs."""
+        """The constraint as defined in the files: equal constraints have equal costs."""
         return self._constraint
 
     @property
@@ -199,7 +199,7 @@ class SharedConstraint:
         return max_cost(self._constraint)
 
     def costs(self, others: OtherValues) -> list[Cost]:
-        """Return the cost of each own value for the values `others`. Raises `ValueError`."""
+        """Return the cost of each own value together with the values `others`. Raises `ValueError`."""
         prices = self._costs.get(others)
         if prices is None:
             self._refuse_undeclared(others)
@@ -248,7 +248,7 @@ class SharedConstraint:
     def least_and_most(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, Cost, Cost]:
         """Return the number of checks, and the minimum and maximum cost over the others' `domains`.
 
-        With more than `wide` combinations, nothing is checked: they are 0 and the constraint's maximum.
+        With more than `wide` combinations, nothing is checked: the results are 0 and the constraint's maximum cost.
         """
         columns = [list(domains[name]) for name in self._names]
         entries = math.prod(map(len, columns)) * len(self.codes)
@@ -260,7 +260,7 @@ class SharedConstraint:
     def combinations(
         self, domains: Mapping[str, Sequence[Value]], size: int
     ) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
-        """Yield the indices of the others' values in `domains`, for each combination, and the values in the scope.
+        """Yield, for each combination of the others' values in `domains`, their indices and the values in the scope.
 
         Combinations that drop the constraint are skipped; `size` is the number of own values.
 
@@ -281,7 +281,7 @@ class SharedConstraint:
                 yield place, others
 
     def mask(self, others: OtherValues) -> int:
-        """Return this robot's values that are consistent with `others`: bit i for the i-th."""
+        """Return this robot's values that are consistent with `others`: bit i for the i-th value."""
         mask = self._masks.get(others)
         if mask is None:
             holds = self.holds(others)
@@ -295,7 +295,7 @@ class SharedConstraint:
         return itertools.product(*columns) if math.prod(map(len, columns)) <= most else ()
 
     def evaluate(self, combinations: Iterable[OtherValues]) -> int:
-        """Evaluate `combinations`, and return the number of those that were not evaluated before."""
+        """Evaluate `combinations`, and return the number of combinations that had not been evaluated before."""
         before = len(self._masks)
         for others in combinations:
             self.mask(others)
@@ -322,21 +322,21 @@ class SharedConstraint:
         return mask
 
     def conflict_with(self, view: Mapping[str, Value]) -> Conflict:
-        """Return `conflict` for the values in `view`, which must be known."""
+        """Return the result of `conflict` for the values in `view`, which must be known."""
         others = self.other_values(view)
         assert others is not None  # noqa: S101 - for mypy
         return self.conflict(others)
 
     def own_part(self, index: int) -> Value:
-        """Return the variables of the constraint in this robot's value at `index`; None for others."""
+        """Return the value at `index`, with None for variables outside the constraint."""
         return self._own.shown(index, self._places)
 
     def row(self, index: int, columns: Sequence[Sequence[int]]) -> tuple[int, list[bool]]:
         """Return which values of the single other robot are consistent with this robot's value at `index`.
 
-        `columns` are the values of that robot's variables; the answers follow their product, as in `itertools`. Every
-        pair that the constraint distinguishes is evaluated once, whatever the answers are. Also return the number of
-        checks, first.
+        `columns` are the values of that robot's variables; the results follow their product, as in `itertools`. Every
+        pair that the constraint distinguishes is evaluated once, whatever the results are. The first item returned is
+        the number of checks.
         """
         own = self._distinct[self.codes[index]]
         places = [place for _, place in self._seen]
@@ -359,7 +359,7 @@ class SharedConstraint:
 def sorted_by_lowest_agent(
     constraints: Iterable[SharedConstraint], rank: Mapping[str, int]
 ) -> tuple[SharedConstraint, ...]:
-    """Return `constraints` in the order of their lowest other robot, the highest first."""
+    """Return `constraints` in the order of their lowest other robots, the highest first."""
     return tuple(
         sorted(constraints, key=lambda c: (max((rank[agent] for agent in c.agents), default=-1), len(c.agents)))
     )

@@ -1,10 +1,10 @@
 """Splits predicates over many variables into small tables, for solvers that accept only tables.
 
-A predicate with too many combinations of values is split along its expression: the value of a subexpression becomes a
-further variable, and a table relates it to the subexpression's variables. Sums in comparisons are added up term by term
-(Trick, "A dynamic programming approach for consistency and propagation for knapsack constraints", Annals of OR 118,
-2003): each partial sum is a variable, and sums for which the rest cannot change the outcome share one value. Every
-further variable is determined by the others, so the number of solutions stays the same.
+A predicate with too many combinations of values is split along its expression: the value of a subexpression becomes an
+additional variable, and a table relates it to the subexpression's variables. Sums in comparisons are added up term by
+term (Trick, "A dynamic programming approach for consistency and propagation for knapsack constraints", Annals of OR
+118, 2003): each partial sum is a variable, and partial sums share one value if the remaining terms cannot change the
+outcome. Every additional variable is determined by the others, so the number of solutions stays the same.
 """
 
 from __future__ import annotations
@@ -46,12 +46,12 @@ _MAY_BE_UNDEFINED = {"div", "mod", "pow"}
 
 @dataclass
 class Split:
-    """Tables that are together equivalent to a predicate: the scope and the allowed rows of each.
+    """Tables that together are equivalent to a predicate: the scope and the allowed rows of each table.
 
     Attributes:
         tables: The tables.
-        domains: The values of all variables in scopes, in ascending order: given and further ones.
-        prefix: The beginning of the names of further variables.
+        domains: The values of all variables in scopes, in ascending order: given and additional variables.
+        prefix: The beginning of the names of additional variables.
         budget: The number of combinations of values that may still be evaluated.
     """
 
@@ -62,7 +62,7 @@ class Split:
     _made: dict[Expression, Name] = field(default_factory=dict)
     _further: int = 0
 
-    # Truth
+    # Boolean expressions
 
     def require(self, expression: Expression) -> None:
         """Add tables that are equivalent to a Boolean expression."""
@@ -125,7 +125,7 @@ class Split:
             place = after
 
     def _complete(self, state: Name, group: Expression, target: int) -> None:
-        """Add the table of `state` + `group` = `target`: for each partial sum, the matching rows."""
+        """Add the table for `state` + `group` = `target`: for each partial sum, the matching rows."""
         scope = names(group)
         fitting: dict[int, list[Row]] = {}
         for row, value in self._worth(group, scope):
@@ -145,7 +145,7 @@ class Split:
     # Values
 
     def _reduced(self, expression: Expression) -> Expression:
-        """Return an equal expression over few variables, including further ones."""
+        """Return an equal expression over few variables, including additional ones."""
         if not isinstance(expression, Apply) or self._size(expression) <= SMALL:
             return expression
         operator = expression.operator
@@ -163,7 +163,7 @@ class Split:
         return self._joined(operator, parts)
 
     def _joined(self, operator: str, parts: Sequence[Expression]) -> Expression:
-        """Return `operator` applied to `parts`; the widest parts become variables as long as necessary."""
+        """Return `operator` applied to `parts`; the widest parts become variables until it is narrow enough."""
         chosen = list(parts)
         widest_first = sorted(range(len(parts)), key=lambda place: -self._size(parts[place]))
         for place in widest_first:
@@ -182,7 +182,7 @@ class Split:
         return self._made[expression]
 
     def _variable(self, scope: tuple[str, ...], rows: Iterable[tuple[Row, int]]) -> Name:
-        """Return a further variable, whose value is determined by `scope`."""
+        """Return an additional variable, whose value is determined by `scope`."""
         name = f"{self.prefix}{self._further}"
         self._further += 1
         table = tuple([(*row, value) for row, value in rows])
@@ -191,7 +191,7 @@ class Split:
         return Name(name)
 
     def _worth(self, expression: Expression, scope: tuple[str, ...]) -> Iterable[tuple[Row, int]]:
-        """Yield all combinations of values of `scope` with the value of `expression`, where it is defined."""
+        """Yield all combinations of values of `scope`, each with the value of `expression`, if it is defined."""
         size = math.prod(len(self.domains[name]) for name in scope)
         self.budget -= size
         if size > MAX_COMBINATIONS or self.budget < 0:
@@ -222,12 +222,12 @@ class NotSplitError(RobochocError):
 def split(
     constraint: Constraint, domains: Mapping[str, Sequence[int]], prefix: str, budget: int = MAX_TRIED
 ) -> Split | None:
-    """Return a hard predicate as small tables. None: not possible.
+    """Return a hard predicate as small tables. None: this is not possible.
 
     Args:
         constraint: The predicate.
         domains: The values of its variables, in ascending order.
-        prefix: The beginning of the names of further variables, and of no other names.
+        prefix: The beginning of the names of additional variables, and of no other names.
         budget: The maximum number of evaluated combinations of values.
     """
     definition = constraint.definition
@@ -253,9 +253,9 @@ def split(
 
 @dataclass(frozen=True)
 class _Window:
-    """The distinctions between partial sums that matter for a comparison of the sum with `target`.
+    """The partial sums that must be distinguished to compare the whole sum with `target`.
 
-    Sums for which the comparison is true, or false, whatever the rest is, share one state.
+    Partial sums share one state if the comparison is true, or false, whatever the rest is.
     """
 
     operator: str

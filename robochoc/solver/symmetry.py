@@ -1,7 +1,7 @@
 """Symmetries of a network: guessed from the variables' names, verified on its tables, and broken.
 
 A symmetry permutes variables, and may reverse the order of the values, such that every table becomes a table of the
-network. It is enough to find the lexicographically first solution of each orbit (lex-leader; Crawford, Ginsberg, Luks
+network. It is enough to find the lexicographically first solution in each orbit (lex-leader; Crawford, Ginsberg, Luks
 and Roy, KR 1996). Wrong guesses are dropped. Only the guesses depend on names: `V3.1` is row 3, column 1 of a board
 that may be mirrored or rotated.
 """
@@ -27,7 +27,7 @@ class Symmetry(NamedTuple):
     reflects: bool
 
     def then(self, other: Symmetry) -> Symmetry:
-        """Return the composition: first this one, then `other`."""
+        """Return the composition: first this symmetry, then `other`."""
         return Symmetry(tuple([other.image[place] for place in self.image]), self.reflects != other.reflects)
 
     def applied(self, solution: Codes, highest: int) -> Codes:
@@ -57,10 +57,10 @@ def symmetries(part: Component) -> tuple[Symmetry, ...]:
 
 
 def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
-    """Return `network` without most of the solutions that are not the first of their orbit.
+    """Return `network` without most of the solutions that are not the first in their orbit.
 
     x is the first if x <= g(x) for every g. For each g, this is required only at the first position that g may change:
-    all before it are equal for every x.
+    all positions before it are equal for every x.
     """
     highest = _highest(network)
     demanded: dict[Hashable, CodeTable] = {}
@@ -104,7 +104,7 @@ def _guesses(names: Sequence[str]) -> Iterator[Symmetry]:
 
 
 def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, ...]]]:
-    """Yield the coordinates with each axis reversed, and with each two axes exchanged."""
+    """Yield the coordinates with each axis reversed, and with each pair of axes exchanged."""
     axes = range(len(coordinates[0]))
     for axis in axes:
         seen = {coordinate[axis] for coordinate in coordinates}
@@ -116,7 +116,7 @@ def _moves(coordinates: Sequence[tuple[int, ...]]) -> Iterator[list[tuple[int, .
 
 
 def _verifier(network: Network) -> Callable[[Symmetry], bool]:
-    """Return a test whether a guess maps `network` to itself."""
+    """Return a test whether a guessed symmetry maps `network` to itself."""
     highest = _highest(network)
     content: dict[Hashable, frozenset[Codes]] = {}
 

@@ -14,17 +14,17 @@ from robochoc.solver.propagation import propagate
 from robochoc.solver.weighted import MAX_CODE, constant_costs, costs_by_scope
 
 MIN_VALUE, MAX_VALUE = -(2**31) + 10, 2**31 - 11
-"""The values that ACE 2.6 reads: 32 bits, except a few that it reserves (found by tests with ACE)."""
+"""The values that ACE 2.6 can read: 32 bits, except a few that it reserves (found by tests with ACE)."""
 MAX_SPREAD = 2**31 - 1
-"""The maximum difference of two values of a domain, since ACE counts the values between them."""
+"""The maximum difference between two values in a domain, because ACE counts the values between them."""
 
 
 def team_network(team: Team) -> tuple[Network, Codes]:
     """Return all variables of `team`, in its order, with all its constraints; codes are values.
 
-    Unary constraints are applied to domains, cliques of `ne` are explicit. After the team's variables come those of
-    split predicates (`solver/splitting.py`), then those of the costs of soft constraints. The positions of the last are
-    returned; their sum is the cost of the problem.
+    Unary constraints are applied to domains, and cliques of `ne` are explicit. After the team's variables come the
+    variables of split predicates (`solver/splitting.py`), then the cost variables of soft constraints. The positions of
+    the cost variables are returned; their sum is the cost of the problem.
 
     Raises:
         UnsupportedError: if the team changes over time, a constraint is too large for a table, costs are too high, or
@@ -44,7 +44,7 @@ def team_network(team: Team) -> tuple[Network, Codes]:
         places = [place.setdefault(name, len(place)) for name in part.names]
         network = with_cliques(part.network, lambda _: None)
         for name, codes in zip(part.names, network.domains, strict=True):
-            domains[name] = part.decoded(codes) or domains.get(name, (0,))  # no format has an empty domain
+            domains[name] = part.decoded(codes) or domains.get(name, (0,))  # no format supports an empty domain
         impossible = impossible or part.network.impossible
         tables += [_over_values(table, part, places) for table in network.tables]
         different += [tuple([places[member] for member in scope]) for scope in network.different]
@@ -112,7 +112,7 @@ def _charges(part: Component, places: Sequence[int], soft: Sequence[Constraint])
 
 
 def identifiers(names: Sequence[str]) -> list[str]:
-    """Return different valid names of XCSP3 (a letter, then letters, digits, `_`) for `names`."""
+    """Return different valid XCSP3 names (a letter, then letters, digits, `_`) for `names`."""
     taken: set[str] = set()
     found = []
     for name in names:

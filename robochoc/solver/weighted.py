@@ -1,7 +1,7 @@
 """Problems with costs for solvers: costs are a column of tables, never an expression.
 
-For each scope with costs there is a further variable, whose codes are the costs, and a table that relates them to the
-codes of the scope. The solver only minimises the sum of these non-negative variables; the minimum is checked with the
+Each scope with costs gets an additional variable, whose codes are the costs, and a table that relates them to the codes
+of the scope. The solver only minimises the sum of these non-negative variables; the minimum is checked with the
 original problem.
 """
 
@@ -39,7 +39,7 @@ DIGIT = 2**27
 """The unit of the higher code of a cost."""
 
 CostRows = dict[Codes, float]
-"""The costs of combinations of codes. Other combinations are forbidden."""
+"""The costs of combinations of codes. All other combinations are forbidden."""
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class WeightedComponent:
         return self.base + self.unit * sum(unit * codes[place] for place, unit in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
-        """Return the values of the variables in a solution of `network`, without those of withdrawn robots."""
+        """Return the values of the variables in a solution of `network`, without the variables of withdrawn robots."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
@@ -99,7 +99,7 @@ def priced_components(team: Team, withdrawal_cost: int | None = None) -> list[We
 
 
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
-    """Return the independent components of the problem of `variables` and `constraints`.
+    """Return the independent components of the problem with `variables` and `constraints`.
 
     The costs of constraints on constants are left out.
 
@@ -130,7 +130,7 @@ def _priced(part: Component, soft: Iterable[Constraint]) -> WeightedComponent:
 
 
 def costs_by_scope(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, CostRows]:
-    """Return the costs of `soft` constraints on variables of `part`, by scope, for the codes in `network`."""
+    """Return the costs of `soft` constraints on variables in `part`, by scope, for the codes in `network`."""
     together = _by_scope(part, soft)
     _join_unary(together)
     return {scope: _prices(part, network, scope, held) for scope, held in together.items()}
@@ -145,9 +145,9 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 
 
 def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
-    """Return `network`, that of `part`, with a cost variable for every scope with costs.
+    """Return `network`, the network of `part`, with a cost variable for every scope with costs.
 
-    Combinations of codes without a price are forbidden.
+    Combinations of codes without a cost are forbidden.
 
     Raises:
         _CostSumError: if the costs are too high.
@@ -182,7 +182,8 @@ def _cost_rows(prices: Mapping[Codes, int]) -> tuple[tuple[Codes, ...], Codes]:
 def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[WeightedComponent]:
     """Return the components of `team`, with all their constraints, if robots may withdraw.
 
-    `withdrawal_cost` is the cost of withdrawing a robot of weight 1. Variables have an additional code without value.
+    `withdrawal_cost` is the cost of withdrawing a robot of weight 1. Variables have an additional code that means no
+    value.
     """
     constraints = list(team.constraints())
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
@@ -255,7 +256,7 @@ def _prices_in_absence(part: Component, network: Network, scope: Codes, charging
 
 
 def _absences(domains: Sequence[Codes], absent: int) -> Iterable[Codes]:
-    """Return all combinations of codes of `domains` in which at least one is replaced by `absent`."""
+    """Return all combinations of codes from `domains` in which at least one code is replaced by `absent`."""
     wider = itertools.product(*((*domain, absent) for domain in domains))
     return (row for row in wider if absent in row)
 
@@ -269,7 +270,7 @@ def _all_or_none(network: Network, first: int, others: Iterable[int], absent: in
 
 
 def _join_unary(together: dict[Codes, list[Constraint]]) -> None:
-    """Add unary costs to the costs of a wider scope with the same variable, if there is one."""
+    """Add unary costs to the costs of a wider scope with the same variable, if there is such a scope."""
     wider = {place: scope for scope in together if len(scope) > 1 for place in scope}
     for scope in [scope for scope in together if len(scope) == 1 and scope[0] in wider]:
         together[wider[scope[0]]] += together.pop(scope)

@@ -1,1 +1,1 @@
-"""Checks of answers, independent of the protocols that have found them."""
+"""Checks of answers, independent of the protocols that found the answers."""

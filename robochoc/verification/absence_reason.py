@@ -1,4 +1,4 @@
-"""Explanations of `no-solution` for teams in which robots are absent or must not withdraw."""
+"""Explains `no-solution` for teams in which robots are absent or must not withdraw."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def absence_reason(team: Team, *, withdrawal: bool = False) -> str:
 
 
 def _can_hold(constraint: Constraint, team: Team) -> bool:
-    """Return whether some values satisfy `constraint` by itself; True if there are too many to try."""
+    """Return whether some values satisfy `constraint` alone; True if there are too many values to try."""
     domains = [team.variables[name].domain for name in constraint.variables]
     if math.prod(map(len, domains)) > MAX_TRIES:
         return True

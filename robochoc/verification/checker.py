@@ -1,4 +1,4 @@
-"""The checker: checks a team's answer against every constraint of every file.
+"""The checker: checks a team's answer against every constraint in every file.
 
 It shares no code with the protocols and the solver: constraints are evaluated in their original form, tuple by tuple
 and term by term.
@@ -34,13 +34,13 @@ MAX_TRIES = 20_000
 
 
 class RefutedError(RobochocError):
-    """The checker or the central solver refutes an answer, because of an error in the protocol or this program."""
+    """The checker or the central solver refutes an answer: there is an error in the protocol or in this program."""
 
 
 def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
     """Yield the reasons why `assignment` is not a solution for the robots of `team` that are not withdrawn.
 
-    Every variable of a flying robot has a value of its domain and every constraint that is in force holds.
+    Every variable of a flying robot must have a value from its domain, and every constraint in force must hold.
     """
     flying = {name: variable for name, variable in team.variables.items() if team.owner[name] not in withdrawn}
     for name, variable in flying.items():
@@ -59,21 +59,21 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
 
 
 def assignment_cost(team: Team, assignment: Assignment) -> float:
-    """Return the cost of `assignment` by all constraints in force, where robots without values are absent."""
+    """Return the cost of `assignment` in all constraints in force; robots without values count as absent."""
     in_force = constraints_in_force(team, robots_without_values(team, assignment))
     return sum(constraint_cost(constraint, assignment) for constraint in in_force)
 
 
 def robots_without_values(team: Team, assignment: Assignment) -> tuple[str, ...]:
-    """Return the robots without values, which withdraw."""
+    """Return the robots without values, which count as withdrawn."""
     return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
 
 def check_user_cost(team: Team, assignment: Assignment, cost: Cost | None, without: Collection[str] = ()) -> None:
-    """Check a cost in the user's units against every constraint of every file in its original form.
+    """Check a cost in the user's units against every constraint in every file in its original form.
 
     Args:
-        team: The team in the form of its files, without normalised costs.
+        team: The team as in its files, without normalised costs.
         assignment: The values of all robots that have not withdrawn.
         cost: The claimed cost; None if there is no assignment.
         without: The robots that have withdrawn.
@@ -133,7 +133,7 @@ def has_local_solution(robot: Robot) -> bool | None:
 def _can_be_placed(
     open_still: Sequence[Variable], assignment: Assignment, own: Sequence[Constraint], tries: list[int]
 ) -> bool:
-    """Return whether values for `open_still` can be added to `assignment` without breaking one of `own`."""
+    """Return whether values for `open_still` can be added to `assignment` without breaking a constraint in `own`."""
     if not open_still:
         return True
     first, *rest = open_still

@@ -11,7 +11,7 @@ from robochoc.model.problem import INFINITE, Constraint, Team, Value
 from robochoc.solver.encoding import cost_function, max_cost
 
 Price = Callable[[Sequence[int]], float]
-"""The cost of a constraint, by the values of its variables."""
+"""The cost of a constraint as a function of the values of its variables."""
 
 
 class Objective:
@@ -20,11 +20,11 @@ class Objective:
     Args:
         team: The team, with normalised costs (`model/costs.py`).
         withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. If None, no
-            robot may withdraw, and the cost is infinite until all have values.
-        in_step: Whether decisions with equal times are simultaneous, so that intermediate states do not count.
+            robot may withdraw, and the cost is infinite until all robots have values.
+        in_step: Whether decisions with equal times are simultaneous, so that the states between them do not count.
 
     Attributes:
-        interfaces: The interface variables of each robot. Runs that reorder the team replace them.
+        interfaces: The interface variables of each robot. Runs that reorder the team replace this mapping.
     """
 
     def __init__(self, team: Team, withdrawal_cost: float | None = None, *, in_step: bool = False) -> None:
@@ -51,7 +51,7 @@ class Objective:
         self._weight = sum(self._weights.values())
 
     def change(self, own: Mapping[str, Mapping[str, int]]) -> None:
-        """Set the values of some robots to `own`."""
+        """Set the values of some robots to the values in `own`."""
         touched: dict[int, None] = {}
         for robot, values in own.items():
             for name in self._variables[robot]:
@@ -70,7 +70,7 @@ class Objective:
                 self._set_cost(number, self._cost_with_absent(number) if self._withdrawal_cost is not None else 0)
 
     def _cost_with_absent(self, number: int) -> float:
-        """Return the cost of a constraint when robots of its scope are absent."""
+        """Return the cost of a constraint when robots in its scope are absent."""
         constraint = self._constraints[number]
         absent = tuple([name for name in constraint.variables if name not in self._values])
         if (number, absent) not in self._restated:
@@ -79,7 +79,7 @@ class Objective:
         return 0 if in_force is None else in_force.price(self._values)
 
     def _set_cost(self, number: int, cost: float) -> None:
-        """Set the cost of a constraint, and update the sum of finite costs and the number of infinite ones."""
+        """Set the cost of a constraint, and update the sum of finite costs and the number of infinite costs."""
         for paid, sign in ((self._costs[number], -1), (cost, 1)):
             if paid == INFINITE:
                 self._broken += sign
@@ -102,7 +102,7 @@ class Objective:
 
     @property
     def cost(self) -> float:
-        """The cost of the present assignment."""
+        """The cost of the current assignment."""
         if self._broken or (self._absent and self._withdrawal_cost is None):
             return INFINITE
         return self._sum + self._weight * (self._withdrawal_cost or 0)

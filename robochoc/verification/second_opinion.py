@@ -19,22 +19,22 @@ def confirmed(
     total: float = INFINITE,
     withdrawal_cost: int | None = None,
 ) -> tuple[str, ...]:
-    """Return the names of the central solvers that agree with a protocol.
+    """Return the names of the central solvers that agree with the result of a protocol.
 
     Args:
         solvers: The central solvers. The first one is required.
-        team: The team in the form of its files.
+        team: The team as in its files.
         protocol: The protocol's name.
         alone: A robot that has no local solution. This is also verified by the checker, because the central solver and
             the compiler of domains share their encoding.
-        total: The claimed minimum cost, including withdrawal costs; infinite for the claim of no solution.
+        total: The claimed minimum cost, including withdrawal costs; infinite if the claim is that there is no solution.
         withdrawal_cost: The withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
 
     Returns:
         The solvers that agree. Solvers that did not finish are omitted.
 
     Raises:
-        RefutedError: when a solver has found a different result.
+        RefutedError: if a solver has found a different result.
     """
     agreeing = []
     for solver in solvers:
@@ -52,7 +52,7 @@ def confirmed(
 def contradiction(opinion: CentralAnswer, total: float) -> str | None:
     """Return the central solver's objection to a claim; None if it agrees, or did not finish.
 
-    `total` is the claimed minimum cost, including withdrawal costs; infinite for the claim of no solution.
+    `total` is the claimed minimum cost, including withdrawal costs; infinite if the claim is that there is no solution.
     """
     if opinion.verdict == Verdict.NO_SOLUTION:
         return None if total == INFINITE else "none"

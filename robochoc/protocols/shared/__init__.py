@@ -1,1 +1,1 @@
-"""Bases of protocols of several families: the pseudo-tree (`dfs.py`) and synchronous cycles (`cycles.py`)."""
+"""Base classes for several families: the pseudo-tree (`dfs.py`) and synchronous cycles (`cycles.py`)."""

@@ -1,25 +1,26 @@
 """The best cycle, found by the robots themselves (anytime local search).
 
-Without it, an outside observer collects the robots' trails and finds the cheapest cycle. With it (`--set anytime=yes`),
-the robots first build a breadth-first tree. Then the costs of each step go up the tree, and the number of the best step
-so far comes down. At the end each robot holds its value of the best step (Zivan, Okamoto, Peled: "Explorative anytime
-local search for distributed constraint optimization", AIJ 212, 2014, Section 3). The search itself does not change:
-cycles, values and random numbers are the same.
+Without this module, an outside observer collects the robots' trails and finds the cheapest cycle. With it (`--set
+anytime=yes`), the robots first build a breadth-first tree. Then the costs of each step are sent up the tree, and the
+number of the best step so far is sent down. At the end each robot has its value in the best step (Zivan, Okamoto,
+Peled: "Explorative anytime local search for distributed constraint optimization", AIJ 212, 2014, Section 3). The search
+itself does not change: cycles, values and random numbers are the same.
 
-- A step is a cycle with all its values. After each step, a robot sends its value to its neighbours of lower priority
-  (`Step`), as the lowest robot of a constraint computes the constraint's cost.
+- A step is a cycle with all its values. After each step, a robot sends its value to its neighbours with lower priority
+  (`Step`), because the lowest robot in a constraint computes the cost of the constraint.
 - A robot adds the cost that it computes to the costs that its children have reported for the step, and reports the sum
   (`Paid`).
-- The root compares, and sends the best step so far (`Best`), once for each step.
-- A robot remembers its values of the best step, and of the steps without a `Best` so far. It waits when these would be
-  more than twice the tree's height plus 2, so its memory is bounded.
+- The root compares the costs of the steps and sends the best step so far (`Best`), once for each step.
+- A robot remembers its values in the best step, and in the steps for which no `Best` has arrived yet. It waits when
+  these would be more than twice the tree's height plus 2, so its memory is bounded.
 
 The paper adds this information to the search's own messages. Here it travels in separate messages, so that it can be
 combined with any protocol: one message for each edge and two for each edge of the tree, in each cycle.
 
-The tree: all robots go through rounds, in which they send their neighbours the best root that they know, and their
-distance to it. A robot is complete when its neighbours have the same root and its children are complete. Once a root is
-complete, it knows the height, which then spreads. So the tree does not depend on delays, and its paths are shortest.
+How the tree is built: all robots go through rounds, in which they send their neighbours the best root that they know
+and their distance to this root. A robot is complete when its neighbours have the same root and its children are
+complete. Once a root is complete, it knows the height of the tree, which it then sends down. So the tree does not
+depend on delays, and its paths are shortest paths.
 """
 
 from __future__ import annotations
@@ -44,9 +45,10 @@ Natural = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class Place(wire.Message, frozen=True):
-    """The sender's place in the breadth-first tree, as far as the sender knows it.
+    """The sender's position in the breadth-first tree, as far as the sender knows it.
 
-    `parent` is None for a root, `below` the height of its subtree once that is complete, `height` that of the tree.
+    `parent` is None for a root. `below` is the height of the sender's subtree once that is complete, `height` the
+    height of the tree.
     """
 
     root: str
@@ -66,7 +68,7 @@ class Place(wire.Message, frozen=True):
 
 
 class Step(wire.Message, frozen=True):
-    """The sender's value in its next step (a cycle): the receiver may have to compute a constraint's cost with it."""
+    """The sender's value in its next step (a cycle): the receiver may need it to compute a constraint's cost."""
 
     value: wire.Value
 
@@ -92,7 +94,7 @@ class Paid(wire.Message, frozen=True):
 
 
 class Best(wire.Message, frozen=True):
-    """The best step so far, `step`, after one more step (None: every step so far broke a hard constraint)."""
+    """The best step so far, `step`, sent after every step (None: every step so far broke a hard constraint)."""
 
     step: Natural | None
 
@@ -106,16 +108,16 @@ class Best(wire.Message, frozen=True):
 
 
 AnytimeMessage = Place | Step | Paid | Best
-"""The messages that every `CycleProtocol` receives besides its own, if it is to find the best cycle."""
+"""The messages that a `CycleProtocol` receives besides its own when the robots find the best cycle."""
 
 
 Sent = list[tuple[str, wire.Message]]
 
 
 class BreadthFirstTree:
-    """One robot's place in the tree: `parent` (None: the root) and `children`, final once `height` is known.
+    """One robot's position in the tree: `parent` (None: the root) and `children`, final once `height` is known.
 
-    `height` is that of the whole tree.
+    `height` is the height of the whole tree.
     """
 
     def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
@@ -133,10 +135,10 @@ class BreadthFirstTree:
         return self._place_messages(None)
 
     def receive(self, sender: str, place: Place) -> Sent:
-        """Process a neighbour's place; return the messages of the next rounds, if there are any.
+        """Process a neighbour's position; return the messages of the next rounds, if there are any.
 
         Raises:
-            ValueError: for a root that is not a robot of the team, or a distance that is too large.
+            ValueError: if the root is not a robot in the team, or the distance is too large.
         """
         if place.root not in self._rank or place.distance >= len(self._rank):
             raise ValueError(f"{sender} sent a place that is in no tree: root {place.root}, distance {place.distance}")
@@ -147,7 +149,7 @@ class BreadthFirstTree:
         return sent
 
     def _round(self, others: dict[str, Place]) -> Sent:
-        """Process one round, with the places of all neighbours."""
+        """Process one round, with the positions of all neighbours."""
         heights = [place.height for place in others.values() if place.height is not None]
         if heights:
             self.height = heights[0]
@@ -160,7 +162,7 @@ class BreadthFirstTree:
         return self._place_messages(below)
 
     def _adopt(self, others: dict[str, Place]) -> None:
-        """Adopt the best root of all, and the neighbour nearest to it as the parent."""
+        """Adopt the best known root, and the neighbour nearest to it as the parent."""
         name, place = min(
             others.items(), key=lambda one: (self._rank[one[1].root], one[1].distance, self._rank[one[0]])
         )
@@ -185,7 +187,7 @@ class BreadthFirstTree:
 class Anytime:
     """One robot's part in finding the best step. `best` is its value in the best step that it knows.
 
-    `news` is the last step for which a `Best` has come, `last` the last step of the search.
+    `news` is the last step for which a `Best` has arrived, `last` the last step of the search.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder, last: int) -> None:
@@ -206,7 +208,7 @@ class Anytime:
         self._best_step: int | None = None
 
     def record(self, step: int, index: int) -> Sent:
-        """Record this robot's value of a step; return the messages with it."""
+        """Record this robot's value in a step; return the messages with this value."""
         self._values[step] = index
         message = Step(self._problem.values[index])
         return [*((name, message) for name in self._below), *self._report()]
@@ -215,7 +217,7 @@ class Anytime:
         """Process a message; return the answers.
 
         Raises:
-            ValueError: for a message that this robot cannot have from `sender`.
+            ValueError: if `sender` cannot have sent this message.
         """
         if isinstance(message, Place):
             return self.tree.receive(sender, message)
@@ -235,11 +237,11 @@ class Anytime:
         return len(self._values)
 
     def is_ahead(self, cycle: int) -> bool:
-        """Return whether a robot in `cycle` has to wait for news, so that it need not remember more values."""
+        """Return whether a robot in `cycle` has to wait for a `Best`, so that it need not remember more values."""
         return self.tree.height is None or cycle - self.news > 2 * self.tree.height + 2
 
     def _report(self) -> Sent:
-        """Compute the costs of all steps for which the values from above and the children's reports have come."""
+        """Compute the costs of all steps for which the values from above and the children's reports have arrived."""
         sent: Sent = []
         while (
             self.tree.height is not None
@@ -262,7 +264,7 @@ class Anytime:
         return self._record_best(self._best_step)
 
     def _record_best(self, step: int | None) -> Sent:
-        """Record that the best step after one more step is `step`; return the messages that pass it to the children."""
+        """Record that the best step is now `step`; return the messages that pass it to the children."""
         self.news += 1
         if step is not None and step != self._best_step:
             if step != self.news:

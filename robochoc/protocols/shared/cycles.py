@@ -1,18 +1,18 @@
-"""The common base of synchronous local search protocols.
+"""The common base class of synchronous local search protocols.
 
 All robots go through cycles, and each cycle has phases. In each phase a robot sends one message to each robot that
-waits for one, then waits for one from each robot that it listens to, and continues when it has all of them. Messages
-need no number, as those of a robot arrive in the order of their phases. A message from a neighbour that is ahead is
-stored until its phase.
+waits for one, then waits for a message from each robot that it listens to, and continues when all these messages have
+arrived. Messages need no number, because the messages from a robot arrive in the order of their phases. A message from
+a neighbour that is ahead is stored until its phase.
 
-If a message is lost, the next one of the same robot shows the gap; if none follows, a robot continues once no
-more messages arrive. In both cases it executes the phase with the messages that it has. From a message that arrives
-after its phase, a robot only stores the new information. So phases stay in step, and the search continues after each
-silence.
+If a message is lost, the next message from the same robot shows the gap; if no further message follows, a robot
+continues once no more messages arrive. In both cases it executes the phase with the messages that it has. If a message
+arrives after its phase, the robot only stores the new information. So phases stay in step, and the search continues
+after each silence.
 
 The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
-(`Trail`); the collected trails give the cheapest cycle. With the setting `anytime` the robots find it themselves
-(`anytime.py`).
+(`Trail`), and the cheapest cycle is computed from the collected trails. With the setting `anytime` the robots find it
+themselves (`anytime.py`).
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class CycleCount(Settings, frozen=True):
 class CycleSettings(CycleCount, frozen=True):
     """`cycles`: the number of cycles after which all robots stop.
 
-    `anytime`: whether the robots themselves find the best cycle, by messages, and end with their values in it.
+    `anytime`: whether the robots find the best cycle themselves, by messages, and end with their values in that cycle.
     """
 
     anytime: Literal["no", "yes"] = "no"
@@ -70,7 +70,7 @@ class Value(wire.Message, frozen=True):
 
 
 class Domain(wire.Message, frozen=True):
-    """The sender's domain, sent first; later messages refer to places in it."""
+    """The sender's domain, sent first; later messages refer to indices in it."""
 
     values: list[wire.Value]
 
@@ -86,11 +86,11 @@ class Domain(wire.Message, frozen=True):
 T = TypeVar("T")
 
 Then = Callable[[Mapping[str, wire.Message]], None]
-"""Called with one message of each robot passed to `listen`, in the order of these robots, without lost ones."""
+"""Called with one message from each robot passed to `listen`, in the order of these robots, without lost messages."""
 
 
 class CycleProtocol(Protocol):
-    """One agent of a synchronous local search. State: `cycle`, and this robot's value in it.
+    """One agent in a synchronous local search. State: `cycle`, and this robot's value in it.
 
     Subclasses choose a first value and send it in `start_cycles`; then they `choose` one value per cycle until the
     search is `finished`. They call `listen` with the robots whose messages they need, and a function that processes
@@ -104,25 +104,25 @@ class CycleProtocol(Protocol):
         self.cycle = -1
         self._trail: list[tuple[int, int]] = []
         self._waiting: dict[str, list[wire.Message | None]] = {name: [] for name in problem.neighbours}
-        """Only a few from each: a robot that is ahead soon waits for this one. None: a lost message."""
+        """Each queue is short: a robot that is ahead soon waits for this one. None: a lost message."""
         self._given_up: dict[str, int] = {}
-        """For each neighbour, the number of its messages that belong to phases executed without them."""
+        """For each neighbour, the number of its messages that belong to phases already executed without them."""
         self._last_values: dict[str, wire.Value] = {}
-        """Neighbours' last values."""
+        """The last values of the neighbours."""
         self._names: tuple[str, ...] = ()
         self._awaited: frozenset[str] = frozenset()
         self._missing = 0
         self._then: Then | None = None
         self._anytime: Anytime | None = None
         self._checked: dict[str, set[wire.Value]] = {name: set() for name in problem.neighbours}
-        """The checked values of each neighbour: most are sent again."""
+        """The checked values of each neighbour: most values are sent repeatedly."""
 
     @abstractmethod
     def start_cycles(self) -> None:
-        """Choose and send a first value. Called for robots that have values and neighbours."""
+        """Choose and send a first value. Called for robots that have at least one value and one neighbour."""
 
     def start(self) -> None:
-        """Start; an empty domain ends the search, a robot without neighbours chooses its cheapest value."""
+        """Start; an empty domain ends the search; a robot without neighbours chooses its cheapest value."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -146,7 +146,7 @@ class CycleProtocol(Protocol):
             self._store(sender, message)
 
     def miss(self, sender: str) -> None:
-        """Store that the message of a phase is lost."""
+        """Record that the message of a phase is lost."""
         if not self._was_given_up(sender):
             self._store(sender, None)
 
@@ -168,16 +168,16 @@ class CycleProtocol(Protocol):
             self._last_values[sender] = message.value
 
     def _was_given_up(self, sender: str, message: wire.Message | None = None) -> bool:
-        """Return whether the sender's next message belongs to a phase that was executed without it; count it off."""
+        """Return whether the next message from `sender` belongs to a phase executed without it; if so, count it off."""
         many = self._given_up.pop(sender, 0)
         if many and message is not None and not self.may_be_late(message):
-            return False  # the awaited messages have never been sent
+            return False  # the awaited messages were never sent
         if many > 1:
             self._given_up[sender] = many - 1
         return many > 0
 
     def may_be_late(self, message: wire.Message) -> bool:  # noqa: ARG002 - for messages that contain their phase
-        """Return whether a message may belong to an earlier phase, after a message of its sender was given up."""
+        """Return whether a message may belong to an earlier phase, after a message from its sender was given up."""
         return True
 
     def _store(self, sender: str, message: wire.Message | None) -> None:
@@ -197,12 +197,12 @@ class CycleProtocol(Protocol):
             then(messages)
 
     def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
-        """Remove and return the next message of each robot that this one listens to; None to continue waiting."""
+        """Remove and return the next message from each robot that this one listens to; None to continue waiting."""
         return [(name, self._waiting[name].pop(0)) for name in self._names]
 
     def listen(self, names: Sequence[str], then: Then) -> None:
-        """Wait for a message of each robot in `names`, then call `then` with the messages that are not lost."""
-        if names is not self._names:  # in most phases they are the same
+        """Wait for a message from each robot in `names`, then call `then` with the messages that were not lost."""
+        if names is not self._names:  # most phases use the same names
             self._names, self._awaited = tuple(names), frozenset(names)
         self._then = then
         self._missing = [self._waiting[name] for name in names].count([])
@@ -214,12 +214,12 @@ class CycleProtocol(Protocol):
         self.checks_at_send += [self.problem.checks] * len(sent)
 
     def exchange_values(self, then: Then) -> None:
-        """Send this robot's value to all neighbours, wait for theirs, then call `then`."""
+        """Send this robot's value to all neighbours, wait for their values, then call `then`."""
         self.multicast(self.problem.neighbours, Value(self.problem.values[self.present]))
         self.listen(self.problem.neighbours, then)
 
     def choose(self, index: int) -> None:
-        """Set this robot's value of the next cycle; it may be the current value."""
+        """Set this robot's value for the next cycle; it may be the current value."""
         self.cycle += 1
         if index != self.value:
             self.value = index
@@ -229,19 +229,19 @@ class CycleProtocol(Protocol):
             self._choose_best()
 
     def finish(self) -> None:
-        """End the search before its last cycle; all connected robots do so in the same one."""
+        """End the search before its last cycle; all connected robots do so in the same cycle."""
         if self._anytime:
             self._anytime.last = self.cycle
             self._choose_best()
         self.cycle = self.settings.cycles
 
     def checked_values(self, messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
-        """Return the values in the messages of a phase in which every robot sends a `Value`.
+        """Return the values in the messages from a phase in which every robot sends a `Value`.
 
         For a lost message, the sender's last known value is used, if there is one.
 
         Raises:
-            ValueError: for a message of another type, or a value that is not in the sender's domain.
+            ValueError: if a message has another type, or a value is not in the sender's domain.
         """
         values: dict[str, wire.Value] = {}
         known = self._checked
@@ -258,10 +258,10 @@ class CycleProtocol(Protocol):
         return values
 
     def checked_domains(self, messages: Mapping[str, wire.Message]) -> dict[str, list[wire.Value]]:
-        """Return the domains in the messages of a phase in which every robot sends a `Domain`.
+        """Return the domains in the messages from a phase in which every robot sends a `Domain`.
 
         Raises:
-            ValueError: for a message of another type, or a value that is not in the sender's domain.
+            ValueError: if a message has another type, or a value is not in the sender's domain.
         """
         domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
         for name in messages:
@@ -272,21 +272,21 @@ class CycleProtocol(Protocol):
         return domains
 
     def check_value(self, name: str, value: wire.Value) -> None:
-        """Raise `ValueError` for a `value` that is not in the domain of the robot called `name`."""
+        """Raise `ValueError` if `value` is not in the domain of the robot called `name`."""
         self.problem.refuse_value(name, value)
         self._checked[name].add(value)
 
     def any_value(self) -> int:
-        """Return a random value of the whole domain, to start the search with."""
+        """Return a random value from the whole domain, as the first value of the search."""
         return self.any_of(range(len(self.problem.values)))
 
     def any_of(self, choices: Sequence[T]) -> T:
-        """Return a random one of `choices`; for a single choice, draw no random number."""
+        """Return a random element of `choices`; if there is only one, draw no random number."""
         return one_of(self.chance, choices)
 
     @property
     def present(self) -> int:
-        """This robot's value, after `start_cycles`."""
+        """This robot's current value; available after `start_cycles`."""
         assert self.value is not None  # noqa: S101 - for mypy: `start_cycles` chooses one
         return self.value
 
@@ -307,7 +307,7 @@ class CycleProtocol(Protocol):
         self._choose_best()
 
     def _choose_best(self) -> None:
-        """Choose this robot's value of the best cycle, once the costs of all cycles are known."""
+        """Choose this robot's value in the best cycle, once the costs of all cycles are known."""
         anytime = self._anytime
         if anytime and anytime.news == anytime.last and anytime.best is not None:
             self.value = anytime.best

@@ -11,9 +11,9 @@ the name is the number of neighbours that do not. So it lists one robot at a tim
 a tree. A robot sends the token to its unvisited neighbour with the most neighbours. Ties go to the robot of higher
 priority.
 
-Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots of an n-ary
-constraint, as they are all neighbours. The cost: 2 messages for each robot for the token, and at least 2 for each edge
-for the election.
+Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots in an n-ary
+constraint, because they are all neighbours. The cost is 2 messages for each robot for the token, and at least 2 for
+each edge for the election.
 """
 
 from abc import abstractmethod
@@ -31,11 +31,11 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class TreeProtocol(Protocol):
-    """One agent that first finds its place in a pseudo-tree, and then runs a protocol on the tree.
+    """One agent that first finds its position in a pseudo-tree, and then runs a protocol on the tree.
 
     `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, when
-    `start_in_tree` is called. Then `handle` is called for each message and `decide` for each packet. Earlier messages
-    are stored until then. Children may start before their parents, never after.
+    `start_in_tree` is called. From then on `handle` is called for each message and `decide` for each batch of messages.
+    Earlier messages are stored until then. Children may start before their parents, but never after them.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -45,14 +45,14 @@ class TreeProtocol(Protocol):
         self.children: tuple[str, ...] = ()
         self.pseudo_children: tuple[str, ...] = ()
         self.placed = False
-        """Whether this robot, and all robots below it, have their places in the tree."""
+        """Whether this robot, and all robots below it, have their positions in the tree."""
         self._election = _Election(problem.agent, problem.neighbours, order)
         self._met: set[str] = set()
         """The neighbours that this robot knows to be in the tree."""
         self._early: list[tuple[str, Message]] = []
 
     def leave_tree(self) -> None:
-        """Forget the place in the tree; `start` builds a new tree, with the present neighbours and order."""
+        """Forget the position in the tree; `start` builds a new tree, with the present neighbours and order."""
         self.parent = None
         self.pseudo_parents = self.children = self.pseudo_children = ()
         self.placed = False
@@ -62,14 +62,14 @@ class TreeProtocol(Protocol):
 
     @abstractmethod
     def start_in_tree(self) -> None:
-        """Start the search; the place in the tree is known."""
+        """Start the search; the position in the tree is known."""
 
     @abstractmethod
     def handle(self, sender: str, message: Message) -> None:
         """Process one message of the search."""
 
     def decide(self) -> None:
-        """Decide; called after all waiting messages were processed."""
+        """Decide; called after all waiting messages have been processed."""
 
     def start(self) -> None:
         """Start this robot's election wave; a robot with an empty domain ends the search."""
@@ -100,7 +100,7 @@ class TreeProtocol(Protocol):
                 self._early.append((sender, message))
 
     def settle(self) -> None:
-        """Call `decide` if the place in the tree is known."""
+        """Call `decide` if the position in the tree is known."""
         if self.placed and self.verdict is None:
             self.decide()
 
@@ -116,7 +116,7 @@ class TreeProtocol(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree."""
+        """This robot's position in the tree."""
         return Findings(place=PseudoTreeNode(self.parent, self.pseudo_parents) if self.placed else None)
 
     def _propagate(self, waves: Sequence[tuple[str, Wave]]) -> None:
@@ -124,7 +124,7 @@ class TreeProtocol(Protocol):
             self.send(receiver, wave)
 
     def _visit(self, parent: str | None, visited: Mapping[str, int]) -> None:
-        """Process the first visit of the token: neighbours that it has visited are above.
+        """Process the first visit of the token: neighbours that the token has already visited are above this robot.
 
         A robot whose only neighbour is its parent needs no list, and no other robot needs to know that it was visited.
         """
@@ -137,7 +137,7 @@ class TreeProtocol(Protocol):
         self._pass_token({**left, self.problem.agent: unaware} if unaware else left)
 
     def _store_visited(self, visited: Mapping[str, int]) -> Mapping[str, int]:
-        """Store which neighbours were `visited`; return those visited robots that some neighbour does not know yet."""
+        """Record which neighbours were `visited`; return the visited robots that some neighbour does not know yet."""
         new = [name for name in self.problem.neighbours if name in visited and name not in self._met]
         if not new:
             return visited
@@ -146,7 +146,7 @@ class TreeProtocol(Protocol):
         return {name: unaware for name, unaware in counts.items() if unaware}
 
     def _pass_token(self, visited: Mapping[str, int]) -> None:
-        """Send the token to an unvisited neighbour, or back if all are in the tree."""
+        """Send the token to an unvisited neighbour, or back to the parent if all neighbours are in the tree."""
         left = [name for name in self.problem.neighbours if name not in self._met]
         if left:
             child = max(left, key=self._election.strength)
@@ -169,9 +169,10 @@ class TreeProtocol(Protocol):
 
 
 class _Election:
-    """One agent's part in the election: the strongest known `candidate`, and the neighbour its wave came from.
+    """One agent's part in the election: the strongest known `candidate`, and the neighbour from which its wave came.
 
-    `_arrived` are the neighbours from which that candidate's wave has arrived; after the last one it is returned.
+    `_arrived` are the neighbours from which that candidate's wave has arrived. After the last of them, the wave is
+    returned.
     """
 
     def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
