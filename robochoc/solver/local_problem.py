@@ -41,8 +41,8 @@ if TYPE_CHECKING:
     from robochoc.solver.exclusions import SharedTask
 
 LexicographicCost = tuple[int, Cost]
-"""The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
-constraint weighs more than any cost, and differences are never `inf - inf`."""
+"""The number of constraints that a value violates, and the cost of all other constraints. Pairs compare as tuples: a
+violated constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 
 class Charged(NamedTuple):
@@ -178,7 +178,7 @@ class LocalProblem:
     def conflicts_of(
         self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1
     ) -> list[tuple[Conflict, list[int]]]:
-        """Return the conflicts of the values at `indices`, each with the values that have it. Checks as in `conflict`."""
+        """Return the conflicts of the values at `indices`, each with its values. Checks as in `conflict`."""
         if self._table is not None:
             found: dict[int, tuple[Conflict, list[int]]] = {}
             for index in indices:
@@ -261,7 +261,7 @@ class LocalProblem:
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
     def cost(self, index: int, view: Mapping[str, Value]) -> Cost:
-        """Return the private cost of `values[index]` plus its cost in `view`, in constraints without unknown variables."""
+        """Return the cost of `values[index]` in `view`: private, plus that of constraints without unknown variables."""
         return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
 
     def costs(self, view: Mapping[str, Value]) -> list[Cost]:

@@ -258,7 +258,7 @@ class Anytime:
         return sent
 
     def _compare(self, cost: Cost) -> Sent:
-        """As the root: compare the `cost` of the latest step with the best; return the resulting messages."""
+        """As the root: compare the `cost` of the latest step with the best cost; return the resulting messages."""
         if cost < self._least:
             self._least, self._best_step = cost, self._priced
         return self._record_best(self._best_step)
