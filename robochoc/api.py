@@ -24,7 +24,9 @@ from robochoc.model.problem import Team
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import counted
+from robochoc.system.posix import IS_POSIX, REQUIREMENT
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending
@@ -204,7 +206,12 @@ class AgentsContainer:
 
         Raises:
             ValueError: if the container has no type, or a robot has no file or no master.
+            UnsupportedError: on Windows.
         """
+        if not IS_POSIX:
+            raise UnsupportedError(
+                f"a run on several machines {REQUIREMENT}: solve the problem with runtime='simulator'"
+            )
         if not self._type:
             raise ValueError("say first what this container is: set_agent_type('MasterABT') or ('AgentABT')")
         if self._type.startswith(_MASTER):

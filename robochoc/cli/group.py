@@ -9,9 +9,10 @@ from pkgutil import resolve_name
 import click
 
 from robochoc import __version__
+from robochoc.system.posix import IS_POSIX, REQUIREMENT
 
 INTERRUPTED = 128 + signal.SIGINT
-UNREAD = 128 + signal.SIGPIPE
+UNREAD = 128 + getattr(signal, "SIGPIPE", 13)
 EXIT_STATUS = """\b
 Exit status:
   0  a verdict was reached (also no-solution)
@@ -54,6 +55,12 @@ The lines are here so that `robochoc --help` imports no command.
 """
 
 
+POSIX_COMMANDS = frozenset(
+    ["app", "authority", "compare", "directory", "experiment", "master", "robot", "serve", "sniff"]
+)
+"""The commands that start or signal other processes, lock files, or use a network."""
+
+
 class Commands(click.Group):
     """The group of commands. Each command is imported when it is used."""
 
@@ -76,7 +83,9 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Resolve the command; for an unknown name, suggest the nearest one."""
+        """Resolve the command; for an unknown name, suggest the nearest one. On Windows, refuse `POSIX_COMMANDS`."""
+        if args[0] in POSIX_COMMANDS and not IS_POSIX:
+            raise click.UsageError(f"robochoc {args[0]} {REQUIREMENT}.", ctx)
         try:
             return super().resolve_command(ctx, args)
         except click.UsageError as error:

@@ -22,6 +22,8 @@ PATIENCE_S = 1.0
 """Seconds in which further signals count as the first (two Ctrl-C, `timeout` and a shell). Later ones force an end."""
 _RETRY_S = 0.01
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
+_HAS_TIMER = hasattr(signal, "setitimer")
+"""Whether a signal can be handled later. On Windows it raises at once, also during an import."""
 
 
 def main() -> NoReturn:
@@ -65,7 +67,8 @@ class TerminationSignals:
 
     def install(self) -> None:
         """Install the handlers. Signals that the caller makes the program ignore (`nohup`, `&`) stay ignored."""
-        signal.signal(signal.SIGALRM, self._retry)
+        if _HAS_TIMER:
+            signal.signal(signal.SIGALRM, self._retry)
         sys.unraisablehook = self._raise_again
         for signum in _STOPPING:
             if signal.getsignal(signum) is not signal.SIG_IGN:
@@ -73,8 +76,11 @@ class TerminationSignals:
 
     def ignore(self) -> None:
         """Ignore further signals: the work is done."""
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        for signum in (*_STOPPING, signal.SIGALRM):
+        ignored: tuple[signal.Signals, ...] = _STOPPING
+        if _HAS_TIMER:
+            signal.setitimer(signal.ITIMER_REAL, 0)
+            ignored += (signal.SIGALRM,)
+        for signum in ignored:
             signal.signal(signum, signal.SIG_IGN)
 
     def _handle(self, signum: int, frame: FrameType | None) -> None:
@@ -84,7 +90,7 @@ class TerminationSignals:
                 signal.raise_signal(signum)
             return
         self._signum = signum
-        if _importing(frame):
+        if _HAS_TIMER and _importing(frame):
             signal.setitimer(signal.ITIMER_REAL, _RETRY_S)
             return
         self._since = time.monotonic()
@@ -97,7 +103,7 @@ class TerminationSignals:
 
     def _raise_again(self, unraisable: sys.UnraisableHookArgs) -> None:
         """Raise the exception again, soon, if Python dropped it because it occurred in a finaliser or a callback."""
-        if self._since is not None and isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
+        if _HAS_TIMER and self._since is not None and isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
             self._since = None
             signal.setitimer(signal.ITIMER_REAL, _RETRY_S)
         else:

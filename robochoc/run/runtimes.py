@@ -22,6 +22,7 @@ from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.posix import IS_POSIX, REQUIREMENT
 
 if TYPE_CHECKING:
     from robochoc.communication.simulator.losses import Losses
@@ -80,8 +81,10 @@ OPENERS = MappingProxyType(
 
 
 def open_session(request: SessionRequest) -> Session:
-    """Open a session in the runtime that the options name. Raises `UnsupportedError` if it is not installed."""
+    """Open a session in the runtime that the options name. Raises `UnsupportedError` if it is not available."""
     name = request.options.runtime
+    if name in {Runtime.PROCESSES, Runtime.NETWORK} and not IS_POSIX:
+        raise UnsupportedError(f"--runtime {name} {REQUIREMENT}: use --runtime simulator")
     try:
         opener: OpenSession = resolve_name(OPENERS[name])
     except ModuleNotFoundError as absent:

@@ -21,6 +21,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -51,7 +52,9 @@ from robochoc.solver.enumeration import (
 )
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.solver.linear import Formula, Junction, Operand, conjuncts, renamed
+from robochoc.solver.process_socket import start_by_port
 from robochoc.solver.propagation import propagate
+from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import signals_delayed
 from robochoc.system.temporary_files import PrivateFolder
 from robochoc.system.time_limit import TimeLimitError, computed_by
@@ -308,6 +311,8 @@ class AceProcess:
         if self._process is not None:
             self._process.kill()
             self._process.wait()
+            if self._process.stdin is not None:
+                self._process.stdin.close()
             self._process = None
         if self._socket is not None:
             self._socket.close()
@@ -347,15 +352,16 @@ class AceProcess:
     @signals_delayed()
     def _start(self) -> None:
         self._folder = PrivateFolder()
+        if not IS_POSIX:
+            self._process, self._socket = self._started_by_port(self._folder.path)
+            return
         ours, theirs = socket.socketpair()
         # The solver reads from this pipe, whose other end only this process has, so the solver ends with this process.
         watched, self._lifeline = os.pipe()
         try:
             with (self._folder.path / "stderr").open("wb") as stderr:
                 self._process = subprocess.Popen(  # noqa: S603 - our own module
-                    [sys.executable, "-P", "-m", "robochoc.solver.ace_process"]
-                    + [str(theirs.fileno()), str(watched), str(self._folder.path)]
-                    + ["--warm"] * self._java,
+                    self._command(str(theirs.fileno()), watched, self._folder.path),
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
                     stderr=stderr,
@@ -369,6 +375,26 @@ class AceProcess:
             theirs.close()
             os.close(watched)
         self._socket = ours
+
+    def _started_by_port(self, folder: Path) -> tuple[subprocess.Popen[bytes], socket.socket]:
+        """Start the process where descriptors cannot be passed. It ends with this process by its standard input."""
+
+        def start(address: str) -> subprocess.Popen[bytes]:
+            with (folder / "stderr").open("wb") as stderr:
+                return subprocess.Popen(  # noqa: S603 - our own module
+                    self._command(address, 0, folder), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=stderr
+                )
+
+        try:
+            return start_by_port(start)
+        except OSError as error:
+            self.close()
+            raise SolverLostError(f"the constraint solver's process was lost ({error})") from None
+
+    def _command(self, address: str, watched: int, folder: Path) -> list[str]:
+        """Return the command of the process. It ends when the descriptor `watched` has no writer any more."""
+        program = [sys.executable, "-P", "-m", "robochoc.solver.ace_process"]
+        return [*program, address, str(watched), str(folder), *["--warm"] * self._java]
 
     def _send_task(self, task: ToAce, deadline: float | None = None) -> None:
         if self._searching:  # for a task that was abandoned

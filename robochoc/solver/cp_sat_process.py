@@ -12,7 +12,6 @@ import math
 import os
 import queue
 import signal
-import socket
 import sys
 import threading
 import time
@@ -31,6 +30,8 @@ from robochoc.solver.cp_sat_messages import (
     CpSatTask,
     FromCpSat,
 )
+from robochoc.solver.process_socket import connect_to_parent
+from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import leave_ctrl_c_to_the_parent, signal_when_orphaned
 
 WORKERS = 1
@@ -39,9 +40,10 @@ WORKERS = 1
 
 def main() -> None:
     """Serve the parent's tasks until it hangs up."""
-    signal_when_orphaned(signal.SIGKILL)
+    if IS_POSIX:
+        signal_when_orphaned(signal.SIGKILL)
     leave_ctrl_c_to_the_parent()
-    stream = socket.socket(fileno=int(sys.argv[1])).makefile("rwb")
+    stream = connect_to_parent(sys.argv[1]).makefile("rwb")
     tasks: queue.SimpleQueue[CpSatTask] = queue.SimpleQueue()
     threading.Thread(target=_receive_tasks, args=(stream, tasks), daemon=True).start()
     while True:

@@ -12,12 +12,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from robochoc.system.posix import IS_POSIX
 from robochoc.system.streams import BackgroundWriter
 
 MAX_AHEAD = 64 << 20
 """The number of bytes that may be buffered for the reader of a pipe."""
 READER_PATIENCE_S = 5.0
 """Closing a pipe waits for its reader until the reader has read nothing for this time, in seconds."""
+_BINARY: int = getattr(os, "O_BINARY", 0)
+"""The flag without which Windows writes line feeds as two bytes."""
 _HIDDEN = (".part", ".new", ".old")
 """The endings of hidden files and folders that are being written."""
 _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
@@ -68,7 +71,7 @@ class PendingFile:
             descriptor = _unnamed(self._target, mode)
             if descriptor is None:
                 self._named = _beside(self._target)
-                descriptor = os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR, mode)
+                descriptor = os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR | _BINARY, mode)
         self.stream = os.fdopen(descriptor, "w+b")
 
     def keep(self) -> None:
@@ -78,6 +81,8 @@ class PendingFile:
                 self.stream.flush()
                 if self._named is None:
                     self._named = _linked(self.stream.fileno(), self._target) or self._copied()
+                if not IS_POSIX:
+                    self.stream.close()  # open files cannot be renamed
                 self._named.replace(self._target)
         except BaseException:
             self.discard()
@@ -99,7 +104,7 @@ class PendingFile:
 
         self._named = _beside(self._target)
         mode = os.fstat(self.stream.fileno()).st_mode & 0o777
-        copy = os.fdopen(os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR, mode), "w+b")
+        copy = os.fdopen(os.open(self._named, os.O_CREAT | os.O_EXCL | os.O_RDWR | _BINARY, mode), "w+b")
         self.stream.seek(0)
         with self.stream as original:
             self.stream = copy
@@ -163,12 +168,16 @@ class AppendableFile:
         try:
             self._descriptor = os.dup(file.stream.fileno())
             self._append_first(beginning)
+            if not IS_POSIX:
+                os.close(self._descriptor)  # open files cannot be renamed
         except BaseException:
             file.discard()
             raise
         copied = file.stream
         file.keep()
-        if file.stream is not copied:  # a copy has replaced it
+        if not IS_POSIX:
+            self._descriptor = os.open(resolved(path), os.O_WRONLY | _BINARY)
+        elif file.stream is not copied:  # a copy has replaced it
             os.close(self._descriptor)
             self._descriptor = os.open(resolved(path), os.O_WRONLY)
 
@@ -184,7 +193,7 @@ class AppendableFile:
         done = 0
         try:
             while done < len(content):
-                done += os.pwrite(self._descriptor, memoryview(content)[done:], self._size + done)
+                done += _write_at(self._descriptor, memoryview(content)[done:], self._size + done)
         except OSError:
             with suppress(OSError):
                 os.ftruncate(self._descriptor, self._size)
@@ -223,6 +232,14 @@ class AppendableFile:
             raise OSError(errno.ENOBUFS, f"its reader is more than {MAX_AHEAD >> 20} MiB behind")
 
 
+def _write_at(descriptor: int, content: memoryview, place: int) -> int:
+    """Write at a place of a file, and return the number of bytes written."""
+    if IS_POSIX:
+        return os.pwrite(descriptor, content, place)
+    os.lseek(descriptor, place, os.SEEK_SET)
+    return os.write(descriptor, content)
+
+
 def resolved(path: Path) -> Path:
     """Return the absolute `path` without symbolic links. The file need not exist.
 
@@ -247,7 +264,7 @@ def _is_stream(path: Path) -> bool:
 def _open_stream(path: Path) -> int:
     """Return a descriptor for writing to the stream at `path`."""
     stream = _standard_stream(path)
-    return os.open(path, os.O_WRONLY) if stream is None else os.dup(stream)
+    return os.open(path, os.O_WRONLY | _BINARY) if stream is None else os.dup(stream)
 
 
 def _standard_stream(path: Path) -> int | None:

@@ -12,6 +12,8 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from robochoc.system.posix import IS_POSIX
+
 _STOPPING = {signal.SIGINT, signal.SIGTERM}
 _PR_SET_PDEATHSIG = 1
 _delayed_threads: set[int] = set()
@@ -23,8 +25,11 @@ def signals_delayed() -> Iterator[None]:
     """Delay Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) in the block: unfinished work would be lost.
 
     A process that is started in the block inherits the delay until it calls `leave_ctrl_c_to_the_parent`: a signal
-    would interrupt the start of Python with an unrelated error.
+    would interrupt the start of Python with an unrelated error. Windows cannot delay signals.
     """
+    if not IS_POSIX:
+        yield
+        return
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
     thread = threading.get_ident()
     is_outermost = thread not in _delayed_threads
@@ -52,7 +57,8 @@ def leave_ctrl_c_to_the_parent() -> None:
     """
     _signal.signal(_signal.SIGINT, _signal.SIG_IGN)
     _signal.signal(_signal.SIGTERM, _signal.SIG_DFL)
-    _signal.pthread_sigmask(_signal.SIG_UNBLOCK, (_signal.SIGINT, _signal.SIGTERM))
+    if IS_POSIX:
+        _signal.pthread_sigmask(_signal.SIG_UNBLOCK, (_signal.SIGINT, _signal.SIGTERM))
 
 
 def signal_when_orphaned(signum: signal.Signals) -> None:

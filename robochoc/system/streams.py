@@ -16,6 +16,8 @@ import threading
 from collections import deque
 from contextlib import suppress
 
+from robochoc.system.posix import IS_POSIX
+
 TYPE_CHECKING = False  # see robochoc/__init__.py
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -144,6 +146,8 @@ def _not_blocking(target: int) -> int | None:
     try:
         if stat.S_ISREG(os.fstat(target).st_mode):  # opened again, it would be written from its beginning
             return os.dup(target)
+        if not IS_POSIX:
+            return None
         return os.open(f"/proc/self/fd/{target}", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY | os.O_CLOEXEC)
     except OSError:  # a socket, another user's terminal, another system
         return None
@@ -201,7 +205,9 @@ _REPLACED: list[object] = []
 
 
 def prepare_standard_streams() -> None:
-    """Make errors of `sys.stdout` name it, and writes to `sys.stderr` independent of its reader."""
+    """Make errors of `sys.stdout` name it, and writes to `sys.stderr` independent of its reader. Not on Windows."""
+    if not IS_POSIX:  # consoles have streams of their own
+        return
     _REPLACED.extend((sys.stdout, sys.stderr))
     with suppress(OSError, ValueError):
         old = sys.stdout

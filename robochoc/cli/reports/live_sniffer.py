@@ -9,6 +9,8 @@ from typing import IO, TYPE_CHECKING, Self
 
 import click
 
+from robochoc.system.posix import IS_POSIX, REQUIREMENT
+
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
     from robochoc.sniffer.viewer import Viewer
@@ -26,11 +28,15 @@ class SnifferRequest:
 
 
 def sniffer_request(chosen: str | None, *, open_browser: bool) -> SnifferRequest | None:
-    """Return the values of --sniff and --open. Raises `click.UsageError` for --open without --sniff."""
+    """Return the values of --sniff and --open. Raises `click.UsageError` for --open without --sniff, and on Windows."""
     if chosen is None:
         if open_browser:
             raise click.UsageError("--open requires --sniff")
         return None
+    if not IS_POSIX:
+        raise click.UsageError(
+            f"--sniff {REQUIREMENT}; --journal FILE saves the messages, and 'robochoc replay' reads them"
+        )
     from robochoc.sniffer.patterns import patterns_in
 
     return SnifferRequest(patterns_in(chosen), open_browser)

@@ -1,0 +1,9 @@
+"""The difference between POSIX systems (Linux, macOS) and Windows, as far as robochoc depends on it."""
+
+from __future__ import annotations
+
+import os
+
+IS_POSIX = hasattr(os, "fork")
+"""Whether processes can be forked, signals blocked, open files renamed, and descriptors passed to other programs."""
+REQUIREMENT = "requires a POSIX system such as Linux or macOS"
