@@ -3,8 +3,8 @@
     >>> import robochoc.experiments
     >>> rows = robochoc.experiments.read("study.sqlite")  # doctest: +SKIP
 
-`study.py` reads the file of a study (its tables: `study_file.py`, `study_problems.py`, `study_runs.py`), `plan.py`
-lists its runs, `runner.py` runs them, `store.py` stores the results, and `report.py` writes a report.
+`study.py` reads a study's file (its tables: `study_file.py`, `study_problems.py`, `study_runs.py`), `plan.py` lists the
+runs, `runner.py` executes them, `store.py` stores the results, and `report.py` writes a report.
 """
 
 from __future__ import annotations

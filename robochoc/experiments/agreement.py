@@ -1,4 +1,4 @@
-"""The comparison of all answers to one problem: contradictory proofs are a fault of the program."""
+"""Compares all answers to one problem: contradictory proofs are a fault of the program."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ _Question = tuple[str, str | None]
 
 
 class DisagreementError(RobochocError):
-    """Two runs contradict each other, or the checker refutes one. The text contains the commands to repeat them."""
+    """Two answers contradict each other, or the checker found one wrong. The text has the commands to repeat them."""
 
 
 class Agreement:
-    """The answers so far, by problem and withdrawal rule."""
+    """The answers found so far, by problem and withdrawal rule."""
 
     def __init__(self) -> None:
         self._answers: dict[_Question, list[tuple[Task, Row]]] = {}
 
     def add(self, task: Task, row: Row) -> None:
-        """Compare the answer of a run with the others to its problem.
+        """Compare the answer of a run with the other answers to its problem.
 
         Raises:
-            DisagreementError: if they contradict each other, or the checker has refuted it.
+            DisagreementError: if the answers contradict each other, or the checker found this answer wrong.
         """
         if row.status == Status.REFUTED:
             raise DisagreementError(
@@ -50,7 +50,7 @@ class Agreement:
 
 
 def contradiction(one: Row, other: Row) -> str:
-    """Return why two answers to the same problem contradict each other; empty if they do not."""
+    """Return why two answers to the same problem contradict each other, or an empty text if they agree."""
     verdicts = {one.verdict, other.verdict}
     if Verdict.NO_SOLUTION in verdicts and len(verdicts) > 1:
         return f"{one.verdict} and {other.verdict}"
@@ -73,7 +73,7 @@ def repeat_commands(task: Task) -> str:
     problem, setup = task.problem, task.setup
     made = [_generated(problem.family, problem.parameters)] if problem.family else []
     folder = problem.path or _OWN
-    if problem.scenario:  # into another folder, as the team's files are the user's
+    if problem.scenario:  # written into another folder, so that the user's files do not change
         scenario = _options(["robochoc", "generate", "scenario", folder], problem.scenario)
         made.append(f"{scenario} --force" if problem.family else scenario)
         folder = _OWN
@@ -98,7 +98,7 @@ def _channel(name: str) -> str:
 
 
 def _limits(task: Task) -> dict[str, float]:
-    """Return the limits of a run, and the cost that means infinity in a foreign file."""
+    """Return the limits of a run, and the cost that means infinity in a file of another tool."""
     limits, given = task.limits, task.problem.parameters if task.problem.path else {}
     found = {name: getattr(limits, name) for name in ("timeout", "messages", "ncccs", "cycles")}
     found["infinity"] = given.get("infinity")

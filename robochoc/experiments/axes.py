@@ -1,7 +1,7 @@
 """Styles of lines, scales, ticks and legends of figures. This file, `plots.py` and `figures.py` need matplotlib.
 
-Lines differ in colour, dashes and markers: the colours are those of Okabe and Ito, "Color Universal Design", 2008,
-which colour-blind readers can distinguish, and dashes and markers remain distinct in grey.
+Lines differ in colour, dashes and markers. The colours are from Okabe and Ito, "Color Universal Design", 2008, and
+distinguishable for colour-blind readers; dashes and markers remain distinct in grey.
 """
 
 from __future__ import annotations
@@ -21,20 +21,20 @@ _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 _DASHES = ("-", "--", "-.", ":")
 MOST_WAYS = len(_MARKERS) * len(_DASHES)
-"""The most ways to run in a figure: they differ in colour and marker, in colour and dashes, and also in grey."""
+"""The most ways to run in a figure. Any two differ in at least two of colour, dashes and marker, so also in grey."""
 _WIDE_RANGE = 30
-"""The ratio of the largest to the smallest value from which an axis is logarithmic."""
+"""The ratio of the largest to the smallest value above which an axis becomes logarithmic."""
 _BLOT = 0.05
-"""The share of the axis below which two marks are too close."""
+"""The distance, as a share of the axis, below which two marks are too close."""
 _EVEN = 1.01
 """Steps are even if the largest is less than this multiple of the smallest."""
 _LETTER, _LINE, _HANDLE = 0.6 / 72, 1.5 / 72, 4.2 / 72
-"""Inches for a point of the font's size: the width of a letter, the height of a line, and a legend's sample."""
+"""Sizes in inches per point of font size: a letter's width, a line's height, and the width of a legend's sample."""
 _LONGEST_TICK, _LONGEST_LABEL, _TURNED = 18, 40, 35
 _FEW_DECADES = 2
-"""Logarithmic axes of fewer powers of ten have ticks at 1, 2 and 5."""
+"""Logarithmic axes that cover fewer powers of ten have ticks at 1, 2 and 5."""
 _LOWEST_PLAIN, _HIGHEST_PLAIN, _HIGHEST_LINEAR = 1e-2, 1e6, 1e7
-"""Numbers between the first two are number_text out on a logarithmic axis, and below the third on a linear one."""
+"""A logarithmic axis shows numbers between the first two limits in full, a linear axis numbers below the third."""
 
 
 class Style(NamedTuple):
@@ -46,7 +46,7 @@ class Style(NamedTuple):
 
 
 def styles_of(ways: Sequence[str]) -> dict[str, Style]:
-    """Return a style for each way to run, up to `MOST_WAYS`: any two differ in at least two of three parts."""
+    """Return a style for each of up to `MOST_WAYS` ways to run. Any two differ in at least two of three parts."""
     styles = {}
     for place, way in enumerate(ways[:MOST_WAYS]):
         turn = place // len(_COLOURS)
@@ -56,7 +56,7 @@ def styles_of(ways: Sequence[str]) -> dict[str, Style]:
 
 
 def spread(axes: Axes, which: str, values: Sequence[float]) -> None:
-    """Make an axis, x or y, logarithmic if values differ much; with zeros, linear near the smallest value."""
+    """Make an axis (`which`: x or y) logarithmic if its values differ much; if they include 0, linear near 0."""
     positive = [value for value in values if value > 0]
     if not positive or min(values) < 0 or max(positive) < _WIDE_RANGE * min(positive):
         return
@@ -65,19 +65,19 @@ def spread(axes: Axes, which: str, values: Sequence[float]) -> None:
 
 def _logarithmic(axes: Axes, which: str, smallest: float, *, zero: bool) -> None:
     setter: Callable[..., Any] = axes.set_xscale if which == "x" else axes.set_yscale
-    if zero:  # the range below the smallest value is as wide as a power of ten
+    if zero:  # the linear range below the smallest value is about as wide as a power of ten
         setter("symlog", linthresh=smallest, linscale=0.9)
     else:
         setter("log")
 
 
 def numbers(values: Sequence[Any]) -> bool:
-    """Return whether all values of a parameter are numbers; otherwise they are categories without distances."""
+    """Return whether all values of a parameter are numbers. Otherwise they are categories."""
     return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
 
 
 def tick_numbers(axes: Axes, values: Sequence[float]) -> None:
-    """Place ticks at values of the x-axis, in ascending order, as many as fit.
+    """Set as many ticks as fit at the given values of the x-axis, which are in ascending order.
 
     The axis becomes logarithmic if the nearest two values are too close on a linear axis, and further apart on a
     logarithmic one.
@@ -96,7 +96,7 @@ def tick_numbers(axes: Axes, values: Sequence[float]) -> None:
 
 
 def _shares(places: Sequence[float]) -> list[float]:
-    """Return the positions of places on the axis, from 0 to 1."""
+    """Return the positions of values on the axis, from 0 to 1."""
     low, width = places[0], places[-1] - places[0] or 1.0
     return [(place - low) / width for place in places]
 
@@ -106,7 +106,7 @@ def _nearest(places: Sequence[float]) -> float:
 
 
 def _fitting_ticks(at: Sequence[float], texts: Sequence[str], width: float) -> list[int]:
-    """Return the ticks whose texts do not overlap: every n-th one, if values are in even steps."""
+    """Return the indices of ticks whose texts do not overlap: of evenly spaced ticks, every n-th."""
     letter: float = _LETTER * mpl.rcParams["font.size"] / (0.8 * width)
 
     def apart(one: int, other: int) -> bool:
@@ -124,7 +124,7 @@ def _fitting_ticks(at: Sequence[float], texts: Sequence[str], width: float) -> l
 
 
 def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
-    """Write names below the x-axis, shortened, and rotated if they would overlap; then the figure grows."""
+    """Write names below the x-axis, shortened, and rotated (in a higher figure) if they would overlap."""
     start, texts = _short(names)
     axes.set_xlabel(literal(f"{what} ({start}…)" if start and what else what or start))
     marks = [literal(text) for text in texts]
@@ -140,7 +140,7 @@ def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
 
 
 def _short(names: Sequence[str]) -> tuple[str, list[str]]:
-    """Return the common start of all names, if it is left out, and the short names."""
+    """Return the common beginning of all names that is left out, and the shortened names."""
     start = ""
     if len(names) > 1 and max(map(len, names)) > _LONGEST_TICK // 2:
         letters = itertools.takewhile(lambda column: len(set(column)) == 1, zip(*names, strict=False))
@@ -152,7 +152,7 @@ def _short(names: Sequence[str]) -> tuple[str, list[str]]:
 
 
 def _cut(name: str, longest: int) -> str:
-    """Return a too long name without its middle, as names often differ at their ends."""
+    """Return a name that is too long without its middle, since names often differ at their ends."""
     half = longest // 2
     return name if len(name) <= longest else f"{name[:half]}…{name[1 - half :]}"
 
@@ -163,7 +163,7 @@ def number_text(value: float, _place: object = None) -> str:
 
 
 def plain_ticks(axes: Axes) -> None:
-    """Write plain numbers: 1, 2, 5, 10 and not 2 x 10^0, and 10,000 for 10000."""
+    """Write plain numbers on both axes: 1, 2, 5, 10 instead of 2 x 10^0, and 10,000 instead of 10000."""
     for axis in (axes.xaxis, axes.yaxis):
         if isinstance(axis.get_major_locator(), FixedLocator):
             continue
@@ -191,7 +191,7 @@ def _figure(axes: Axes) -> Figure:
 
 
 def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> None:
-    """Draw the legend above the axes; the figure grows by its height."""
+    """Draw the legend above the axes, and enlarge the figure by the legend's height."""
     figure = _figure(axes)
     handles = [
         mpl.lines.Line2D(
@@ -208,7 +208,7 @@ def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> No
 
 
 def literal(text: str) -> str:
-    """Escape `text` for matplotlib, which reads formulas between dollars."""
+    """Escape `text` for matplotlib, which interprets text between dollar signs as formulas."""
     return text.replace("$", r"\$")
 
 

@@ -1,8 +1,8 @@
-"""The workers of a cluster, by Dask (https://distributed.dask.org): the extra `cluster`.
+"""Workers on a Dask cluster (https://distributed.dask.org). Extra: `cluster`.
 
-Each run is one task of the cluster. Tasks and rows are sent as JSON, together with the files of teams: workers need
-robochoc, but no shared folder. Tasks of a lost worker are repeated by others. Dask itself unpickles received data, so
-only users who may run programs there should be able to reach the scheduler.
+Each run is one task for the cluster. Tasks and rows are sent as JSON, together with the files of teams, so workers need
+robochoc but no shared folder. If a worker is lost, other workers repeat its tasks. Dask itself unpickles received data,
+so only users who may run programs on the cluster should be able to reach the scheduler.
 """
 
 from __future__ import annotations
@@ -23,20 +23,20 @@ from robochoc.experiments.task import Row, Status, Task
 from robochoc.system.errors import RobochocError
 
 AT_ONCE = 1000
-"""The most tasks that the scheduler has at a time."""
+"""The maximum number of tasks at the scheduler."""
 
 
 class SchedulerLostError(RobochocError):
-    """The scheduler cannot be reached, or its connection was lost."""
+    """The scheduler cannot be reached, or the connection to it was lost."""
 
 
 class ClusterWorkers:
-    """The workers of a Dask cluster.
+    """The workers on a Dask cluster.
 
     Args:
-        address: The scheduler's address, such as `tcp://10.0.0.1:8786`. None: it is in `file`.
+        address: The scheduler's address, such as `tcp://10.0.0.1:8786`. None: the address is in `file`.
         file: The scheduler's JSON file, as `dask scheduler --scheduler-file` and dask-jobqueue write it.
-        memory_mb: Not used: Dask's workers have their own limits on memory.
+        memory_mb: Ignored: Dask's workers have their own memory limits.
         notice: Called once with a text if there are no workers yet.
     """
 
@@ -52,7 +52,7 @@ class ClusterWorkers:
         self._client: Client | None = None
 
     def __enter__(self) -> Self:
-        """Connect with the scheduler. Raises `SchedulerLostError` if it cannot be reached."""
+        """Connect to the scheduler. Raises `SchedulerLostError` if it cannot be reached."""
         try:
             address = _address_in(self._file) if self._file else self._address
             resolve_address(address)  # Dask reports an invalid address late, and in several lines
@@ -67,12 +67,12 @@ class ClusterWorkers:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Disconnect, and drop waiting tasks."""
+        """Disconnect from the scheduler, and discard waiting tasks."""
         if self._client is not None:
             self._client.close()
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
-        """Yield the rows of all tasks, as soon as they are finished."""
+        """Yield the row of each task as soon as the task is finished."""
         client = self._client
         assert client is not None  # noqa: S101 - it is used as a context
         tasks = itertools.chain.from_iterable(bundles)
@@ -91,13 +91,13 @@ class ClusterWorkers:
 
 
 class _SchedulerFile(msgspec.Struct):
-    """The part of a Dask scheduler's JSON file that is read."""
+    """The relevant part of a Dask scheduler's JSON file."""
 
     address: str
 
 
 def _address_in(file: Path) -> str:
-    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError` if it has none."""
+    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError` if the file contains no address."""
     try:
         return msgspec.json.decode(file.read_bytes(), type=_SchedulerFile).address
     except msgspec.MsgspecError as wrong:

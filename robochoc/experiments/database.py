@@ -1,4 +1,4 @@
-"""The SQLite file of a study's results: its tables, and opening it."""
+"""The SQLite database with a study's results: creates and opens it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robochoc.experiments.task import CostPoint, RobotLoad, Status
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 
 APPLICATION_ID = 0x726F626F
-"""The `PRAGMA application_id` of SQLite files with results; in ASCII it is `robo`."""
+"""The `PRAGMA application_id` of SQLite files with results: `robo` in ASCII."""
 VERSION = 4
 COLUMNS: Mapping[str, str] = {
     "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
@@ -26,7 +26,7 @@ COLUMNS: Mapping[str, str] = {
     "cpu_s": "REAL", "memory": "INTEGER", "cost_over_time": "TEXT", "loads": "TEXT", "machine": "TEXT",
     "version": "TEXT", "removed": "INTEGER", "removing_messages": "INTEGER", "removing_ncccs": "INTEGER",
 }  # fmt: skip
-"""The columns of a row, and their types."""
+"""The columns of a row, and their SQL types."""
 NUMBERS = [name for name, kind in COLUMNS.items() if kind != "TEXT"]
 JSON: Mapping[str, Any] = {
     "messages_by_type": dict[str, int], "cost_over_time": list[CostPoint], "loads": list[RobotLoad],
@@ -47,9 +47,9 @@ CREATE VIEW IF NOT EXISTS results AS
 """  # noqa: S608 - our own names
 
 TRIED_AGAIN = (Status.CRASHED, Status.LOST, Status.INVALID, Status.ERROR)
-"""The statuses of runs that are repeated when the study is run again, as their cause may be repaired."""
+"""The statuses of runs that are repeated when the study is run again, since their cause may be gone."""
 STRANGE = (sqlite3.Error, msgspec.MsgspecError, TypeError, ValueError, KeyError, OverflowError, ArithmeticError)
-"""The errors of reading a file into which another program has written."""
+"""The errors from reading a file that another program has modified."""
 
 
 def open_database(path: Path, *, writing: bool = True) -> sqlite3.Connection:
@@ -57,11 +57,11 @@ def open_database(path: Path, *, writing: bool = True) -> sqlite3.Connection:
     if not writing and not path.is_file():
         raise invalid(path, "is not a file")
     try:
-        # A reader with write access cleans up: SQLite keeps two more files while a file is read.
+        # With write access, SQLite removes the two additional files that it needs while a file is read.
         mode = "rwc" if writing else "rw" if os.access(path, os.W_OK) else "ro"
         address = f"{path.absolute().as_uri()}?mode={mode}"
         database = sqlite3.connect(address, uri=True, timeout=60)
-        if mode == "ro" and not _is_readable(database):  # SQLite cannot create its files in the folder
+        if mode == "ro" and not _is_readable(database):  # SQLite cannot create its additional files in the folder
             database.close()
             database = sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)
         try:
@@ -83,7 +83,7 @@ def _is_readable(database: sqlite3.Connection) -> bool:
 
 
 def _check(database: sqlite3.Connection, path: Path, *, writing: bool) -> None:
-    """Create the tables of a new file, and refuse a foreign file."""
+    """Create the tables in a new file, and reject a file of another program."""
     (application,) = database.execute("PRAGMA application_id").fetchone()
     (tables,) = database.execute("SELECT count(*) FROM sqlite_master").fetchone()
     (version,) = database.execute("PRAGMA user_version").fetchone()
@@ -101,7 +101,7 @@ def _check(database: sqlite3.Connection, path: Path, *, writing: bool) -> None:
 
 
 def make_tables(database: sqlite3.Connection) -> None:
-    """Create all tables, or none if the process is killed meanwhile."""
+    """Create all tables, or none if the process is killed in between."""
     with database:
         database.execute("BEGIN IMMEDIATE")
         for statement in filter(str.strip, _TABLES.split(";\n")):

@@ -1,4 +1,4 @@
-"""Digests of problems: problems with the same content are the same, whatever their names and places."""
+"""Digests of problems: problems with the same content are the same problem, whatever their names and paths."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _BYTES = 16
 
 
 def digest_of_team(team: Team) -> str:
-    """Return the digest of the content of the robots' files, whether the team was read or generated."""
+    """Return the digest of the content of the robots' files, which is the same for a read and a generated team."""
     return _digest(team_files(team).items())
 
 
 def digest_of_files(path: Path) -> str:
-    """Return the digest of the names and contents of a team's files, or of one file. Raises `OSError`."""
+    """Return the digest of the names and contents of a team's files, or of a single file. Raises `OSError`."""
     files = sorted(path.iterdir()) if path.is_dir() else [path]
     return _digest((file.name, file.read_bytes()) for file in files if file.is_file())
 

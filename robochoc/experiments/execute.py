@@ -1,4 +1,4 @@
-"""The execution of one run of a study: each task gives a row, even after an error."""
+"""Executes one run of a study: each task results in a row, even after an error."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
 KEPT = 4
-"""The most problems in the cache: the runs of one problem follow each other."""
+"""The maximum number of problems in the cache. It can be small, as the runs on one problem follow each other."""
 _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
     (InvalidInputError, Status.INVALID),
     (UnsupportedError, Status.REFUSED),
@@ -46,7 +46,7 @@ _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
 
 
 class TaskRunner(AbstractContextManager["TaskRunner"]):
-    """Runs tasks, one after the other, with a cache of problems and one process of the constraint solver."""
+    """Runs tasks one by one, with a cache of problems and a single process of the constraint solver."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()
@@ -56,7 +56,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """End the solver."""
+        """End the solver's process."""
         self._stack.__exit__(kind, error, trace)
 
     def __enter__(self) -> Self:
@@ -64,7 +64,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         return self
 
     def run(self, task: Task) -> Row:
-        """Run `task` and return its row; an error becomes a row with its reason."""
+        """Run `task` and return its row. After an error, the row contains the reason."""
         began = time.perf_counter()
         row = Row(status=Status.ERROR, machine=machine(), version=__version__)
         try:
@@ -95,7 +95,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         row.journal = journal_bytes(journal, outcome) if journal else b""
 
     def _team(self, problem: ProblemSpec) -> tuple[Team, str]:
-        """Return the team of a problem, and the digest of its robots' files. Raises as `team_of`."""
+        """Return the team for a problem, and the digest of its robots' files. Raises the exceptions of `team_of`."""
         identity = problem.identity
         if identity not in self._teams:
             while len(self._teams) >= KEPT:
@@ -108,11 +108,11 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
 
 
 def team_of(problem: ProblemSpec) -> Team:
-    """Return the team of a problem.
+    """Return the team that solves a problem.
 
     Raises:
-        InvalidInputError: if its files are invalid.
-        ValueError: if the family has no such problem.
+        InvalidInputError: if the problem's files are invalid.
+        ValueError: if the family has no problem with these parameters.
     """
     if problem.family:
         team = FAMILIES[problem.family](**problem.parameters)
@@ -129,7 +129,7 @@ def team_of(problem: ProblemSpec) -> Team:
 
 @cache
 def machine() -> str:
-    """Return a description of this machine: its name, its processors, its Python."""
+    """Return a description of this machine: its name, its processors, and its Python version."""
     return f"{platform.node()}, {os.cpu_count()} x {platform.machine()}, Python {platform.python_version()}"
 
 
@@ -153,7 +153,7 @@ def _describe(row: Row, team: Team, digest: str) -> None:
 
 
 def _fill(row: Row, outcome: Outcome, team: Team) -> None:
-    """Copy an outcome into its row."""
+    """Copy an outcome into a row."""
     metrics = outcome.metrics
     row.status = Status.DONE
     if outcome.verdict == Verdict.UNKNOWN:
@@ -163,7 +163,7 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     row.cost, row.bound = _exact(outcome.cost if team.kind == ProblemKind.DISWCSP else None), _exact(outcome.bound)
     row.withdrawn, row.verified, row.confirmed = len(outcome.withdrawn), outcome.verified, outcome.confirmed
     row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
-    if outcome.protocol == CENTRAL:  # it sends no messages, so counts are not comparable
+    if outcome.protocol == CENTRAL:  # the central solver sends no messages, so its counts are not comparable
         return
     row.messages_by_type = dict(sorted(metrics.messages.items()))
     row.messages, row.bytes, row.largest = sum(metrics.messages.values()), metrics.bytes, metrics.largest

@@ -1,4 +1,4 @@
-"""Results for other programs: CSV, JSON lines, Parquet, and a LaTeX table of medians."""
+"""Exports results for other programs: CSV, JSON lines, Parquet, and a LaTeX table of medians."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import on_one_line
 
 _NESTED = ("settings", "messages_by_type", "cost_over_time", "loads")
-"""The columns that are written as JSON in formats with text cells."""
+"""The columns that are written as JSON in formats whose cells are text."""
 _LATEX = str.maketrans(
     {sign: f"\\{sign}" for sign in "&%$#_{}"}
     | {"~": r"\textasciitilde{}", "\\": r"\textbackslash{}", "^": r"\textasciicircum{}"}
@@ -24,10 +24,10 @@ _LATEX = str.maketrans(
 
 
 def export_results(results: Results, form: str) -> bytes:
-    """Return the results of a study in the form `csv`, `json`, `latex` or `parquet`.
+    """Return the results of a study in the format `csv`, `json`, `latex` or `parquet`.
 
     Raises:
-        UnsupportedError: if the package for the form is not installed.
+        UnsupportedError: if the package that writes the format is not installed.
     """
     rows = results.rows
     match form:
@@ -50,7 +50,7 @@ def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 
 def _flat(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
-    """Return rows of the same columns, with plain values."""
+    """Return rows that all have the same columns, with plain values."""
     columns = _columns(rows)
     return [
         {name: msgspec.json.encode(row[name]).decode() if name in _NESTED else row.get(name) for name in columns}
@@ -84,13 +84,13 @@ def _latex(text: str) -> str:
 
 
 def latex_table(rows: Sequence[Mapping[str, Any]], title: str, over: str, metrics: Sequence[str] = ()) -> str:
-    """Return a table of medians in LaTeX, with the rules of the package booktabs: a block for each metric.
+    """Return a LaTeX table of medians with a block of lines for each metric. It requires the package booktabs.
 
     Args:
         rows: The results, as `summary.prepare` returns them.
         title: The title of the study.
-        over: The parameter of the table's lines.
-        metrics: The metrics. Empty: the usual ones.
+        over: The parameter whose values are the table's lines.
+        metrics: The metrics. Empty: the default metrics.
     """
     if not rows:
         return ""

@@ -1,4 +1,4 @@
-"""The figures of a report, with their titles and captions."""
+"""Selects the figures of a report, and writes their titles and captions."""
 
 from __future__ import annotations
 
@@ -30,22 +30,22 @@ _SETTINGS = {
     "pdf.fonttype": 42, "lines.linewidth": 1.4, "lines.markersize": 4.5, "figure.constrained_layout.use": True,
 }  # fmt: skip
 _HEIGHT = 0.64
-"""The height as a share of the width, without the legend."""
+"""The height of a figure as a share of its width, without the legend."""
 _NARROW, _SMALL = 4, {"font.size": 8, "legend.fontsize": 7, "lines.markersize": 4}
-"""Figures narrower than this many inches have smaller letters."""
+"""Figures narrower than this width in inches have smaller letters."""
 MOST_KINDS = 12
-"""The most kinds of problems, or instances, over which figures are drawn: more names would not be readable."""
+"""The most kinds of problems, or instances, on the axis of a figure: more names would not be readable."""
 MOST_PROFILES, MOST_PAIRS = 2, 4
-"""The most metrics with profiles, and the most pairs with scatter plots."""
+"""The most metrics with profiles, and the most pairs of ways to run with scatter plots."""
 MOST_BOXES = 40
-"""The most boxes that fit side by side."""
+"""The most boxes side by side in one plot."""
 _NEARLY = 1.01
-"""Values that differ by at most this factor, 1 %, count as equal."""
+"""Values count as equal if they differ by at most this factor (1 %)."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure: the name of its file, its title and caption, its drawing function, and its width in inches."""
+    """A figure: its file name, title, caption, drawing function, and width in inches."""
 
     name: str
     title: str
@@ -54,15 +54,15 @@ class Drawing:
     width: float = WIDTH
 
     def __post_init__(self) -> None:
-        """Make the name valid for a file, as it contains names of parameters from a study's file."""
+        """Make the name valid as a file name, since it contains parameter names from a study's file."""
         object.__setattr__(self, "name", _file(self.name))
 
     def svg(self, *, text: bool = False) -> bytes:
-        """Return it as SVG; with `text`, words are text in the reader's font, and not shapes."""
+        """Return the figure as SVG. If `text` is true, words are text in the reader's font, instead of shapes."""
         return self._saved("svg", {"Date": None}, {"svg.fonttype": "none" if text else "path"})
 
     def pdf(self) -> bytes:
-        """Return it as PDF."""
+        """Return the figure as PDF."""
         return self._saved("pdf", {"CreationDate": None}, {})
 
     def drawn(self) -> Figure:
@@ -82,7 +82,7 @@ class Drawing:
 
 
 class Figures(NamedTuple):
-    """The informative figures of results, and a sentence for each figure that is left out."""
+    """The informative figures for some results, and a sentence for each figure that is left out."""
 
     drawings: list[Drawing]
     remarks: list[str]
@@ -90,7 +90,7 @@ class Figures(NamedTuple):
 
 @dataclass(frozen=True)
 class _Shown:
-    """The rows of figures: of the ways to run that have a style, over one parameter."""
+    """The rows shown in figures over one parameter: the results of the ways to run that have a style."""
 
     rows: Rows
     over: str
@@ -102,12 +102,12 @@ class _Shown:
 
     @property
     def grouped(self) -> bool:
-        """Whether the parameter has several values, and not one for each problem."""
+        """Whether the parameter has several values, but fewer than there are problems."""
         return 1 < len(self.values) < len({(row.get("case"), row["digest"]) for row in self.rows})
 
     @cached_property
     def value_at(self) -> dict[str, Any]:
-        """The value of the parameter for each problem, if problems are grouped by it; else None for all."""
+        """The value of the parameter for each problem; None for all problems if they are not grouped by it."""
         grouped = self.grouped
         return {row["digest"]: row.get(self.over) if grouped else None for row in self.rows}
 
@@ -124,7 +124,7 @@ def figures_of(rows: Rows, over: str, metrics: Sequence[str], width: float = WID
 
 
 def _all(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
-    """Yield figures, and sentences in place of uninformative ones; costs first if they differ."""
+    """Yield figures, or a sentence instead of an uninformative figure. If costs differ, their figures are first."""
     local = _costs_differ(shown.rows)
     if local:
         yield from _costs(shown, metrics)
@@ -163,7 +163,7 @@ def _spots(shown: _Shown, metric: str) -> dict[str, list[Spot]]:
 
 
 def _caption(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: str) -> str:
-    """Return the caption of medians over a parameter."""
+    """Return the caption for a figure of medians over a parameter."""
     drawn = [spot for line in spots.values() for spot in line]
     caption = f"Median of {name}"
     caption += ", with its 95 % confidence interval (bootstrap)." if any(s.low < s.high for s in drawn) else "."
@@ -174,13 +174,13 @@ def _caption(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: s
 
 
 def _same(lines: Mapping[str, Any]) -> str:
-    """Return a sentence on identical lines."""
+    """Return a sentence about identical lines."""
     groups = [listed(group) for group in same_lines(lines)]
     return f" Identical lines: {'; '.join(groups)}." if groups else ""
 
 
 def _missing(lines: Mapping[str, Sequence[Any]]) -> str:
-    """Return a sentence on ways to run without a line."""
+    """Return a sentence about the ways to run that have no line."""
     missing = [way for way, line in lines.items() if not line]
     return f" Without a value: {', '.join(missing)}." if missing else ""
 
@@ -215,13 +215,13 @@ def _share(rows: Rows) -> float:
 
 
 def _solutions(rows: Rows) -> float:
-    """Return the share of problems with a solution among those that a way to run has solved."""
+    """Return the share of problems with a solution among the problems that any way to run has solved."""
     solved = {row["digest"]: row["verdict"] != Verdict.NO_SOLUTION for row in rows if row["status"] == Status.DONE}
     return sum(solved.values()) / len(solved) if solved else math.nan
 
 
 def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
-    """Yield profiles and scatter plots of some metrics, and sentences on ways with equal needs."""
+    """Yield profiles and scatter plots for some metrics, and sentences about ways to run with equal results."""
     if len(shown.styles) == 1:
         return
     needs = {
@@ -244,7 +244,7 @@ def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
 
 
 def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
-    """Yield cactus plots and performance profiles, unless all ways have the same line."""
+    """Yield a cactus plot and a performance profile, each unless all ways to run have the same line."""
     name, found = METRICS[metric], statistics.cactus(shown.rows, metric)
     solved = {way: line for way, line in found.items() if line}
     cut = " Runs that limits have ended are not solved." if _some_cut(shown.rows) else ""
@@ -270,7 +270,7 @@ def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
 
 
 def _vary(shown: _Shown, cases: Mapping[Case, float]) -> bool:
-    """Return whether runs differ at the same value of the parameter."""
+    """Return whether results differ between problems with the same value of the parameter."""
     groups: dict[Any, list[float]] = {}
     for (problem, case), value in cases.items():
         groups.setdefault((shown.value_at[problem], case), []).append(value)
@@ -290,7 +290,7 @@ def _some_cut(rows: Rows) -> bool:
 
 
 def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, float]]) -> Iterator[Drawing]:
-    """Yield scatter plots of the first way to run against others, if one of the two varies."""
+    """Yield scatter plots of the first way to run against others, if the results of one of the two vary."""
     name, (first, *others) = METRICS[metric], shown.styles
     drawn = 0
     for way in others:
@@ -307,7 +307,7 @@ def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, floa
 
 
 def _costs(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing]:
-    """Yield costs over the effort, cycles first, and the final costs if they are requested."""
+    """Yield plots of costs over effort (cycles first if counted), and of the final costs if they are requested."""
     for spent in sorted(statistics.SPENT, key=lambda one: one != "cycles"):
         bands = statistics.cost_bands(shown.rows, spent)
         if bands:
@@ -320,7 +320,7 @@ def _costs(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing]:
 
 
 def _final_costs(shown: _Shown) -> Iterator[Drawing]:
-    """Yield boxes of the final costs at each value of the parameter, if they fit; problems are one group."""
+    """Yield box plots of final costs at each value of the parameter, if they fit. Single problems form one group."""
     values = [None] if shown.over in summary.SINGLE else shown.values
     if len(values) * len(shown.styles) > MOST_BOXES:
         return
@@ -339,7 +339,7 @@ def _final_costs(shown: _Shown) -> Iterator[Drawing]:
 
 
 def _costs_differ(rows: Rows) -> bool:
-    """Return whether runs on the same problem have ended with different costs, as in local search."""
+    """Return whether runs on the same problem ended with different costs, as in local search."""
     found: dict[str, set[Any]] = {}
     for row in rows:
         if row["cost"] is not None and row["status"] in {Status.DONE, Status.LIMIT}:
@@ -352,12 +352,12 @@ def _file(label: str) -> str:
 
 
 def file_name(name: str, part: str) -> str:
-    """Return the name of the file for a part of the problems."""
+    """Return the file name for a part of the problems."""
     return f"{name}-{_file(part)}" if part else name
 
 
 def unique_names(names: Sequence[str]) -> list[str]:
-    """Return names of files, duplicates with a number: `a/b` and `a-b` give the same name."""
+    """Return distinct file names by numbering duplicates: `a/b` and `a-b` have the same file name."""
     found: dict[str, None] = {}
     for name in names:
         numbered = (f"{name}-{number}" for number in itertools.count(2))

@@ -1,4 +1,4 @@
-"""Frames on a socket between a study and its workers: four bytes of length, then the content."""
+"""Frames on a socket between a study and its workers: a length of four bytes, then the content."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def write_frame(connection: socket.socket, content: bytes) -> None:
 
 
 def read_frame(connection: socket.socket) -> bytes | None:
-    """Wait for a frame, and return its content; None if the other end is closed."""
+    """Wait for a frame and return its content, or None if the other end is closed."""
     frames = FrameBuffer()
     while True:
         received = connection.recv(_CHUNK if frames.missing is None else frames.missing)
@@ -26,19 +26,19 @@ def read_frame(connection: socket.socket) -> bytes | None:
 
 
 class FrameBuffer:
-    """A buffer that joins received pieces to frames."""
+    """Joins received pieces into frames."""
 
     def __init__(self) -> None:
         self._buffer = bytearray()
 
     @property
     def missing(self) -> int | None:
-        """The least number of bytes that are missing in the present frame; None if it is complete."""
+        """The minimum number of bytes missing in the current frame, or None if it is complete."""
         length = _LENGTH.unpack_from(self._buffer)[0] if len(self._buffer) >= _LENGTH.size else 0
         return max(0, _LENGTH.size + length - len(self._buffer)) or None
 
     def feed(self, received: bytes) -> list[bytes]:
-        """Add `received` bytes, and return the contents of the complete frames."""
+        """Add `received` bytes, and return the contents of all frames that are now complete."""
         self._buffer += received
         whole = []
         while len(self._buffer) >= _LENGTH.size:

@@ -1,4 +1,4 @@
-"""Reports in Markdown: tables for a page of a repository or a site, without figures."""
+"""Reports in Markdown: tables for a page in a repository or on a website, without figures."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from robochoc.system.files import write_atomically
 from robochoc.system.plain_text import on_one_line
 
 MOST_COLUMNS = 7
-"""With more ways to run than this, and than values of the parameter, each has a line and not a column."""
+"""If there are more ways to run than this and than values of the parameter, each way has a line instead of a column."""
 MOST_PAIRS = 10
-"""With more pairs, only those with the first way to run are shown."""
+"""If there are more pairs of ways to run, only the pairs with the first way are shown."""
 _INTRODUCTION = re.compile(r'^text = (?:"""[^"]*"""|"[^"\n]*")\n', re.MULTILINE)
 
 
@@ -28,10 +28,10 @@ def write_markdown(results: Results, page: Path, over: str | None = None) -> Non
     Args:
         results: The results.
         page: The file to write.
-        over: The parameter of tables. None: the study's, or the first one with several values.
+        over: The parameter of the tables. None: the study's parameter, or the first one with several values.
 
     Raises:
-        InvalidInputError: if there are no results, or no such parameter.
+        InvalidInputError: if there are no results, or the parameter does not exist.
         OSError: if the page cannot be written.
     """
     write_atomically(page, markdown_page(results, page.name, over).encode())
@@ -41,7 +41,7 @@ def markdown_page(results: Results, name: str, over: str | None = None) -> str:
     """Return the report on the results of a study in Markdown, for a file called `name`.
 
     Raises:
-        InvalidInputError: as `write_markdown`.
+        InvalidInputError: if there are no results, or the parameter does not exist.
     """
     return "\n\n".join(block.strip() for block in _blocks(ReportContent(results, over), name)) + "\n"
 
@@ -75,7 +75,7 @@ def _blocks(content: ReportContent, name: str) -> Iterator[str]:
 
 
 def _fitted(table: Table) -> Table:
-    """Return a table, transposed if it is too wide."""
+    """Return `table`, transposed if it is too wide."""
     heads, lines = table
     if len(heads) - 1 <= max(MOST_COLUMNS, len(lines)):
         return table
@@ -84,7 +84,7 @@ def _fitted(table: Table) -> Table:
 
 
 def _solved(content: ReportContent) -> Iterator[str]:
-    """Yield the numbers of problems with a solution, unless all decided problems have one."""
+    """Yield the table of problems with and without a solution, unless all decided problems have a solution."""
     over = "problems" if "case" in content.rows[0] else content.over
     tables = [(part, summary.solved(rows, over)) for part, rows in content.parts]
     if any(line[3] != "0" for _, (_, lines) in tables for line in lines):
@@ -116,7 +116,7 @@ def _how_to_repeat(content: ReportContent, name: str) -> Iterator[str]:
 
 
 def _without_introduction(text: str) -> str:
-    """Return a study's file without the introduction, which is on the page; the whole file in case of doubt."""
+    """Return a study's file without the introduction, which the page already contains; if unsure, the whole file."""
     rest = _INTRODUCTION.sub("", text)
     whole = toml_tables(text)
     whole.get("report", {}).pop("text", None)

@@ -1,4 +1,4 @@
-"""Observers of a run: the cost over time, the load of each robot, and the journal."""
+"""Observers of a run, which record the cost over time, the load of each robot, and the journal."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from robochoc.run.options import Options
 from robochoc.run.recording import journal_header, objective_to_record
 
 MOST_POINTS = 10_000
-"""The most points of a curve: the cost seldom falls, but costs can be large."""
+"""The most points on a curve. The cost rarely falls so often, but large costs can."""
 
 
 class CostOverTime:
-    """An observer of the moments at which the team's assignment became cheaper than ever, with the effort until then.
+    """An observer that records when the team's assignment became cheaper than before, and the effort until then.
 
-    The moments are those of a journal's `Improved` events.
+    The recorded points correspond to the `Improved` events of a journal.
     """
 
     def __init__(self, team: Team, task: Task) -> None:
@@ -32,7 +32,7 @@ class CostOverTime:
         self._seen: list[tuple[float, int, int, AnyEvent]] = []
 
     def __call__(self, event: AnyEvent) -> None:
-        """Take in one event."""
+        """Process one event."""
         match event:
             case Sent():
                 self._messages += 1
@@ -46,11 +46,11 @@ class CostOverTime:
                 pass
 
     def note_sent(self, progress: Progress) -> None:
-        """Record the number of messages sent, in a runtime without an event for each."""
+        """Record the number of messages sent, for a runtime without an event for each message."""
         self._messages = max(self._messages, progress.messages)
 
     def points(self) -> list[CostPoint]:
-        """Return the moments, in order; empty if nothing is minimised."""
+        """Return the recorded points in order; empty if nothing is minimised."""
         return list(self._points())[:MOST_POINTS]
 
     def _points(self) -> Iterator[CostPoint]:
@@ -67,25 +67,25 @@ class CostOverTime:
 
 
 class RobotLoads:
-    """An observer of the messages and bytes that each robot has sent."""
+    """An observer that counts the messages and bytes sent by each robot."""
 
     def __init__(self) -> None:
         self._messages: Counter[str] = Counter()
         self._bytes: Counter[str] = Counter()
 
     def __call__(self, event: AnyEvent) -> None:
-        """Take in one event."""
+        """Process one event."""
         if isinstance(event, Sent):
             self._messages[event.sender] += 1
             self._bytes[event.sender] += event.bytes
 
     def loads(self) -> list[RobotLoad]:
-        """Return the load of each robot that has sent a message, sorted by name."""
+        """Return the load of each robot that sent a message, sorted by name."""
         return [RobotLoad(name, count, self._bytes[name]) for name, count in sorted(self._messages.items())]
 
 
 LARGEST_JOURNAL = 256 * 2**20
-"""The largest stored journal, in bytes; larger ones are dropped."""
+"""The maximum size of a stored journal, in bytes. Larger journals are discarded."""
 
 
 def journal_of(team: Team, options: Options) -> JournalRecorder:
@@ -94,7 +94,7 @@ def journal_of(team: Team, options: Options) -> JournalRecorder:
 
 
 def journal_bytes(journal: JournalRecorder, outcome: Outcome) -> bytes:
-    """Return the journal of a finished run; empty if it is too large."""
+    """Return the journal of a finished run, or an empty value if it is too large."""
     journal.outcome = outcome
     content = journal.content()
     return content if len(content) <= LARGEST_JOURNAL else b""

@@ -12,14 +12,14 @@ MAX_RUNS = 1_000_000
 
 
 class TooManyRunsError(RobochocError, ValueError):
-    """The study has too many runs for a file of results."""
+    """The study has too many runs for one file of results."""
 
 
 def plan_of(study: Study) -> dict[str, Task]:
-    """Return the runs of a study, by their keys. Runs of one problem follow each other.
+    """Return the runs of a study by key. The runs on one problem follow each other.
 
     Raises:
-        TooManyRunsError: if there are more than `MAX_RUNS`.
+        TooManyRunsError: if there are more than `MAX_RUNS` runs.
     """
     count = len(study.problems) * sum(len(seeds) for _, seeds, _ in study.setups) * study.repeat
     if count > MAX_RUNS:

@@ -1,4 +1,4 @@
-"""The kinds of plots in a report. `figures.py` selects them and their data."""
+"""The kinds of plots in a report. `figures.py` selects the plots and their data."""
 
 from __future__ import annotations
 
@@ -24,22 +24,22 @@ from robochoc.experiments.axes import (
 from robochoc.experiments.statistics import Band
 
 _MOST_BANDS = 4
-"""With more ways to run, intervals are bars, and quartiles are not shown: bands would overlap."""
+"""With more ways to run, intervals are drawn as bars, and quartiles are left out, since bands would overlap."""
 _MARKERS_EVERY = 0.14
-"""The distance of markers on a line of many points, as a share of the size of the axes."""
+"""The distance between markers on a line with many points, as a share of the size of the axes."""
 _LONG_PROFILE = 5
-"""The largest factor on a linear axis."""
+"""The largest factor for which the axis of a profile is linear."""
 _DODGED = 0.7
-"""The share of the room of a kind of problems on which its ways to run are side by side."""
+"""The share of the space for one kind of problems in which the ways to run are placed side by side."""
 
 Styles = Mapping[str, Style]
 Steps = Mapping[str, Sequence[float]]
-"""For each way to run, the values of the steps of its line, in ascending order."""
+"""The values at which each way's line rises, in ascending order, by way to run."""
 
 
 @dataclass(frozen=True)
 class Spot:
-    """The result of one way to run at one value of the parameter: a median and its interval."""
+    """The results of one way to run at one value of the parameter: a median and its interval."""
 
     at: Any
     median: float
@@ -57,7 +57,7 @@ def same_lines(lines: Mapping[str, Hashable]) -> list[list[str]]:
 
 
 def _line(axes: Axes, x: Sequence[float], y: Sequence[float], style: Style, above: int = 0, **more: Any) -> None:  # noqa: ANN401 - of `plot`
-    """Draw a line, wider if identical lines are drawn upon it, so that all are visible."""
+    """Draw a line, wider if identical lines will be drawn over it, so that all of them are visible."""
     wider = min(above, 3)
     axes.plot(
         x, y, color=style.colour, linestyle=style.dashes, marker=style.marker,
@@ -73,9 +73,9 @@ def _lines_above(lines: Mapping[str, Hashable]) -> dict[str, int]:
 def over_parameter(
     spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], names: tuple[str, str], styles: Styles, axes: Axes
 ) -> None:
-    """Draw medians with intervals over the values of a parameter; `names` are those of the parameter and the metric.
+    """Draw medians with intervals over the values of a parameter. `names`: the names of the parameter and the metric.
 
-    Lines join numbers. Kinds of problems are not joined: their ways to run are side by side.
+    Lines join the medians at numbers. At kinds of problems, the ways to run are side by side, without lines.
     """
     axes.set_xlabel(literal(names[0]))
     shown = {way: style for way, style in styles.items() if spots.get(way)}
@@ -106,7 +106,7 @@ def _median_line(axes: Axes, spots: Sequence[Spot], style: Style, above: int, *,
 
 
 def _mark(axes: Axes, at: float, spot: Spot, style: Style, above: int = 0, *, bar: bool) -> None:
-    """Draw a median, hollow if it is a lower bound, and its interval as a bar."""
+    """Draw a median, hollow if it is only a lower bound, with its interval as a bar."""
     if bar and spot.low < spot.high:
         axes.vlines(at, spot.low, spot.high, color=style.colour, linewidth=1, alpha=0.7)
     face = "white" if spot.open_ended else style.colour
@@ -117,7 +117,7 @@ def shares(
     found: Mapping[str, Sequence[float]], values: Sequence[Any], solutions: Sequence[float], names: tuple[str, str],
     styles: Styles, axes: Axes,
 ) -> None:  # fmt: skip
-    """Draw the share of runs with a verdict over a parameter, and, in grey, that of problems with a solution."""
+    """Draw the share of runs with a verdict over a parameter, and in grey the share of problems with a solution."""
     axes.set_xlabel(literal(names[0]))
     if numbers(values):
         tick_numbers(axes, values)
@@ -140,7 +140,7 @@ def shares(
 
 
 def cactus(steps: Steps, name: str, styles: Styles, axes: Axes) -> None:
-    """Draw the number of runs solved within a value of the metric; lines continue to the right edge."""
+    """Draw the number of runs solved within each value of the metric. Lines continue to the right edge."""
     values = [value for line in steps.values() for value in line]
     spread(axes, "x", values)
     _stairs(axes, steps, styles, 1, max(values))
@@ -151,7 +151,7 @@ def cactus(steps: Steps, name: str, styles: Styles, axes: Axes) -> None:
 
 
 def profile(steps: Steps, name: str, each: float, styles: Styles, axes: Axes) -> None:
-    """Draw the share of runs within a factor of the best way's; each run adds the share `each`."""
+    """Draw the share of runs within each factor of the best way. Each run adds `each` to the share."""
     last = max(factor for line in steps.values() for factor in line)
     if last > _LONG_PROFILE:
         axes.set_xscale("log")
@@ -162,7 +162,7 @@ def profile(steps: Steps, name: str, each: float, styles: Styles, axes: Axes) ->
 
 
 def _stairs(axes: Axes, steps: Steps, styles: Styles, each: float, last: float, first: float | None = None) -> None:
-    """Draw lines that rise by `each` at each step, from `first` or the first step to the edge after `last`."""
+    """Draw lines that rise by `each` at each step, from `first` (or the first step) to just beyond `last`."""
     begin = min((line[0] for line in steps.values() if line), default=last) if first is None else first
     room = (last - begin) * 0.05 or 1.0
     edge = last + room if axes.get_xscale() == "linear" else last * 1.1
@@ -170,7 +170,7 @@ def _stairs(axes: Axes, steps: Steps, styles: Styles, each: float, last: float, 
     for place, (way, line) in enumerate(steps.items()):
         x = [begin, *line, edge]
         y = [0.0, *(each * (count + 1) for count in range(len(line))), each * len(line)]
-        start = _MARKERS_EVERY * place / len(steps)  # markers of identical lines do not overlap
+        start = _MARKERS_EVERY * place / len(steps)  # keeps the markers of identical lines apart
         more = {"drawstyle": "steps-post", "markevery": (start, _MARKERS_EVERY)}
         _line(axes, x, y, styles[way], above.get(way, 0), **more)
     axes.set_xlim(right=edge)
@@ -178,7 +178,7 @@ def _stairs(axes: Axes, steps: Steps, styles: Styles, each: float, last: float, 
 
 
 def scatter(pairs: Sequence[tuple[float, float]], name: str, ways: tuple[str, str], colour: str, axes: Axes) -> None:
-    """Draw a point for each case: the needs of two ways to run."""
+    """Draw a point for each case, whose coordinates are the results of two ways to run."""
     values = [value for pair in pairs for value in pair]
     axes.scatter([x for x, _ in pairs], [y for _, y in pairs], s=14, color=colour, alpha=0.6, linewidths=0)
     for which in ("x", "y"):
@@ -191,7 +191,7 @@ def scatter(pairs: Sequence[tuple[float, float]], name: str, ways: tuple[str, st
 
 
 def cost_over(bands: Mapping[str, Band], name: str, styles: Styles, axes: Axes, *, steps: bool) -> None:
-    """Draw the cost of the best assignment so far over the effort; `steps`: over integers, on a linear axis."""
+    """Draw the cost of the best assignment so far over the effort; `steps`: on a linear axis with integers."""
     above = _lines_above({way: (band.spent, band.median) for way, band in bands.items()})
     for place, (way, band) in enumerate(bands.items()):
         start = _MARKERS_EVERY * place / len(bands)
@@ -211,9 +211,9 @@ def cost_over(bands: Mapping[str, Band], name: str, styles: Styles, axes: Axes, 
 def boxes(
     groups: Mapping[str, Mapping[str, Sequence[float]]], names: tuple[str, str], styles: Styles, axes: Axes
 ) -> None:
-    """Draw the values of each way to run as a box of quartiles (Tukey, "Exploratory Data Analysis", 1977).
+    """Draw the values of each way to run as a box plot with quartiles (Tukey, "Exploratory Data Analysis", 1977).
 
-    Boxes of several groups are side by side; those of one group have the names of ways below them.
+    The boxes of several groups are side by side. If there is only one group, the ways' names are below the boxes.
     """
     ways = [way for way in styles if any(way in group for group in groups.values())]
     alone = len(groups) == 1

@@ -1,4 +1,4 @@
-"""The best configurations, in one sentence for each metric, for readers who look for the answer first."""
+"""States the best configurations in one sentence for each metric, for readers who want the answer first."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ from robochoc.experiments.statistics import by_problem, case_of, maximised
 from robochoc.experiments.summary import METRICS, Rows, labels
 
 MOST_TOLD = 3
-"""The most ways that a sentence names."""
+"""The most ways to run named in a sentence."""
 _SEARCHED = ("messages", "ncccs", "bytes", "cost")
-"""The columns by which ways count as identical."""
+"""The columns that must be equal for ways to run to count as identical."""
 
 
 def answers(rows: Rows, metrics: Sequence[str]) -> list[str]:
-    """Return sentences about the best configurations, and about those with equal results.
+    """Return sentences about the best configurations, and about configurations with equal results.
 
     Args:
         rows: The results of several ways to run.
-        metrics: The metrics that are reported.
+        metrics: The metrics in the report.
     """
     sentences = [line for metric in metrics if (line := _least(rows, metric))]
     return [*sentences, *_twins(rows)] if len(labels(rows)) > 1 else []
 
 
 def _least(rows: Rows, metric: str) -> str:
-    """Return a sentence on the cases in which each way is the best, or tied; empty if all ways are equal in all cases.
+    """Return a sentence with the number of cases in which each way to run is the best, or tied.
 
-    A case is a problem with a value of the parameter of runs, counted by the median of its runs. Higher utilities are
-    better. A case that no way has solved is open.
+    The sentence is empty if all ways are equal in all cases. A case is a problem with a value of the parameter of runs;
+    its result is the median over its runs. Higher utilities are better. A case that no way has solved is open.
     """
     ways = labels(rows)
     needs = {way: by_problem(rows, way, metric) for way in ways}
@@ -59,7 +59,7 @@ def _run(row: Mapping[str, Any]) -> tuple[Any, ...]:
 
 
 def _twins(rows: Rows) -> Iterator[str]:
-    """Yield sentences on ways with identical results in all cases."""
+    """Yield sentences about ways to run with identical results in all cases."""
     did: dict[str, dict[tuple[Any, ...], tuple[Any, ...]]] = {}
     for row in rows:
         did.setdefault(str(row["label"]), {})[_run(row)] = (row["status"], *(row[name] for name in _SEARCHED))

@@ -1,4 +1,4 @@
-"""One run on a worker of a cluster: its data, and its execution there."""
+"""Executes one run on a cluster's worker, and collects the data that the worker needs."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _KEPT = threading.local()
 
 
 def files_of(task: Task) -> dict[str, bytes]:
-    """Return the contents of the files of a task's problem by name, to be sent with it; empty if it is generated."""
+    """Return the contents of the files of a task's problem, by name; empty if the problem is generated."""
     path = Path(task.problem.path)
     if not task.problem.path:
         return {}
@@ -26,11 +26,11 @@ def files_of(task: Task) -> dict[str, bytes]:
 
 
 def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
-    """Run one task on a worker of the cluster, and return its row.
+    """Run one task on a cluster's worker, and return its row.
 
     Args:
         content: The task as JSON.
-        files: The contents of its problem's files.
+        files: The contents of the problem's files.
     """
     task = msgspec.json.decode(content, type=Task)
     if not files:
@@ -48,7 +48,7 @@ def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
 
 
 def _bench() -> TaskRunner:
-    """Return the task runner of this thread: a constraint solver serves one run at a time."""
+    """Return the task runner of the calling thread; its constraint solver can only serve one run at a time."""
     if not hasattr(_KEPT, "bench"):
         _KEPT.bench = TaskRunner()
     bench: TaskRunner = _KEPT.bench

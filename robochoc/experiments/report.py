@@ -39,21 +39,22 @@ def write_page(results: Results, page: Path, over: str | None = None) -> None:
     Args:
         results: The results.
         page: The file to write.
-        over: The parameter of tables and figures. None: the study's, or the first one with several values.
+        over: The parameter of tables and figures. None: the study's parameter, or the first one with several values.
 
     Raises:
-        InvalidInputError: if there are no results, or no such parameter.
+        InvalidInputError: if there are no results, or the parameter does not exist.
         OSError: if the page cannot be written.
     """
     write_atomically(page, _Report(results, over).page().encode())
 
 
 def write_folder(results: Results, folder: Path, over: str | None = None, *, replace: bool = False) -> None:
-    """Write the figures of the report as SVG and PDF, their captions, and its table in LaTeX, into `folder`.
+    """Write the report's figures (SVG and PDF), their captions, and its table (LaTeX) into `folder`.
 
     Raises:
-        InvalidInputError: as `write_page`, and if a figure already exists and `replace` is not set.
-        OSError: if they cannot be written.
+        InvalidInputError: if there are no results, the parameter does not exist, or a figure already exists and
+            `replace` is false.
+        OSError: if the files cannot be written.
     """
     report = _Report(results, over)
     tables = unique_names([file_name("medians", part) for part, _ in report.parts])
@@ -74,7 +75,7 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
 
 
 class _Report(ReportContent):
-    """The content of a report, with figures."""
+    """The content of a report, including figures."""
 
     def __init__(self, results: Results, over: str | None) -> None:
         super().__init__(results, over)
@@ -143,7 +144,7 @@ def _table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
 
 
 def _inline(drawing: Drawing) -> str:
-    """Return a figure as an element of the page: without the XML declaration, and with unique identifiers."""
+    """Return a figure as an element for the page, without the XML declaration and with unique identifiers."""
     svg = drawing.svg(text=True).decode()
     svg = svg[svg.index("<svg") :]
     for sign in ('id="', 'href="#', "url(#"):

@@ -12,7 +12,7 @@ from robochoc.formats.diagnostics import invalid_input
 
 SIGNIFICANT = 0.05
 MOST_TESTED = 2
-"""The most metrics by which pairs are compared."""
+"""The most metrics by which pairs of ways to run are compared."""
 PAIRS_EXPLANATION = (
     "On problems that both have solved: how often each is better (by the median of its runs), the median of the"
     " ratio first / second and of the difference first - second, and Wilcoxon's signed-rank test, corrected for the"
@@ -20,18 +20,18 @@ PAIRS_EXPLANATION = (
     " of the ratios or more are to 0."
 )
 _OF_MACHINES = {"wall_s", "total_s", "cpu_s", "memory"}
-"""Metrics that differ from machine to machine."""
+"""Metrics that depend on the machine."""
 
 
 class ReportContent:
-    """The results of a study, with the texts and tables of a report.
+    """The results of a study, with a report's texts and tables.
 
     Args:
         results: The results.
-        over: The parameter of tables and figures. None: the study's, or the first one with several values.
+        over: The parameter of tables and figures. None: the study's parameter, or the first one with several values.
 
     Raises:
-        InvalidInputError: if there are no results, or no such parameter.
+        InvalidInputError: if there are no results, or the parameter does not exist.
     """
 
     def __init__(self, results: Results, over: str | None) -> None:
@@ -52,11 +52,11 @@ class ReportContent:
 
     @property
     def paragraphs(self) -> list[str]:
-        """The paragraphs of the study's introduction."""
+        """The paragraphs of the introduction in the study's file."""
         return [part for part in self.introduction.strip().split("\n\n") if part]
 
     def measured(self) -> Iterator[str]:
-        """Yield sentences on the runs, the machines, and the checks of answers."""
+        """Yield sentences about the runs, the machines, and the checks of answers."""
         count, rows = self.planned, self._all
         there = f"{len(rows):,} of {count:,} runs are finished" if len(rows) < count else f"{count:,} runs"
         problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(self.rows))
@@ -73,21 +73,21 @@ class ReportContent:
         checked = sum(row["verified"] for row in rows)
         text = f"The answers of {checked:,} runs were checked against every constraint in force"
         if self.stopped:
-            why = self.stopped.partition("\n")[0]  # the commands that repeat them follow
+            why = self.stopped.partition("\n")[0]  # without the commands that repeat the runs
             yield f"{text}. The study was stopped: {why}"
         else:
             yield f"{text}, and no two answers to a problem contradict each other."
         yield from self._remarks
 
     def answers(self) -> list[str]:
-        """Return a sentence for each best configuration, and for each group of equal ones."""
+        """Return sentences about the best configurations for each metric, and about groups of equal configurations."""
         return ranking.answers(self.rows, self.metrics)
 
     def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:
-        """Yield the name and a table of pairs for each compared metric, unless no test was possible.
+        """Yield, for each compared metric, its name and a table of pairs, unless no test was possible.
 
         Args:
-            first_only: Whether only pairs with the first way to run are shown. All pairs are tested.
+            first_only: Whether only pairs with the first way to run are shown. All pairs are tested in any case.
         """
         for metric in [one for one in self.metrics if one in (*CENSORED, "cost")][:MOST_TESTED]:
             for part, rows in self.parts:
@@ -106,7 +106,7 @@ class ReportContent:
 
 
 def headed(what: str, part: str) -> str:
-    """Return a heading, with the name of the part of the problems."""
+    """Return a heading that ends with the name of the part of the problems, if there is one."""
     return f"{what}: {part}" if part else what
 
 

@@ -1,4 +1,4 @@
-"""The results of a study, read from its file."""
+"""Reads the results of a study from its file."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from robochoc.formats.diagnostics import shortened
 from robochoc.system.plain_text import on_one_line
 
 _MOST_DIGITS = 300
-"""The most digits before and after the point: floats and costs have no more, and `1e999999999` takes for ever."""
+"""The most digits before and after the point. Floats and costs have no more; `1e999999999` would take for ever."""
 
 
 class Results(NamedTuple):
     """The results of a study.
 
     Attributes:
-        name: The name of the study's file, without the ending.
+        name: The name of the study's file, without the extension.
         title: The title of the study.
         text: The content of the study's file.
-        stopped: Why it was stopped, with the commands that repeat it: two answers contradict each other, or the checker
-            refutes one. Empty: it was not stopped.
-        planned: The number of all its runs, finished or not.
+        stopped: The reason why the study was stopped, with commands that repeat the runs: two answers contradict each
+            other, or the checker found an answer wrong. Empty: it was not stopped.
+        planned: The number of all runs in the study, finished or not.
         rows: The finished runs, as `read` returns them.
     """
 
@@ -47,11 +47,11 @@ def read(path: Path | str) -> list[dict[str, Any]]:
     """Return the results of a study: a dictionary for each run, in the order of the study's file.
 
     Args:
-        path: The SQLite file that `robochoc experiment run` writes; the study may be running.
+        path: The SQLite file written by `robochoc experiment run`. The study may still be running.
 
     Returns:
-        Rows for `pandas.DataFrame(rows)` or `polars.DataFrame(rows)`. The problem's parameters are columns with their
-        names; names that other columns have begin with `problem_`.
+        Rows for `pandas.DataFrame(rows)` or `polars.DataFrame(rows)`. The problem's parameters are columns with the
+        parameters' names, preceded by `problem_` if another column has the same name.
 
     Raises:
         InvalidInputError: if the file contains no results of a study.
@@ -60,7 +60,7 @@ def read(path: Path | str) -> list[dict[str, Any]]:
 
 
 def read_results(path: Path) -> Results:
-    """Return the results of a study with the study itself; it may be running.
+    """Return the results of a study, and the study itself, which may still be running.
 
     Raises:
         InvalidInputError: if the file contains no results of a study.
@@ -87,7 +87,7 @@ def journals(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _journal(found: tuple[object, object]) -> tuple[str, bytes]:
-    """Return a key and a journal. Raises `TypeError` if they are invalid, as the key will be the name of a file."""
+    """Return a key and a journal. Raises `TypeError` if one is invalid, since the key becomes a file name."""
     key, content = found
     if isinstance(key, str) and KEY.fullmatch(key) and isinstance(content, bytes):
         return key, content
@@ -95,7 +95,7 @@ def _journal(found: tuple[object, object]) -> tuple[str, bytes]:
 
 
 def results_of(database: sqlite3.Connection) -> Results:
-    """Return the results in an open file. Raises one of `STRANGE` for foreign content."""
+    """Return the results in an open database. Raises an exception in `STRANGE` for modified content."""
     found = database.execute("SELECT name, title, text, stopped FROM study").fetchone() or ("",) * 4
     if not all(isinstance(one, str) for one in found):
         raise TypeError("the study has no name")
@@ -106,11 +106,11 @@ def results_of(database: sqlite3.Connection) -> Results:
 
 
 def finished_keys(path: Path, again: Collection[str] = ()) -> set[str]:
-    """Return the keys of all finished runs that are not to be repeated.
+    """Return the keys of the finished runs that need not be repeated.
 
     Args:
-        path: The file of the results.
-        again: The statuses of runs to repeat, besides those that are always repeated.
+        path: The file with the results.
+        again: The statuses of runs to repeat, in addition to those that are always repeated.
 
     Raises:
         InvalidInputError: if the file contains no results of a study.
@@ -151,7 +151,7 @@ def _is_number(value: object) -> bool:
 
 
 def _exact(text: str) -> int | float | Decimal:
-    """Return the number in a text: an integer, a float if it is exact, or a decimal."""
+    """Return the number in a text: an integer, a float if that is exact, otherwise a decimal."""
     exact = Decimal(text)
     if not exact.is_finite() or abs(exact.adjusted()) > _MOST_DIGITS:
         raise TypeError(f"{shortened(text)} is not a cost")
@@ -161,7 +161,7 @@ def _exact(text: str) -> int | float | Decimal:
 
 
 def _number(text: str) -> str | int | float:
-    """Return the number in a text, or the text."""
+    """Return the number in a text, or the text itself if it is not a number."""
     for kind in (int, float):
         with suppress(ValueError):
             return kind(text)

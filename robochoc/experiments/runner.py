@@ -1,4 +1,4 @@
-"""Running a study: missing runs are executed, compared and stored."""
+"""Runs a study: executes the missing runs, and compares and stores their answers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from robochoc.experiments.task import Row, Status, Task
 from robochoc.experiments.workers import LocalWorkers
 
 WRITE_S = 0.2
-"""Seconds between two writes of rows: the most that a kill loses."""
+"""The interval between two writes of rows, in seconds. A killed study loses at most this time."""
 
 
 class StudyProgress(NamedTuple):
@@ -27,9 +27,9 @@ class StudyProgress(NamedTuple):
 
     Attributes:
         done: The number of finished runs.
-        planned: The number of all runs of the study.
-        elapsed_s: Seconds since this start.
-        left_s: The estimated seconds of the rest, by the runs since this start. None: there were none.
+        planned: The number of all runs in the study.
+        elapsed_s: The seconds since the study was started or continued.
+        left_s: The estimated remaining seconds, based on the runs since then. None: there were no runs.
     """
 
     done: int
@@ -39,10 +39,10 @@ class StudyProgress(NamedTuple):
 
 
 class Workers(Protocol):
-    """The workers that run tasks: processes of this machine, or a cluster."""
+    """The workers that run tasks: processes on this machine, or a cluster."""
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
-        """Yield the rows of all tasks, in any order."""
+        """Yield the rows of all tasks in any order."""
 
     def __enter__(self) -> Self:
         """Start the workers."""
@@ -64,23 +64,24 @@ def run_study(
 ) -> Counter[str]:
     """Execute the runs of `study` that are not in `store`.
 
-    Runs in the simulator are executed in parallel. Runs with processes follow, one at a time, as their times would be
-    meaningless otherwise.
+    Runs in the simulator are executed in parallel. Afterwards, runs with processes are executed one at a time, since
+    their times would be meaningless otherwise.
 
     Args:
         study: The study.
-        store: The store of the results.
+        store: The store for the results.
         jobs: The number of workers on this machine. None: the number of processors.
         progress: Called after each run.
-        workers: Returns the workers for runs in the simulator, instead of those of this machine, for a limit on memory
-            in megabytes.
-        again: The statuses of runs to repeat, besides those that are always repeated.
+        workers: Returns the workers for runs in the simulator, given a limit on memory in megabytes. None: processes
+            on this machine.
+        again: The statuses of runs to repeat, in addition to those that are always repeated.
 
     Returns:
         The number of the study's runs by status.
 
     Raises:
-        DisagreementError: if two answers contradict each other, or one is refuted. All rows so far are written.
+        DisagreementError: if two answers contradict each other, or the checker found one wrong. All rows so far are
+            written.
         TooManyRunsError: if the study has too many runs.
     """
     plan = plan_of(study)
@@ -101,7 +102,7 @@ def run_study(
 def _run_all(
     missing: Sequence[Task], writer: _Writer, jobs: int | None, workers: Callable[[int | None], Workers] | None
 ) -> None:
-    """Run the missing tasks, those with processes after the others."""
+    """Run the missing tasks, those with processes last."""
     for timed, tasks in itertools.groupby(sorted(missing, key=_is_timed), key=_is_timed):
         bundles = [[*bundle] for _, bundle in itertools.groupby(tasks, key=_problem)]
         memory_mb = bundles[0][0].limits.memory_mb
@@ -127,7 +128,7 @@ def _processors() -> int:
 
 
 class _Clock:
-    """Reports the progress."""
+    """Measures and reports the progress."""
 
     def __init__(self, planned: int, missing: int, progress: Callable[[StudyProgress], None] | None) -> None:
         self._planned, self._missing = planned, missing
@@ -136,7 +137,7 @@ class _Clock:
         self._run = 0
 
     def tick(self) -> None:
-        """Count a run."""
+        """Count one finished run."""
         self._run += 1
         if self._progress:
             elapsed_s = time.monotonic() - self._began
@@ -145,7 +146,7 @@ class _Clock:
 
 
 def _compare_what_is_there(store: Store, plan: dict[str, Task], agreement: Agreement) -> None:
-    """Compare the rows of earlier starts. Raises `DisagreementError`."""
+    """Compare the stored rows of earlier starts. Raises `DisagreementError`."""
     for found in store.results().rows:
         compared = {name: found[name] for name in ("team", "digest", "verdict", "withdrawn", "maximises", "reason")}
         cost = None if found["cost"] is None else str(found["cost"])
@@ -154,7 +155,7 @@ def _compare_what_is_there(store: Store, plan: dict[str, Task], agreement: Agree
 
 
 class _Writer(AbstractContextManager["_Writer"]):
-    """Writes rows, several at a time, as single writes would be slower than runs."""
+    """Writes several rows at a time, since writing each row could take longer than its run."""
 
     def __init__(self, store: Store, agreement: Agreement, clock: _Clock) -> None:
         self._store, self._agreement, self._clock = store, agreement, clock
@@ -162,7 +163,7 @@ class _Writer(AbstractContextManager["_Writer"]):
         self._due = 0.0
 
     def add(self, task: Task, row: Row) -> None:
-        """Add a row, and write it now or soon. Raises `DisagreementError`."""
+        """Add a row, which is written now or soon. Raises `DisagreementError`."""
         self._rows.append((task.key, row))
         if time.monotonic() >= self._due:
             self.flush()

@@ -1,4 +1,4 @@
-"""Statistics of results: confidence intervals of medians, tests of pairs, profiles."""
+"""Statistics of results: confidence intervals for medians, tests of pairs, and profiles."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from robochoc.experiments.task import Status
 RESAMPLES = 2000
 CONFIDENCE = 0.95
 _SEED = 0
-"""The seed of the resampling: the same results give the same intervals."""
+"""The seed for resampling, so that the same results give the same intervals."""
 MOST_EXACT = 10
 FEWEST_PAIRS = 6
-"""With fewer pairs no result of the test can be significant at 5 %."""
+"""With fewer pairs, no test result can be significant at 5 %."""
 
 
 @dataclass(frozen=True)
 class MedianInterval:
-    """A median, and its confidence interval with the level `CONFIDENCE`."""
+    """A median, and its confidence interval at the level `CONFIDENCE`."""
 
     median: float
     low: float
@@ -34,13 +34,13 @@ class MedianInterval:
 
 
 def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> MedianInterval:
-    """Return the median of `values` and its interval by the percentile bootstrap.
+    """Return the median of `values` and its confidence interval by the percentile bootstrap.
 
-    Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3. Problems are drawn, each with all of
-    its runs, as repetitions of one problem are not independent.
+    Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3. Whole problems with all their runs are
+    resampled, since repetitions of one problem are not independent.
 
     Args:
-        values: The values of runs.
+        values: The values of the runs.
         problems: The problem of each run. Empty: all problems differ.
 
     Raises:
@@ -60,7 +60,7 @@ def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> Me
 
 
 def weighted_medians(values: Any, counts: Any) -> Any:  # noqa: ANN401 - arrays of numbers
-    """Return, for each row of `counts`, the median of the ascending `values`, repeated as counted."""
+    """Return, for each row of `counts`, the median of the ascending `values`, each repeated by its count."""
     until = np.cumsum(counts, axis=1)
     total = until[:, -1:]
     low = values[np.argmax(until >= (total + 1) // 2, axis=1)]
@@ -70,18 +70,18 @@ def weighted_medians(values: Any, counts: Any) -> Any:  # noqa: ANN401 - arrays 
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two ways to run, on the problems that both have solved.
+    """Two ways to run, compared on the problems that both have solved.
 
     Attributes:
-        one: The label of the first.
-        other: The label of the second.
-        pairs: The number of problems that both have solved.
-        one_better: In how many of them the first is better, by the median of its runs of the problem.
-        other_better: In how many of them the second is better.
-        ratio: The median ratio of the first to the second. None: it does not exist.
-        difference: The median difference of the first and the second. None: there are no pairs.
-        p: The p-value of the difference, corrected for the number of tests. None: too few pairs.
-        at: The value of the parameter of runs at which they are compared. None: tables are over none.
+        one: The label of the first way.
+        other: The label of the second way.
+        pairs: The number of problems that both ways have solved.
+        one_better: The number of these problems on which the first way is better, by the median of its runs.
+        other_better: The number of these problems on which the second way is better.
+        ratio: The median ratio of the first way to the second. None: it does not exist.
+        difference: The median difference between the first way and the second. None: there are no pairs.
+        p: The p-value of the difference, corrected for the number of tests. None: there are too few pairs.
+        at: The value of the parameter of runs at which the ways are compared. None: there is no such parameter.
     """
 
     one: str
@@ -96,12 +96,12 @@ class Comparison:
 
 
 def comparisons(rows: Rows, metric: str) -> list[Comparison]:
-    """Compare all pairs of ways to run by Wilcoxon's signed-rank test, with Holm's correction.
+    """Compare all pairs of ways to run by Wilcoxon's signed-rank test with Holm's correction.
 
     Wilcoxon, "Individual comparisons by ranking methods", 1945; Holm, "A simple sequentially rejective multiple test
-    procedure", 1979. A problem counts once, however many runs of it there are: they are not independent of each
-    other. So over a parameter of runs, too, ways are compared at each of its values. A problem of which half of the
-    runs have no verdict is in no pair.
+    procedure", 1979. Each problem counts once, however many runs it has, since runs on the same problem are not
+    independent. Therefore, if results are shown over a parameter of runs, ways are compared at each value separately. A
+    problem is in no pair if half or more of its runs have no verdict.
     """
     found = []
     for at in dict.fromkeys(row.get("case") for row in rows):
@@ -114,16 +114,16 @@ def comparisons(rows: Rows, metric: str) -> list[Comparison]:
 
 
 def maximised(rows: Rows, metric: str) -> set[str]:
-    """Return the problems with utilities, for which higher values of the metric are better."""
+    """Return the problems with utilities, for which higher metric values are better."""
     return {row["digest"] for row in rows if row["maximises"]} if metric == "cost" else set()
 
 
 Case = tuple[str, Any]
-"""What two ways to run are compared on: a problem, and the value of the parameter of runs that is drawn over."""
+"""A problem together with the value of the parameter of runs on the axis: the unit on which two ways are compared."""
 
 
 def by_problem(rows: Rows, way: str, metric: str) -> dict[Case, float]:
-    """Return the median of a metric over a way's runs of each problem, if more than half of them have a verdict."""
+    """Return a metric's median over a way's runs on each problem, if more than half of these runs have a verdict."""
     upwards = maximised(rows, metric)
     runs: dict[Case, list[float]] = {}
     for row in rows:
@@ -136,7 +136,7 @@ def by_problem(rows: Rows, way: str, metric: str) -> dict[Case, float]:
 
 
 def case_of(row: Mapping[str, Any]) -> Case:
-    """Return the case of a run."""
+    """Return the case that a run belongs to."""
     return row["digest"], row.get("case")
 
 
@@ -160,7 +160,7 @@ def _comparison(
 
 
 def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
-    """Return the median of the ratios of all `pairs`; None if it does not exist.
+    """Return the median of the ratios of all `pairs`, or None if it does not exist.
 
     The ratio of 0 to 0 is 1; the ratio of a positive number to 0 is infinite. Negative numbers have no ratio.
     """
@@ -171,9 +171,10 @@ def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
 
 
 def _wilcoxon(differences: Sequence[float]) -> float | None:
-    """Return the two-sided p-value; None for too few differences. Pairs without a difference are left out.
+    """Return the two-sided p-value, or None if there are too few differences. Zero differences are left out.
 
-    With ties it is exact for up to `MOST_EXACT` differences, and otherwise approximate: scipy takes seconds for more.
+    With ties, the p-value is exact for up to `MOST_EXACT` differences and approximate for more, where scipy takes
+    seconds.
     """
     some = [one for one in differences if one]
     if len(some) < FEWEST_PAIRS:
@@ -186,7 +187,7 @@ def _wilcoxon(differences: Sequence[float]) -> float | None:
 
 
 def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
-    """Return `found` with p-values corrected for their number (Holm; scipy has no such function)."""
+    """Return `found` with p-values corrected for the number of tests (Holm's method, which scipy lacks)."""
     tested = sorted((one.p, place) for place, one in enumerate(found) if one.p is not None)
     corrected: dict[int, float] = {}
     highest = 0.0
@@ -197,12 +198,12 @@ def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
 
 
 def cactus(rows: Rows, metric: str) -> dict[str, list[float]]:
-    """Return, for each way to run, the metric of its solved problems, in ascending order."""
+    """Return, for each way to run, the metric values of the solved problems in ascending order."""
     return {way: sorted(by_problem(rows, way, metric).values()) for way in labels(rows)}
 
 
 def performance_profile(rows: Rows, metric: str) -> dict[str, list[tuple[float, float]]]:
-    """Return for each way to run the share of problems that it solves within a factor of the best: (factor, share).
+    """Return, for each way to run, pairs (factor, share): the share of problems solved within a factor of the best way.
 
     Dolan and More, "Benchmarking optimization software with performance profiles", Mathematical Programming 91, 2002.
     """
@@ -222,7 +223,7 @@ def _factor(value: float, best: float) -> float:
 
 @dataclass(frozen=True)
 class Band:
-    """The cost of the best assignment so far over the effort: quartiles over runs, at each of `spent`."""
+    """The cost of the best assignment so far over the effort: quartiles over all runs, at each value in `spent`."""
 
     spent: tuple[float, ...]
     low: tuple[float, ...]
@@ -232,13 +233,13 @@ class Band:
 
 _POINTS = 200
 SPENT: Mapping[str, int] = MappingProxyType({"messages": 0, "ncccs": 1, "cycles": 2, "simulated_s": 2})
-"""The measures of effort, and their places in a point of a curve; the time is in the run's unit."""
+"""The measures of effort, with their indices in a point of a curve. The third is the time, in the run's unit."""
 
 
 def cost_bands(rows: Rows, spent: str) -> dict[str, Band]:
-    """Return for each way to run the cost of its best assignment over `spent`, one of `SPENT`.
+    """Return, for each way to run, the cost of its best assignment over the effort `spent`, a key of `SPENT`.
 
-    Bands start where all runs of the way have an assignment. Runs that do not count `spent` are left out.
+    A band starts where all runs of the way have an assignment. Runs that do not count `spent` are left out.
     """
     bands = {}
     for way in labels(rows):
@@ -264,6 +265,6 @@ def _band(curves: Sequence[Sequence[tuple[float, float]]]) -> Band:
 
 
 def _at(curve: Sequence[tuple[float, float]], spent: Any) -> list[float]:  # noqa: ANN401 - an array of floats
-    """Return the cost of the last point before each of `spent`."""
+    """Return the cost at the last point before each value in `spent`."""
     places = np.searchsorted([point[0] for point in curve], spent, side="right") - 1
     return [curve[max(0, int(place))][1] for place in places]

@@ -1,8 +1,8 @@
-"""The results of a study: one SQLite file with a row for each run. docs/guides/experiments.md describes the columns.
+"""Stores the results of a study in a SQLite file, one row per run. docs/guides/experiments.md describes the columns.
 
-The table `runs` contains every finished run, by its unique key. The table `plan` contains the runs of the study,
-in its order; the view `results` joins both. So after a change or an interruption only missing runs are executed, and
-the results are the same as in one uninterrupted study.
+The table `runs` contains every finished run by its unique key. The table `plan` contains the runs of the study in the
+study's order; the view `results` joins both. So after a change or an interruption only missing runs are executed, and
+the results are the same as those of an uninterrupted study.
 """
 
 from __future__ import annotations
@@ -27,19 +27,19 @@ from robochoc.system.plain_text import on_one_line
 
 
 class StudyInUseError(RobochocError):
-    """Another process runs this study."""
+    """Another process is running this study."""
 
 
 class Store:
-    """The file of a study's results, opened for writing by at most one process.
+    """The file with a study's results, opened for writing by at most one process.
 
     Args:
-        path: The file, created if it does not exist. None: results are stored in memory.
+        path: The file, which is created if it does not exist. None: results are stored in memory.
 
     Raises:
-        InvalidInputError: if it is a foreign file.
-        StudyInUseError: if another process writes to it.
-        OSError: if it cannot be created.
+        InvalidInputError: if the file was written by another program.
+        StudyInUseError: if another process writes to the file.
+        OSError: if the file cannot be created.
     """
 
     def __init__(self, path: Path | None) -> None:
@@ -49,7 +49,7 @@ class Store:
             self._database = sqlite3.connect(":memory:")
             make_tables(self._database)
             return
-        # Closed after the database, as closing any descriptor of a file releases SQLite's locks on it.
+        # Closed after the database, since closing any descriptor of a file releases SQLite's locks on the file.
         self._lock = os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o644)
         try:
             try:
@@ -74,12 +74,12 @@ class Store:
             os.close(self._lock)
 
     def start(self, study: Study, plan: Mapping[str, Task], again: Collection[Status] = ()) -> set[str]:
-        """Set the plan, and return the keys of the stored runs.
+        """Store the plan, and return the keys of the stored runs.
 
         Args:
             study: The study.
-            plan: Its runs.
-            again: The statuses of runs to repeat, besides those that are always repeated.
+            plan: The study's runs.
+            again: The statuses of runs to repeat, in addition to those that are always repeated.
         """
         rows = [_planned(place, key, task) for place, (key, task) in enumerate(plan.items(), 1)]
         with self._writing() as writing:
@@ -95,7 +95,7 @@ class Store:
         return {key for (key,) in self._database.execute("SELECT key FROM runs")}
 
     def add(self, rows: Iterable[tuple[str, Row]]) -> None:
-        """Write the rows of runs, by their keys. Existing rows are not changed."""
+        """Write rows of runs with their keys. Existing rows are not changed."""
         marks = ", ".join("?" * (1 + len(COLUMNS)))
         several = list(rows)
         journals = [(key, row.journal) for key, row in several if row.journal]
@@ -108,7 +108,7 @@ class Store:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """Commit all statements of the context, or none. Raises `InvalidInputError` if that is not possible."""
+        """Commit all statements in the context, or none. Raises `InvalidInputError` if that is not possible."""
         try:
             with self._database as writing:
                 yield writing
@@ -116,12 +116,12 @@ class Store:
             raise invalid(self._path or Path("results"), f"cannot be written to: {error}") from None
 
     def mark_stopped(self, why: str) -> None:
-        """Store the reason why the study was stopped."""
+        """Store the reason for stopping the study."""
         with self._writing() as writing:
             writing.execute("UPDATE study SET stopped = ?", (why,))
 
     def check_place(self) -> None:
-        """Raise `InvalidInputError` if the file was removed meanwhile."""
+        """Raise `InvalidInputError` if the file has been removed."""
         if self._path is not None and not self._path.exists():
             raise invalid(self._path, "was removed while it was written to; its results are lost", "run it again")
 
@@ -129,7 +129,7 @@ class Store:
         """Return the results so far.
 
         Raises:
-            InvalidInputError: if another program has written into the file.
+            InvalidInputError: if another program has modified the file.
         """
         try:
             return results_of(self._database)

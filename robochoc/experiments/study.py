@@ -1,4 +1,4 @@
-"""A study's file: problems, protocols and limits. docs/guides/experiments.md describes it.
+"""The file of a study: problems, protocols and limits. docs/guides/experiments.md describes it.
 
     [problems]
     family = "random"
@@ -11,7 +11,7 @@
     [runs]
     protocol = ["abt", "afc-ng", "dynabt", "awc"]
 
-A list, or a range as in `study_file.py`, means each of its values; several lists mean all combinations.
+A list, or a range as in `study_file.py`, means each of its values. Several lists mean all combinations of their values.
 """
 
 from __future__ import annotations
@@ -32,25 +32,25 @@ from robochoc.formats.toml import convert, toml_tables
 from robochoc.run.options import Runtime
 
 LARGEST_FILE = 2**20
-"""The largest study's file, in bytes."""
+"""The maximum size of a study's file, in bytes."""
 _TOP = ("title", "problems", "runs", "limits", "repeat", "record", "report")
 MOST_REPETITIONS = 1000
 MOST_MEMORY_MB = 2**30
 WIDTH = 4.6
-"""The default width of figures in inches: one column of a paper, and a little more."""
+"""The default width of figures in inches: a little more than one column of a paper."""
 
 
 class ReportSettings(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The settings of a report: the table `[report]`.
+    """The settings for a report, from the table `[report]`.
 
     Attributes:
-        over: The parameter over which figures are drawn. None: the first one with several values.
-        each: The parameter of problems with separate tables and figures for each of its values. None: all problems are
-            in the same ones.
-        metrics: The metrics to draw. Empty: the usual ones in the results.
+        over: The parameter on the x-axis of figures. None: the first one with several values.
+        each: A parameter of problems: each of its values has separate tables and figures. None: all problems share the
+            same tables and figures.
+        metrics: The metrics to draw. Empty: the usual metrics that the results have.
         text: The introduction above the figures.
-        width: The width of figures, in inches.
-        names: Names of ways to run in figures and tables, by labels or words in labels.
+        width: The width of figures in inches.
+        names: The names of ways to run in figures and tables, by label or by a word in labels.
     """
 
     over: str | None = None
@@ -65,14 +65,14 @@ class Study(msgspec.Struct, frozen=True, kw_only=True):
     """A study.
 
     Attributes:
-        name: The name of its file, without the ending.
+        name: The name of the study's file, without the extension.
         title: The title.
-        text: The content of its file.
-        problems: The problems, in the file's order.
-        setups: The protocols with their options, each with the seeds of its runs and its limits.
+        text: The content of the study's file.
+        problems: The problems, in the order of the file.
+        setups: The protocols with their options, each with the seeds and limits of its runs.
         repeat: The number of repetitions of each run.
-        record: The recordings besides counts.
-        report: The settings of a report.
+        record: The data recorded in addition to counts.
+        report: The settings for a report.
     """
 
     name: str
@@ -89,7 +89,7 @@ def read_study(path: Path) -> Study:
     """Return the study in the TOML file at `path`.
 
     Raises:
-        InvalidInputError: with the line, if the file is invalid.
+        InvalidInputError: if the file is invalid. The error contains the line.
     """
     text = _text(path)
     try:
@@ -102,7 +102,7 @@ def read_study(path: Path) -> Study:
 
 
 def study_of_tables(name: str, tables: Mapping[str, Any]) -> Study:
-    """Return the study that `tables` describe, without a file; `text` is the content of an equal file.
+    """Return the study described by `tables`, without a file. Its `text` is the content of an equivalent file.
 
     Raises:
         InvalidInputError: if the tables are invalid.
@@ -112,7 +112,7 @@ def study_of_tables(name: str, tables: Mapping[str, Any]) -> Study:
 
 
 def toml_of(tables: Mapping[str, Any]) -> str:
-    """Return plain values, and then tables, as TOML. JSON's numbers, words and lists are valid TOML."""
+    """Return plain values, followed by tables, as TOML. JSON's numbers, strings and lists are valid TOML."""
     parts = []
     for name, table in tables.items():
         if not isinstance(table, Mapping):
@@ -130,7 +130,7 @@ def _toml(value: object) -> str:
 
 
 def study_of(tables: Mapping[str, Any], place: Place) -> Study:
-    """Return the study that `tables` describe. Raises `InvalidInputError`."""
+    """Return the study described by `tables`. Raises `InvalidInputError`."""
     place.check_keys(tables, _TOP)
     limits = _convert(tables.get("limits", {}), Limits, place.below("limits"))
     problems = [one for table, at in _tables(tables, "problems", place) for one in problems_of(table, at)]
@@ -158,7 +158,7 @@ def study_of(tables: Mapping[str, Any], place: Place) -> Study:
 
 
 def _tables(tables: Mapping[str, Any], name: str, place: Place) -> Iterator[tuple[Mapping[str, Any], Place]]:
-    """Yield the tables `[name]` or `[[name]]`, each with its place."""
+    """Yield the tables `[name]` or `[[name]]`, each with its place in the file."""
     keys = PROBLEM_KEYS if name == "problems" else RUN_KEYS
     found = tables.get(name)
     several = found if isinstance(found, list) else [found] if found is not None else []
@@ -184,7 +184,7 @@ def _convert(table: object, kind: Any, place: Place) -> Any:  # noqa: ANN401 - o
 
 
 def _same_labels(named: Sequence[Setup], setups: Sequence[tuple[Setup, tuple[int, ...], Limits]]) -> str:
-    """Return a label of several different ways to run; empty if there is none."""
+    """Return a label that several different ways to run share, or an empty text if there is none."""
     ways: dict[str, Any] = {}
     for one, (setup, _, limits) in zip(named, setups, strict=True):
         way = msgspec.structs.replace(setup, label=""), limits
@@ -196,7 +196,7 @@ def _same_labels(named: Sequence[Setup], setups: Sequence[tuple[Setup, tuple[int
 def _check_report_settings(
     wishes: ReportSettings, problems: Sequence[ProblemSpec], setups: Sequence[Setup], place: Place
 ) -> None:
-    """Raise `InvalidInputError` before the runs for a parameter or a metric that the results will not have."""
+    """Raise `InvalidInputError` for a parameter or metric that the results will not have, before the runs start."""
     of_problems = {name for one in problems for name in (*one.parameters, *(f"scenario_{n}" for n in one.scenario))}
     of_problems |= {f"problem_{name}" for name in of_problems} | {"problems", "team"}
     of_runs = {*OF_RUNS, *(name for one in setups for name in one.settings)}
@@ -248,6 +248,6 @@ def _text(path: Path) -> str:
 
 
 def report_settings(text: str) -> ReportSettings:
-    """Return the report settings in the text of a valid study."""
+    """Return the report settings in the text of a valid study file."""
     table = toml_tables(text).get("report", {}) if text else {}
     return msgspec.convert(table, ReportSettings)

@@ -1,4 +1,4 @@
-"""The tables of a study's file: the lines of keys, and the values of lists and ranges."""
+"""The tables in a study's file: the lines of keys, and the values in lists and ranges."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ HINT = "docs/guides/experiments.md describes the file of a study"
 MAX_INTEGER = 2**53
 """The largest integer that JSON, SQLite and floats represent exactly."""
 MOST_COMBINATIONS = 100_000
-"""The most combinations of a table."""
+"""The maximum number of combinations in a table."""
 MAX_VALUES = 100_000
-"""The most values of a range."""
+"""The maximum number of values in a range."""
 _NUMBER = r"-?\d+(?:\.\d+)?"
 _RANGE = re.compile(rf"({_NUMBER})\.\.({_NUMBER})(?::({_NUMBER}))?", re.ASCII)
 _MAX_LENGTH = 100
@@ -28,13 +28,13 @@ _MAX_LENGTH = 100
 
 @dataclass(frozen=True)
 class Place:
-    """A table of a study's file.
+    """A table in a study's file.
 
     Attributes:
-        path: The file.
-        text: Its content.
-        table: The table's name. Empty: keys before all tables.
-        number: The number of the table among those of the same name, from 0.
+        path: The study's file.
+        text: The content of the file.
+        table: The table's name. Empty: the keys before all tables.
+        number: The index of the table among the tables with the same name, from 0.
     """
 
     path: Path
@@ -43,30 +43,30 @@ class Place:
     number: int = 0
 
     def below(self, table: str, number: int = 0) -> Place:
-        """Return the place of a table."""
+        """Return the place of a table in the same file."""
         return replace(self, table=table, number=number)
 
     def line(self, key: str) -> int:
-        """Return the line of a key, or of its table if the key is empty or not there; 0 if there is none."""
+        """Return the line of a key, or of the table if the key is empty or missing, or 0 if neither exists."""
         return line_of(self.text, self.table, key, self.number)
 
     def mistake(self, key: str, message: str, hint: str = HINT) -> InvalidInputError:
-        """Return the error for an invalid key (empty: for the table)."""
+        """Return the error for an invalid key, or for the table if the key is empty."""
         named = ".".join(filter(None, (self.table, key)))
         text = f"{shortened(named)}: {message}" if named else message
         return invalid_input(self.path, text, hint, self.line(key))
 
     def check_keys(self, table: Mapping[str, Any], known: Collection[str]) -> None:
-        """Raise `InvalidInputError` for a key that is not known."""
+        """Raise `InvalidInputError` for an unknown key."""
         for key in table:
             if key not in known:
                 raise self.mistake(key, "there is no such key", suggestion(key, known, "keys"))
 
     def values(self, key: str, given: object) -> list[Any]:
-        """Return the values of a list, a range or a plain value.
+        """Return the values in a list or range, or a plain value as the only one.
 
         Raises:
-            InvalidInputError: if there are none, or they are not plain values.
+            InvalidInputError: if there are no values, or they are not plain values.
         """
         found: list[Any] = []
         for one in given if isinstance(given, list) else [given]:
@@ -86,7 +86,7 @@ class Place:
         """Yield all combinations of the values in `table`; the last key varies fastest.
 
         Raises:
-            InvalidInputError: if there are too many, or values are invalid.
+            InvalidInputError: if there are too many combinations, or a value is invalid.
         """
         keys = list(table)
         several = [self.values(key, table[key]) for key in keys]
@@ -105,13 +105,13 @@ def _is_plain(value: object) -> bool:
 
 
 def range_of(text: str) -> list[int] | list[float] | None:
-    """Return the numbers of a range, both ends included; None if `text` is not a range.
+    """Return the numbers in a range, including both ends, or None if `text` is not a range.
 
     Args:
-        text: `FIRST..LAST`, or `FIRST..LAST:STEP` (the default is 1). Integers if all written numbers are integers.
+        text: `FIRST..LAST`, or `FIRST..LAST:STEP` (default step: 1). The result has integers if all three are integers.
 
     Raises:
-        ValueError: if it has no value, or too many.
+        ValueError: if the range has no values, or too many.
     """
     found = _RANGE.fullmatch(text) if len(text) <= _MAX_LENGTH else None
     if found is None:

@@ -1,4 +1,4 @@
-"""The table `[problems]` of a study: a family with its parameters, or folders and files."""
+"""The table `[problems]` in a study: a family with its parameters, or folders and files."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ _SCENARIO: Mapping[str, tuple[type, ...]] = {
 }
 _OF_FILES: Mapping[str, tuple[type, ...]] = {"infinity": (int,), "owner": (str,)}
 _HYPHENATED = re.compile(r"\d+-\d+")
-"""A text that resembles a range, but is not one."""
+"""A text that looks like a range but is not one."""
 
 
 MOST_PROBLEMS = 100_000
-"""The most problems of a table."""
+"""The maximum number of problems in a table."""
 
 
 def problems_of(table: Mapping[str, Any], place: Place) -> Iterator[ProblemSpec]:
-    """Yield the problems of a table.
+    """Yield the problems in a table.
 
     Raises:
         InvalidInputError: if the table is invalid.
@@ -130,7 +130,7 @@ def _of_files(paths: object, given: Mapping[str, Any], name: str, place: Place) 
 
 
 def _named(folder: Path, word: str) -> list[Path]:
-    """Return the paths that match a word with or without wildcards; an existing path is used literally."""
+    """Return the paths that match a word, which may contain wildcards. An existing path is used literally."""
     path = folder / word
     if path.exists() or not has_magic(word):
         return [path]

@@ -1,4 +1,4 @@
-"""The table `[runs]` of a study: protocols with their options."""
+"""The table `[runs]` in a study: protocols with their options."""
 
 from __future__ import annotations
 
@@ -31,23 +31,23 @@ _CHOICES: Mapping[str, Sequence[str]] = {
     "order": tuple(dict.fromkeys((GIVEN, *map(str, Order)))),
 }
 MOST_SETUPS = 2000
-"""The most ways to run of a table."""
+"""The maximum number of ways to run in a table."""
 _LABELLED = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "verify")
-"""The options that a label may contain, besides the protocol and its settings."""
+"""The options that a label may contain, in addition to the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
 _WITHIN = ("label", "settings", "seed", *_OWN_LIMITS)
-"""Keys that are not combined here."""
+"""Keys whose values are not combined by `_setups`."""
 
 
 def setups_of(
     table: Mapping[str, Any], limits: Limits, place: Place
 ) -> Iterator[tuple[Setup, tuple[int, ...], Limits]]:
-    """Yield the setups of a table, each with its seeds and its limits.
+    """Yield the setups in a table, each with its seeds and limits.
 
     Args:
         table: The table.
-        limits: The limits of the whole study.
-        place: The place of the table.
+        limits: The limits for the whole study.
+        place: The place of the table in the file.
 
     Raises:
         InvalidInputError: if the table is invalid.
@@ -111,7 +111,7 @@ def _channel(word: object, place: Place) -> ChannelModel:
 
 
 def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
-    """Raise `InvalidInputError` if the options of `setup` cannot be combined for any problem."""
+    """Raise `InvalidInputError` if the options in `setup` cannot be combined for any problem."""
     try:
         refuse_options(options_of(setup, limits))
         if setup.protocol not in {CENTRAL, AUTO}:
@@ -123,7 +123,7 @@ def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
 
 
 def _own_limits(table: Mapping[str, Any], place: Place) -> dict[str, Any]:
-    """Return the limits in a table of runs."""
+    """Return the limits in a table `[runs]`."""
     own = {name: table[name] for name in _OWN_LIMITS if name in table}
     for name, value in own.items():
         kinds = (int, float) if name == "timeout" else (int,)
@@ -133,7 +133,7 @@ def _own_limits(table: Mapping[str, Any], place: Place) -> dict[str, Any]:
 
 
 def _labelled(setups: Sequence[Setup], label: object, place: Place) -> Iterator[Setup]:
-    """Yield the setups of a table, each with a label that contains its differences from the others."""
+    """Yield the setups of a table, each with a label that shows how it differs from the others."""
     if label is not None and (not isinstance(label, str) or len(setups) > 1 or not label.isprintable()):
         raise place.mistake("label", "expected one line of text, in a table with one way to run")
     for one in setups:
@@ -141,10 +141,10 @@ def _labelled(setups: Sequence[Setup], label: object, place: Place) -> Iterator[
 
 
 def distinct(given: Sequence[tuple[Setup, Limits]]) -> list[Setup]:
-    """Return the setups of all tables, with longer labels for different setups with the same label.
+    """Return the setups of all tables. Different setups with the same label are given longer labels.
 
     Args:
-        given: The setups, each with its limits, in which they may differ as well.
+        given: The setups with their limits, which may also differ.
     """
     found: list[Setup] = []
     alike: dict[str, list[tuple[Setup, Limits]]] = {}
@@ -164,7 +164,7 @@ def distinct(given: Sequence[tuple[Setup, Limits]]) -> list[Setup]:
 
 
 def _differences(one: Setup, others: Sequence[Setup]) -> list[str]:
-    """Return words for the differences of a setup from others."""
+    """Return words that describe how a setup differs from others."""
     settings = sorted({name for other in others for name in other.settings})
     differing = [name for name in settings if len({other.settings.get(name) for other in others}) > 1]
     names = [name for name in _LABELLED if any(getattr(other, name) != getattr(one, name) for other in others)]

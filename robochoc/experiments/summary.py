@@ -34,26 +34,26 @@ METRICS: Mapping[str, str] = MappingProxyType(
         "largest": "bytes of the largest message",
     }
 )
-"""The metrics, with their names on an axis."""
+"""The metrics, with their names for an axis."""
 CENSORED = ("messages", "ncccs", "bytes", "checks", "cycles", "simulated_s", "wall_s", "total_s", "cpu_s")
-"""Metrics whose values are lower bounds if a limit has ended a run."""
+"""Metrics whose values are lower bounds if a limit ended the run."""
 OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
-"""Parameters of runs, over which results can also be shown."""
+"""Parameters of runs, which can also be the axis of tables and figures."""
 SINGLE = ("instance", "team")
 """Parameters that identify single problems."""
 MOST_TEAMS = 12
-"""The most problems that have their own lines by default."""
+"""The most problems with separate lines by default."""
 _MOST = {"instance": MOST_TEAMS}
-"""The most values of a parameter over which results are shown by default."""
+"""The most values of a parameter that can be the default axis."""
 SEEDS = ("seed", "problem_seed", "scenario_seed")
-"""Parameters that are drawn at random: they do not belong to a setting."""
+"""Parameters with random seeds, which are not part of a setting."""
 Setting = tuple[tuple[str, Any], ...]
-"""The name and parameters of problems, without seeds."""
+"""The name and parameters of a group of problems, without seeds."""
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
 
 class NoSuchColumnError(RobochocError, ValueError):
-    """The results have no such parameter or metric."""
+    """The results have no parameter or metric with this name."""
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,11 @@ class Sample:
     """The results of one way to run at one value of the parameter.
 
     Attributes:
-        values: The metric of the runs with a verdict, and of those that a limit has ended if it is known.
-        problems: The problem of each value.
-        censored: The number of these runs that a limit has ended.
-        failed: The number of runs without a value: they crashed, were refused, and so on.
-        open_ended: Whether the median is a lower bound: it would be higher without the limit that has ended runs.
+        values: The metric's values in runs with a verdict, and in runs that a limit ended if their value is known.
+        problems: The problem for each value.
+        censored: The number of values from runs that a limit ended.
+        failed: The number of runs without a value, for instance because they crashed or were refused.
+        open_ended: Whether the median is only a lower bound: without the limit that ended runs it would be higher.
     """
 
     values: tuple[float, ...]
@@ -76,12 +76,12 @@ class Sample:
 
     @property
     def median(self) -> float | None:
-        """The median. None: there is no value."""
+        """The median, or None if there are no values."""
         return statistics.median(self.values) if self.values else None
 
 
 def parameters(rows: Rows) -> list[str]:
-    """Return the names of the problems' parameters, in their order."""
+    """Return the names of the problems' parameters in their original order."""
     names: dict[str, None] = {}
     for row in rows:
         for name in row:
@@ -92,15 +92,15 @@ def parameters(rows: Rows) -> list[str]:
 
 
 def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
-    """Return the parameter over which results are shown.
+    """Return the parameter that is the axis of tables and figures.
 
     Args:
         rows: The results.
-        wanted: The requested name. None: the first parameter that all problems have, with several values,
-            except seeds; if there is none, the problems, or the kinds of problems if there are many.
+        wanted: The requested name. None: the first parameter, except seeds, that all problems have and that has several
+            values; if there is none, the problems, or the kinds of problems if there are many problems.
 
     Raises:
-        NoSuchColumnError: if there is no such parameter.
+        NoSuchColumnError: if the results have no such parameter.
     """
     of_problems = parameters(rows)
     known = [*of_problems, "problems", "team", *OF_RUNS, *_settings(rows)]
@@ -120,7 +120,7 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
 
 
 def _parts_labels(rows: Rows, name: str) -> bool:
-    """Return whether each way to run has been run with several values of a parameter of runs."""
+    """Return whether every way to run was run with several values of a parameter of runs."""
     ways: dict[str, set[Any]] = {}
     for row in rows:
         ways.setdefault(_without(row["label"], name, row[name]), set()).add(row[name])
@@ -128,9 +128,9 @@ def _parts_labels(rows: Rows, name: str) -> bool:
 
 
 def by_parameter(rows: Rows, over: str) -> Rows:
-    """Return `rows` for tables and figures over a parameter: a parameter of runs becomes a column.
+    """Return `rows` for tables and figures over `over`: if it is a parameter of runs, it becomes a column.
 
-    It is removed from the labels: `abt delay=20` and `abt delay=50` are both `abt`, over `delay`. The column `case`
+    The parameter is removed from the labels: `abt delay=20` and `abt delay=50` both become `abt`. The column `case`
     distinguishes runs with the same label and problem.
     """
     if over in OF_RUNS:
@@ -154,8 +154,8 @@ class Prepared(NamedTuple):
 
     Attributes:
         over: The parameter on the axis of tables and figures.
-        rows: The results. Problems without a parameter have their name in its place.
-        remarks: Sentences about results that were left out.
+        rows: The results. For a problem without this parameter, its name is the value.
+        remarks: Sentences about results that are left out.
     """
 
     over: str
@@ -172,7 +172,7 @@ def prepare(rows: Rows, over: str | None, names: Mapping[str, str]) -> Prepared:
         names: The names of ways to run; see `named`.
 
     Raises:
-        NoSuchColumnError: as these two.
+        NoSuchColumnError: if the parameter does not exist, or two ways to run would have the same name.
     """
     kept, remarks = without_duplicates(rows, parameters(rows))
     over = parameter_to_draw_over(kept, over)
@@ -182,20 +182,20 @@ def prepare(rows: Rows, over: str | None, names: Mapping[str, str]) -> Prepared:
 
 
 def _way(row: Mapping[str, Any], over: str) -> str:
-    """Return the way to run without the parameter `over`, as different ways may have the same label."""
+    """Return a way to run without the parameter `over`, since different ways may have the same label."""
     settings = {name: value for name, value in row["settings"].items() if name != over}
     return str([row["protocol"], sorted(settings.items()), *(row[name] for name in OF_RUNS if name != over)])
 
 
 def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
-    """Return the parts of the results with separate tables and figures, each with its name.
+    """Return the parts of the results that have separate tables and figures, each with its name.
 
     Args:
         rows: The results.
-        each: The parameter whose values define the parts. None: all results are one part, without a name.
+        each: The parameter whose values define the parts. None: all results are one part without a name.
 
     Raises:
-        NoSuchColumnError: if there is no such parameter.
+        NoSuchColumnError: if the results have no such parameter.
     """
     if each is None:
         return [("", rows)]
@@ -207,7 +207,7 @@ def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
 
 
 def named(rows: Rows, names: Mapping[str, str]) -> Rows:
-    """Return `rows` with ways to run renamed: by a whole label, or by words in it.
+    """Return `rows` with ways to run renamed, by their whole label or by a word in it.
 
     Raises:
         NoSuchColumnError: if two ways to run would have the same name.
@@ -229,12 +229,12 @@ def _without(label: str, name: str, value: object) -> str:
 
 
 def metrics_to_show(rows: Rows, wanted: Sequence[str] = (), over: str = "") -> list[str]:
-    """Return the metrics to show: the wanted ones, or the usual ones that the results have.
+    """Return the metrics to show: the wanted ones, or by default the usual metrics that the results have.
 
-    The parameter `over` is not among them, as `cycles` is also a setting of local searches.
+    The parameter `over` is left out, since `cycles`, for instance, is also a setting of local search protocols.
 
     Raises:
-        NoSuchColumnError: if there is no such metric.
+        NoSuchColumnError: if the results have no such metric.
     """
     for name in wanted:
         if name not in METRICS:
@@ -248,12 +248,12 @@ def metrics_to_show(rows: Rows, wanted: Sequence[str] = (), over: str = "") -> l
 
 
 def labels(rows: Rows) -> list[str]:
-    """Return the ways to run, in the order of the study."""
+    """Return the labels of the ways to run, in the order of the study."""
     return list(dict.fromkeys(str(row["label"]) for row in rows))
 
 
 def values_of(rows: Rows, name: str) -> list[Any]:
-    """Return the values of a parameter: numbers ascending, problems sorted by name, others in their order."""
+    """Return the values of a parameter: numbers ascending, problems by name, others in the original order."""
     found = list(dict.fromkeys(row.get(name) for row in rows))
     if name in SINGLE:
         return sorted(found, key=lambda value: natural_key(str(value)))
@@ -262,7 +262,7 @@ def values_of(rows: Rows, name: str) -> list[Any]:
 
 
 def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]:
-    """Return the sample of each way to run, by the value of the parameter `over` and its label."""
+    """Return the sample for each value of the parameter `over` and each way to run."""
     groups: dict[tuple[Any, str], list[Mapping[str, Any]]] = {}
     for row in rows:
         groups.setdefault((row.get(over), str(row["label"])), []).append(row)
@@ -270,7 +270,7 @@ def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]
 
 
 def sample(rows: Rows, metric: str) -> Sample:
-    """Return the sample of a metric in `rows`."""
+    """Return the sample of a metric's values in `rows`."""
     counted = [row for row in rows if _counts(row, metric)]
     cut = [metric in CENSORED and row["status"] == Status.LIMIT for row in counted]
     values, problems = tuple(float(row[metric]) for row in counted), tuple(str(row["digest"]) for row in counted)
@@ -284,13 +284,13 @@ def _counts(row: Mapping[str, Any], metric: str) -> bool:
 
 
 Table = tuple[list[str], list[list[str]]]
-"""The headings of a table, and its lines."""
+"""The headings and the lines of a table."""
 
 
 def medians(rows: Rows, metric: str, over: str) -> Table:
-    """Return the medians of a metric: a line for each value of the parameter `over`, a column for each way to run.
+    """Return a metric's medians: a line for each value of the parameter `over`, a column for each way to run.
 
-    Over single problems there is a line for all together, too.
+    If the lines are single problems, a further line summarises all problems.
     """
     found = samples(rows, metric, over)
     ways = labels(rows)
@@ -301,7 +301,7 @@ def medians(rows: Rows, metric: str, over: str) -> Table:
 
 
 def reached(rows: Rows, over: str) -> Table:
-    """Return the numbers of runs that reached the best known cost of their problem, out of all runs."""
+    """Return how many runs, out of all runs, reached the best known cost of their problem."""
     best: dict[str, float] = {}
     for row in rows:
         if _counts(row, "cost"):
@@ -322,7 +322,7 @@ def _share(found: Sequence[bool]) -> str:
 
 
 def endings(rows: Rows) -> Table:
-    """Return the verdicts of runs, or the statuses of those without one: a line for each way to run."""
+    """Return the verdicts of runs, or the statuses of runs without a verdict: a line for each way to run."""
     kinds = Counter(_ending(row) for row in rows)
     by_way: dict[str, Counter[str]] = {way: Counter() for way in labels(rows)}
     for row in rows:
@@ -332,7 +332,7 @@ def endings(rows: Rows) -> Table:
 
 
 def solved(rows: Rows, over: str) -> Table:
-    """Return the numbers of problems with and without a solution, as far as known, over a parameter."""
+    """Return the numbers of problems with and without a solution, as far as known, for each value of a parameter."""
     found: dict[Any, dict[str, set[str]]] = {}
     for row in rows:
         kinds = found.setdefault(row.get(over), {kind: set() for kind in ("problems", "with", "without")})
@@ -348,14 +348,14 @@ def _ending(row: Mapping[str, Any]) -> str:
 
 
 def cell(one: Sample | None) -> str:
-    """Return the text of a sample in a table: its median, with a sign if it is a lower bound."""
+    """Return the text for a sample in a table: the median, with a sign if it is only a lower bound."""
     if one is None or one.median is None:
         return "-"
     return f"{'>= ' * one.open_ended}{number(one.median)}"
 
 
 def number(value: float) -> str:
-    """Return a number with about four digits."""
+    """Return a number as text with about four digits."""
     if not math.isfinite(value):
         return str(value)
     if value == int(value) or abs(value) >= 1000:  # noqa: PLR2004 - digits before the point suffice
@@ -366,10 +366,10 @@ def number(value: float) -> str:
 def without_duplicates(
     rows: Sequence[Mapping[str, Any]], parameters: Sequence[str]
 ) -> tuple[list[Mapping[str, Any]], list[str]]:
-    """Return the results of the first of all settings with the same problems, and a sentence about the others.
+    """Return the results without settings that repeat an earlier setting's problems, and sentences about these.
 
     Two settings are the same if they have the same problem for each seed. Different seeds of one setting may well have
-    the same problem: small problems are often drawn twice.
+    the same problem, since small problems are often generated twice.
 
     Args:
         rows: The results of a study.
@@ -391,13 +391,13 @@ def without_duplicates(
 
 
 def _setting(row: Mapping[str, Any], parameters: Sequence[str]) -> Setting:
-    """Return the problems' name and parameters, without the seeds."""
+    """Return the name and parameters of a row's group of problems, without seeds."""
     given = tuple((name, row.get(name)) for name in parameters if name not in SEEDS)
     return (("problems", row.get("problems")), *given)
 
 
 def _sentence(settings: Sequence[Setting]) -> str:
-    """Return a sentence about settings with the same problems."""
+    """Return a sentence about settings that have the same problems."""
     several = [name for place, (name, _) in enumerate(settings[0]) if len({one[place] for one in settings}) > 1]
     words = [", ".join(f"{name} {value}" for name, value in one if name in several) for one in settings]
     return f"{listed(words)} generate the same problems: they are counted once, as {words[0]}."

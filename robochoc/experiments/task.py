@@ -1,4 +1,4 @@
-"""One run of a study and its row: plain data, sent to workers and back as JSON."""
+"""One run of a study, and its result row: plain data that is sent to workers and back as JSON."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from robochoc.run.options import Options, Runtime, ScheduleName
 
 Parameter = str | int | float | bool
 Content = bytes
-"""An alias, as `bytes` is a count in a row."""
+"""An alias for `bytes`, which is also the name of a count in a row."""
 GIVEN = "given"
-"""The priority order of the files."""
+"""The priority order given by the files."""
 _KEY_BYTES = 16
 KEY = re.compile(f"[0-9a-f]{{{2 * _KEY_BYTES}}}")
 """The pattern of a run's key."""
 
 
 class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
-    """A problem: of a family, or from files.
+    """A problem, generated from a family or read from files.
 
     Attributes:
         group: The study's name for the group of problems.
-        family: The family of generated problems. Empty: the problem is in files.
-        parameters: The family's parameters, or options of reading the files.
-        path: The team's folder or file, if it is in files.
-        digest: The digest of the files' content. Two problems with the same content are the same problem.
-        scenario: The parameters of a random scenario. Empty: there is none.
+        family: The family of generated problems. Empty: the problem is read from files.
+        parameters: The family's parameters, or options for reading the files.
+        path: The team's folder or file, if the problem is read from files.
+        digest: The digest of the files' content. Problems with the same content are the same problem.
+        scenario: The parameters of a random scenario. Empty: there is no scenario.
     """
 
     group: str = ""
@@ -45,15 +45,15 @@ class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
 
     @property
     def identity(self) -> str:
-        """The identity of the problem, independent of its name and the place of its files."""
+        """The identity of the problem, which does not depend on its name or on the path of its files."""
         identity = msgspec.structs.replace(self, group="", path="" if self.digest else self.path)
         return msgspec.json.encode(identity, order="deterministic").decode()
 
 
 class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
-    """A protocol with its options. Attributes are as in `robochoc.run.options.Options`.
+    """A protocol with its options. The attributes have the meaning of those in `robochoc.run.options.Options`.
 
-    `label` is its name in tables and figures.
+    `label` is the setup's name in tables and figures.
     """
 
     label: str = ""
@@ -73,11 +73,11 @@ class Limits(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tr
     """The limits of one run.
 
     Attributes:
-        timeout: Seconds for the run, its set-up included. None: no limit.
-        messages: The number of messages. None: no limit.
-        ncccs: Non-concurrent constraint checks, in the simulator. None: no limit.
-        cycles: Cycles, with the schedule `cycles`. None: no limit.
-        memory_mb: Megabytes of the process that solves. None: no limit.
+        timeout: The maximum number of seconds for the run, including its set-up. None: no limit.
+        messages: The maximum number of messages. None: no limit.
+        ncccs: The maximum number of non-concurrent constraint checks, in the simulator. None: no limit.
+        cycles: The maximum number of cycles, with the schedule `cycles`. None: no limit.
+        memory_mb: The maximum memory of the solving process, in megabytes. None: no limit.
     """
 
     timeout: float | None = None
@@ -117,8 +117,8 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
         setup: The protocol with its options.
         seed: The run's seed.
         limits: The run's limits.
-        repetition: The number of the repetition, from 1.
-        record: The recordings besides counts; see `Recording`.
+        repetition: The number of this repetition, from 1.
+        record: The data recorded in addition to counts; see `Recording`.
     """
 
     problem: ProblemSpec
@@ -130,7 +130,7 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
 
     @property
     def key(self) -> str:
-        """The digest of everything that determines the run; labels and places of files do not."""
+        """The digest of everything that determines the run. Labels and the paths of files are not included."""
         plain = msgspec.structs.replace(self, setup=msgspec.structs.replace(self.setup, label=""))
         content = msgspec.json.encode(
             [self.problem.identity, msgspec.structs.replace(plain, problem=_NOWHERE)], order="deterministic"
@@ -139,7 +139,7 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
 
     @property
     def is_timed(self) -> bool:
-        """Whether robots have processes: then nothing else should run on the machine."""
+        """Whether robots run as processes, so that nothing else should run on the machine."""
         return self.setup.runtime not in {Runtime.SIMULATOR, Runtime.ARRAYS}
 
 
@@ -147,7 +147,7 @@ _NOWHERE = ProblemSpec()
 
 
 class Recording(StrEnum):
-    """The recordings besides the counts of the whole run."""
+    """The data recorded in addition to the counts for the whole run."""
 
     COST_OVER_TIME = "cost-over-time"
     ROBOTS = "robots"
@@ -157,10 +157,10 @@ class Recording(StrEnum):
 class Status(StrEnum):
     """The status of a finished run.
 
-    `DONE`: it has a verdict. `LIMIT`: a limit was reached before. `ENDED`: an incomplete protocol has ended without a
-    valid answer. `REFUSED`: problem, protocol and options cannot be combined. `INVALID`: the problem is invalid.
-    `LOST`: robots were lost. `REFUTED`: the checker refutes the answer. `MEMORY`: there was not enough memory.
-    `CRASHED`: the solving process has ended. `ERROR`: any other error.
+    `DONE`: the run has a verdict. `LIMIT`: a limit was reached before a verdict. `ENDED`: an incomplete protocol ended
+    without a valid answer. `REFUSED`: problem, protocol and options cannot be combined. `INVALID`: the problem is
+    invalid. `LOST`: robots were lost. `REFUTED`: the checker found the answer wrong. `MEMORY`: there was not enough
+    memory. `CRASHED`: the solving process ended unexpectedly. `ERROR`: any other error.
     """
 
     DONE = "done"
@@ -176,13 +176,13 @@ class Status(StrEnum):
 
 
 class CostPoint(msgspec.Struct, frozen=True, array_like=True):
-    """A moment at which the team's assignment became cheaper than ever before.
+    """A point at which the team's assignment became cheaper than ever before.
 
     Attributes:
-        messages: Messages sent until then.
+        messages: The number of messages sent until then.
         ncccs: The highest NCCC clock until then.
-        time: Seconds since the start; in the simulator steps, with a channel model simulated seconds.
-        cost: The cost, as text, in the user's numbers.
+        time: The time since the start: seconds, or steps in the simulator, or simulated seconds with a channel model.
+        cost: The cost as text, in the user's numbers.
     """
 
     messages: int
@@ -192,7 +192,7 @@ class CostPoint(msgspec.Struct, frozen=True, array_like=True):
 
 
 class RobotLoad(msgspec.Struct, frozen=True, array_like=True):
-    """The load of one robot: messages and bytes sent."""
+    """The load of one robot: the messages and bytes that it sent."""
 
     robot: str
     messages: int
@@ -200,34 +200,34 @@ class RobotLoad(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
-    """What came of a run. Counts are as in `robochoc.model.outcome.Metrics`; None where there is no answer.
+    """The result of a run. Counts are as in `robochoc.model.outcome.Metrics`, and None if there is no answer.
 
     Attributes:
-        status: How the run has ended.
-        reason: Why, where it has no verdict.
+        status: The status of the finished run.
+        reason: The reason for a missing verdict.
         team: The name of the team.
-        digest: Of the problem as it was solved.
+        digest: The digest of the problem as it was solved.
         robots: The number of robots.
         variables: The number of variables.
         constraints: The number of constraints.
         verdict: The verdict.
-        cost: The cost in the user's numbers, exactly, as text.
-        bound: A lower bound of it, where one is known.
+        cost: The exact cost as text, in the user's numbers.
+        bound: A lower bound on the cost, if known.
         maximises: Whether the cost is a utility.
         withdrawn: The number of withdrawn robots.
         verified: Whether the checker has checked the answer.
-        confirmed: Whether a central solver has found the same.
-        messages: Messages sent.
-        messages_by_type: The same, by type.
-        total_s: Seconds of the whole run, checks and set-up included.
-        cpu_s: Seconds of the processor, in the simulator.
-        cost_over_time: With `COST_OVER_TIME`.
-        loads: With `ROBOTS`.
-        journal: With `JOURNAL`: the content of the run's journal.
-        removed: With `preprocess`: how many values were removed before the protocol.
-        removing_messages: The messages that it took, which `messages` does not count.
-        removing_ncccs: The same for NCCCs.
-        machine: Where it ran: host, processor, Python.
+        confirmed: Whether a central solver has found the same answer.
+        messages: The number of messages sent.
+        messages_by_type: The number of messages of each type.
+        total_s: The seconds for the whole run, including checks and set-up.
+        cpu_s: The seconds of processor time, in the simulator.
+        cost_over_time: The improvements of the cost, if `COST_OVER_TIME` is recorded.
+        loads: The load of each robot, if `ROBOTS` is recorded.
+        journal: The content of the run's journal, if `JOURNAL` is recorded.
+        removed: With `preprocess`: the number of values removed before the protocol started.
+        removing_messages: With `preprocess`: the messages for removing values, which `messages` does not include.
+        removing_ncccs: With `preprocess`: the NCCCs for removing values.
+        machine: The machine on which the run took place: its name, processors and Python version.
         version: The version of robochoc.
     """
 

@@ -1,7 +1,7 @@
-"""A worker of this machine: reads tasks from a socket, and writes their rows to it, until the socket is closed.
+"""A worker on this machine: reads tasks from a socket, and writes their rows to it, until the socket is closed.
 
-It is a separate program, `python -m robochoc.experiments.worker DESCRIPTOR PARENT MEMORY_MB`, so that a crash of a task
-ends only this process.
+The worker is a separate program, `python -m robochoc.experiments.worker DESCRIPTOR PARENT MEMORY_MB`, so that a task
+that crashes ends only this process.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def main(descriptor: int, parent: int, memory_mb: int) -> None:
     Args:
         descriptor: The descriptor of the socket.
         parent: The id of the parent process.
-        memory_mb: The limit on memory; 0: none.
+        memory_mb: The limit on memory in megabytes. 0: no limit.
     """
     leave_ctrl_c_to_the_parent()
     signal_when_orphaned(signal.SIGKILL)

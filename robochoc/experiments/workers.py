@@ -1,4 +1,4 @@
-"""The workers of this machine: processes that execute the runs of a study."""
+"""The workers on this machine: processes that execute the runs of a study."""
 
 from __future__ import annotations
 
@@ -22,16 +22,16 @@ from robochoc.experiments.task import Row, Status, Task
 from robochoc.system.signals import signals_delayed
 
 SETUP_S = 60.0
-"""Seconds beyond its limit, for reading, compiling and ending, after which a run's worker is killed."""
+"""The seconds beyond a run's time limit, for reading, compiling and ending, after which its worker is killed."""
 LEAVING_S = 5.0
-"""Seconds in which a worker without a task may end by itself."""
+"""The seconds in which a worker without a task may end by itself."""
 _CHUNK = 1 << 16
 
 
 class LocalWorkers:
-    """Processes of this machine. Each has one bundle of tasks at a time: those of one problem.
+    """Processes on this machine. Each has one bundle of tasks at a time, whose tasks are runs on the same problem.
 
-    If a worker dies, or does not finish, its present task is lost; other workers continue with the rest.
+    If a worker dies or does not finish in time, its current task is lost; other workers continue with the rest.
     """
 
     def __init__(self, count: int, memory_mb: int | None = None) -> None:
@@ -58,7 +58,7 @@ class LocalWorkers:
         return [worker.pid for worker in self._workers]
 
     def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
-        """Yield the rows of all tasks, as soon as they are finished."""
+        """Yield the row of each task as soon as the task is finished."""
         waiting = deque(deque(bundle) for bundle in bundles)
         while waiting or any(worker.tasks for worker in self._workers):
             self._hand_out(waiting)
@@ -70,7 +70,7 @@ class LocalWorkers:
                 yield task, _late(task)
 
     def _hand_out(self, waiting: deque[deque[Task]]) -> None:
-        """Give each idle worker a bundle; start workers up to the allowed number."""
+        """Give each idle worker a bundle, and start workers up to the allowed number."""
         while waiting and len(self._workers) < self._count:
             worker = _Worker(self._memory_mb)
             self._workers.append(worker)
@@ -91,7 +91,7 @@ class LocalWorkers:
         for content in worker.frames.feed(received):
             row = msgspec.json.decode(content, type=Row)
             task = worker.tasks.popleft()
-            if row.status == Status.MEMORY:  # the worker ends after this row
+            if row.status == Status.MEMORY:  # the worker ends itself after this row
                 self._replace(worker, waiting)
             else:
                 worker.next()
@@ -102,7 +102,7 @@ class LocalWorkers:
             self._replace(worker, waiting)
 
     def _replace(self, worker: _Worker, waiting: deque[deque[Task]], *, busy: bool = False) -> None:
-        """End a worker, and return its remaining tasks to the queue."""
+        """End a worker, and put its remaining tasks back into the queue."""
         if worker.tasks:
             waiting.appendleft(worker.tasks)
         self._selector.unregister(worker.connection)
@@ -111,7 +111,7 @@ class LocalWorkers:
 
 
 class _Worker:
-    """One process, its tasks, and the deadline of the first of them."""
+    """One process, its tasks, and the deadline for the first task."""
 
     def __init__(self, memory_mb: int | None) -> None:
         self.connection, theirs = socket.socketpair()
@@ -137,7 +137,7 @@ class _Worker:
         return self._process.pid
 
     def give(self, tasks: deque[Task]) -> None:
-        """Give it a bundle; each task is sent after the row of the previous one."""
+        """Give the worker a bundle. Each task is sent when the row of the previous task has arrived."""
         self.tasks = tasks
         self.next()
 
@@ -148,16 +148,16 @@ class _Worker:
             return
         limit_s = self.tasks[0].limits.timeout
         self.deadline = None if limit_s is None else time.monotonic() + limit_s + SETUP_S
-        with suppress(OSError):  # it has ended after its last row, which the socket shows
+        with suppress(OSError):  # the worker ended after its last row, as its closed socket will show
             write_frame(self.connection, msgspec.json.encode(self.tasks[0]))
 
     @property
     def is_late(self) -> bool:
-        """Whether its task has taken too long."""
+        """Whether the current task has taken too long."""
         return self.deadline is not None and time.monotonic() > self.deadline
 
     def exit_reason(self) -> str:
-        """Return the reason why there is no row."""
+        """Return the reason why there is no row for the current task."""
         status = self._process.wait()
         if status < 0:
             hint = "; perhaps there was not enough memory" if status == -signal.SIGKILL else ""
@@ -165,7 +165,7 @@ class _Worker:
         return f"the process ended with status {status}"
 
     def end(self, *, busy: bool) -> None:
-        """End the process: let it end by itself, with its solver, unless it is `busy`."""
+        """End the process. Unless it is `busy`, let it end by itself, together with its solver."""
         self.connection.close()
         if not busy:
             with suppress(subprocess.TimeoutExpired):

@@ -135,7 +135,7 @@ class Solvable(ABC):
         Raises:
             UnsupportedError: if problem, protocol, runtime and options cannot be combined.
             RobotsLostError: if robots were lost, and the options do not allow the run to continue without them.
-            RefutedError: if the check of the answer fails.
+            RefutedError: if the checker finds the answer wrong.
             OptionError: if an option is unknown, or its value is not allowed.
 
         Example:

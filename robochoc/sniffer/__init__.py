@@ -1,1 +1,1 @@
-"""The sniffer: conversations between robots, to be watched, inspected and saved (the paper's Figure 7)."""
+"""The sniffer: shows, inspects and saves the conversations between robots (the paper's Figure 7)."""

@@ -1,4 +1,4 @@
-r"""FIPA ACL messages (FIPA00061), and their form as text (FIPA00070).
+r"""FIPA ACL messages (FIPA00061), and their text form (FIPA00070).
 
 >>> from robochoc.protocols.acts import Performative
 >>> from robochoc.services.identifier import AgentIdentifier
@@ -32,14 +32,14 @@ from robochoc.services.symbolic import (
 from robochoc.system.errors import RobochocError
 
 CAPS = Caps(characters=1 << 25, expressions=10_000, depth=16)
-"""Limits of a message. The largest message of a protocol, a part of a `dpop` table, has 16 MiB (22 MiB as text)."""
+"""The limits on a message. The largest message of a protocol, a part of a `dpop` table, has 16 MiB (22 MiB as text)."""
 
 _DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
 _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
 
 
 class ACLError(RobochocError, ValueError):
-    """An invalid text or message. `at`: the position of the error in the text; None: not known."""
+    """An invalid text or message. `at`: the position of the error in the text; None: unknown."""
 
     def __init__(self, message: str, at: int | None = None) -> None:
         super().__init__(message if at is None else f"character {at}: {message}")
@@ -47,10 +47,10 @@ class ACLError(RobochocError, ValueError):
 
 
 class ACLMessage(msgspec.Struct, frozen=True):
-    """The thirteen parameters of FIPA00061, under its names, and user-defined ones (`user`); None: not given.
+    """A message with the thirteen parameters of FIPA00061, and user-defined ones (`user`). None: not given.
 
-    `reply_by` is a DateTime of FIPA00008: `20260131T120000000Z`, or with a `+` the time from now. Names in `user` begin
-    with `x-` and are in lower case.
+    `reply_by` is a DateTime of FIPA00008: `20260131T120000000Z`, or with a `+`, the time from now. Names in `user`
+    begin with `x-` and are in lower case.
 
     Raises:
         ValueError: if `reply_by` or a name in `user` does not have this form.
@@ -86,7 +86,7 @@ _KNOWN = {"sender", "receiver", "reply-to", *_TEXTS, "reply-by"}
 
 
 def text(message: ACLMessage) -> str:
-    """Return the message in the form of FIPA00070, on one line except within strings; omit missing parameters."""
+    """Return the message in the form of FIPA00070, without missing parameters. Only strings can contain line breaks."""
     items: list[Expression] = []
     if message.sender is not None:
         items += [Word(":sender"), expression_of(message.sender)]
@@ -105,9 +105,9 @@ def text(message: ACLMessage) -> str:
 
 
 def parse(message: str) -> ACLMessage:
-    """Return the message of a text in the form of FIPA00070.
+    """Return the message in a text in the form of FIPA00070.
 
-    Where FIPA00070 allows any expression as a value, only words and strings are accepted.
+    As values, only words and strings are accepted, although FIPA00070 allows other expressions for some parameters.
 
     Raises:
         ACLError: if the text has any other form.
@@ -150,7 +150,7 @@ def _message(whole: Expression) -> ACLMessage:
 
 
 def _parameters(whole: Expression, act: str) -> dict[str, Expression]:
-    """Return the parameters of a message by name. Raise `SymbolicExpressionError` for an unknown parameter."""
+    """Return a message's parameters by name. Raises `SymbolicExpressionError` for an unknown parameter."""
     found = parameters(items_of(whole, (act,), "a message"), "the message")
     for key, value in found.items():
         if key not in _KNOWN and not key.startswith("x-"):

@@ -1,12 +1,12 @@
-"""The messages of a run in FIPA ACL: each envelope has an ACL message with all its content.
+"""Converts the messages of a run to FIPA ACL: each envelope becomes an ACL message with all its content.
 
-The content is JSON, an array of the message's type and its fields by name: `["Ok",{"value":[3]}]`. A value without a
-JSON form is an object with one member: `{"base64":"..."}` for bytes, `{"float":"inf"}` for a number, or
-`{"map":[...]}` for pairs of key and value. A content that JSON cannot represent exactly, or not within `MAX_JSON`
-characters, is sent as msgpack in base64; `:language` and `:encoding` state the form.
+The content is JSON: an array of the message's type and its fields by name, such as `["Ok",{"value":[3]}]`. A value
+without a JSON form becomes an object with one member: `{"base64":"..."}` for bytes, `{"float":"inf"}` for a number, or
+`{"map":[...]}` for pairs of key and value. If JSON cannot represent the content exactly, or only with more than
+`MAX_JSON` characters, it is sent as msgpack in base64. `:language` and `:encoding` state the form.
 
-`Conversation` converts envelopes with their protocol. `AclMessages` converts the messages of a journal; without the
-protocol, or with another version of it, it uses the recorded fields.
+`Conversation` converts envelopes, using their protocol. `AclMessages` converts the messages in a journal; if the
+protocol is missing or has another version, it uses the recorded fields.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from robochoc.sniffer.trace import Trace
 ONTOLOGY = "robochoc"
 JSON = ("json", "utf-8")
 PACKED = ("msgpack", "base64")
-"""Language and encoding."""
+"""The language and the encoding of contents that are not JSON."""
 CLOCK = "x-clock"
 """The user-defined parameter with the sender's NCCC clock."""
 MAX_JSON = 1 << 22
-"""The maximum number of characters. Small lists need many times as much memory as their text."""
+"""The maximum number of characters. Small lists need many times the memory of their text."""
 
 _DEPTH = 32
 _NUMBER = re.compile(r"[0-9]{1,18}")
@@ -42,14 +42,14 @@ _NOT_FINITE = {"inf": math.inf, "-inf": -math.inf, "nan": math.nan}
 
 
 class _InexpressibleError(Exception):
-    """A value that has no JSON form."""
+    """A value has no JSON form."""
 
 
 class Conversation:
-    """One run of the protocol `name`, among robots of `platform` (`host:port/robochoc`).
+    """One run of the protocol `name` between robots on `platform` (`host:port/robochoc`).
 
     Raises:
-        ValueError: if `platform` is not of this form.
+        ValueError: if `platform` does not have this form.
     """
 
     def __init__(self, protocol: type[Protocol], name: str, platform: str, conversation_id: str) -> None:
@@ -61,9 +61,9 @@ class Conversation:
         self._fields = _fields_of(protocol)
 
     def acl_of(self, envelope: Envelope, sequence: int, reply_to: int | None = None) -> ACLMessage:
-        """Return the ACL message of `envelope`, the sender's message number `sequence`.
+        """Return the ACL message for `envelope`. `sequence` is the sender's number for this message.
 
-        It is a reply to the receiver's message number `reply_to`, if that is given.
+        If `reply_to` is given, it is a reply to the receiver's message with this number.
 
         Raises:
             ACLError: if the content is not a message of the protocol.
@@ -87,10 +87,10 @@ class Conversation:
         )
 
     def envelope_of(self, acl: ACLMessage) -> tuple[Envelope, Message]:
-        """Return the envelope and the message of `acl`, checked by the protocol's own decoder.
+        """Return the envelope and the message in `acl`, checked by the protocol's own decoder.
 
         Raises:
-            ACLError: if the message is not of this conversation, or not a message of the protocol.
+            ACLError: if the message does not belong to this conversation, or is not a message of the protocol.
         """
         for what, found, expected in (
             ("ontology", acl.ontology, ONTOLOGY),
@@ -139,7 +139,7 @@ class Conversation:
 
 
 def _fields_of(protocol: type[Protocol]) -> dict[str, tuple[str, ...]]:
-    """Return the field names of each message type that is encoded as an array, by the type's tag."""
+    """Return the field names of each message type that is encoded as an array, by tag."""
     return {
         kind.__struct_config__.tag: tuple(field.name for field in msgspec.structs.fields(kind))
         for kind in get_args(protocol.messages) or (protocol.messages,)
@@ -148,7 +148,7 @@ def _fields_of(protocol: type[Protocol]) -> dict[str, tuple[str, ...]]:
 
 
 def _json_of(content: bytes, fields: Mapping[str, Sequence[str]]) -> str | None:
-    """Return `content` as JSON; None if that would lose information or be too long."""
+    """Return `content` as JSON, or None if the JSON would lose information or be too long."""
     try:
         kind, *values = msgspec.msgpack.decode(content)
         said = [kind, {name: _exact_json(value, 0) for name, value in zip(fields[kind], values, strict=True)}]
@@ -159,7 +159,7 @@ def _json_of(content: bytes, fields: Mapping[str, Sequence[str]]) -> str | None:
 
 
 def _content_of(text: str, fields: Mapping[str, Sequence[str]]) -> bytes:
-    """Return the msgpack bytes of a content in JSON. Raises `ACLError`."""
+    """Return the msgpack bytes for a content in JSON. Raises `ACLError`."""
     if len(text) > MAX_JSON:
         raise ACLError(f"the content has {len(text):,} characters, more than {MAX_JSON:,} as JSON")
     try:
@@ -172,7 +172,7 @@ def _content_of(text: str, fields: Mapping[str, Sequence[str]]) -> bytes:
 
 
 def _names(kind: str, given: Collection[str], fields: Mapping[str, Sequence[str]]) -> Sequence[str]:
-    """Return the fields of `kind` in their order. Raises `ACLError` if `given` are other fields."""
+    """Return the field names of `kind` in the right order. Raises `ACLError` if `given` contains other names."""
     if kind not in fields:
         raise ACLError(f"the message type {_shown(kind)} is unknown; known types: {', '.join(fields)}")
     names = fields[kind]
@@ -182,7 +182,7 @@ def _names(kind: str, given: Collection[str], fields: Mapping[str, Sequence[str]
 
 
 def _exact_json(value: object, depth: int) -> object:
-    """Return `value`, decoded from msgpack, in JSON form. Raises `_InexpressibleError`."""
+    """Return a value decoded from msgpack in JSON form. Raises `_InexpressibleError`."""
     match value:
         case None | bool() | int() | str():
             return value
@@ -201,7 +201,7 @@ def _exact_json(value: object, depth: int) -> object:
 
 
 def _from_json(value: Any, depth: int) -> Any:  # noqa: ANN401 - any JSON
-    """Return the value that `_exact_json` was given. Raises `ValueError` and others for any other input."""
+    """Return the value from which `_exact_json` made this JSON. Raises `ValueError` and others for invalid JSON."""
     if depth > _DEPTH:
         raise ValueError(f"the lists are nested deeper than {_DEPTH} levels")
     if isinstance(value, list):
@@ -225,7 +225,7 @@ def _is_mark(members: Mapping[Any, object]) -> bool:
 
 
 def _key(value: object) -> object:
-    """Return a key for a msgpack map: lists cannot be keys, so they become tuples."""
+    """Return a valid key for a msgpack map: a list becomes a tuple."""
     return tuple(map(_key, value)) if isinstance(value, list) else value
 
 
@@ -238,7 +238,7 @@ def _shown(found: object) -> str:
 _MARKS = {"base64", "float", "map"}
 """Keys of objects that represent values without a JSON form."""
 PLATFORM = "localhost/robochoc"
-"""The name in place of the machine's, which journals do not record."""
+"""The platform name used instead of the machine's name, which journals do not contain."""
 
 _FIELDS = tuple(field.name for field in msgspec.structs.fields(ACLMessage) if field.name != "user")
 
@@ -252,7 +252,7 @@ class AclMessages:
         self._conversations: dict[int, Conversation | None] = {}
 
     def acl_of(self, message: int) -> ACLMessage:
-        """Return a message in FIPA ACL. It is a reply if its step received exactly one message from its receiver."""
+        """Return a message in FIPA ACL. It is a reply if its step received exactly one message from the receiver."""
         trace, of = self._trace, self._trace.messages
         answered = [cause for cause in trace.causes(message) if of.sender[cause] == of.receiver[message]]
         reply_to = of.sequence[answered[0]] if len(answered) == 1 else None
@@ -262,7 +262,7 @@ class AclMessages:
             if conversation is not None:
                 try:
                     return conversation.acl_of(envelope, of.sequence[message], reply_to)
-                except ValueError:  # an `ACLError`, or a name that is not valid for an agent
+                except ValueError:  # an `ACLError`, or a name that is invalid for an agent
                     pass
         return self._from_fields(message, reply_to)
 
@@ -271,13 +271,13 @@ class AclMessages:
         return {name: plain(value) for name, value in self._trace.content(message).items()}
 
     def fields(self, acl: ACLMessage) -> dict[str, str]:
-        """Return the given parameters of `acl` as text, by their names in FIPA00070."""
+        """Return the parameters of `acl` that are set as text, by their names in FIPA00070."""
         shown = {name.replace("_", "-"): _text(getattr(acl, name)) for name in _FIELDS}
         shown.update({f"X-{name[2:]}": value for name, value in acl.user})
         return {name: value for name, value in shown.items() if value}
 
     def _envelope(self, message: int) -> Envelope | None:
-        """Return the message's envelope; None if its protocol is not installed or does not have this message type."""
+        """Return a message's envelope, or None if the protocol is not installed or lacks this message type."""
         trace, of = self._trace, self._trace.messages
         kind = self._protocols.type_of(message)
         if kind is None:
@@ -299,7 +299,7 @@ class AclMessages:
         return self._conversations[run]
 
     def _from_fields(self, message: int, reply_to: int | None) -> ACLMessage:
-        """Return the message, built from its recorded fields without its protocol."""
+        """Return an ACL message made from the recorded fields, without the protocol."""
         trace, of = self._trace, self._trace.messages
         sender, receiver = trace.robots[of.sender[message]], trace.robots[of.receiver[message]]
         kind, number = trace.kinds[of.kind[message]], of.run[message]
@@ -321,7 +321,7 @@ class AclMessages:
 
 
 def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON
-    """Return `value` in JSON form, which need not be converted back."""
+    """Return `value` in a JSON form that need not be convertible back."""
     match value:
         case None | bool() | int() | str():
             found: Any = value
@@ -341,9 +341,9 @@ def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON
 
 
 def _packings(kind: type[Message], content: Mapping[str, Any]) -> Iterator[bytes]:
-    """Yield possible msgpack bytes of a message: of its fields as recorded, and converted to their types.
+    """Yield possible msgpack bytes for a message: from the recorded fields, as they are and converted to their types.
 
-    JSON journals have bytes in base64, and do not distinguish 1 from 1.0.
+    Journals in text form contain bytes in base64, and do not distinguish 1 from 1.0.
     """
     try:
         said = [kind.__struct_config__.tag, *(content[name] for name in kind.__struct_fields__)]

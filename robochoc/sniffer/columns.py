@@ -1,4 +1,4 @@
-"""Growing columns of numbers, their transfer to a page, and the packed contents of messages."""
+"""Growing columns of numbers, which can be sent to a page, and the packed contents of messages."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from typing import Any, TypeAlias
 import msgspec
 
 NOT_YET = 0xFFFFFFFF
-"""The value for a missing step or message in columns of unsigned integers of 4 bytes."""
+"""The value that stands for a missing step or message in columns of 4-byte unsigned integers."""
 
 Column: TypeAlias = "array[float] | array[int]"
 
 
 def floats() -> array[float]:
-    """Return an empty column of floats of 8 bytes."""
+    """Return an empty column of 8-byte floats."""
     return array("d")
 
 
 def longs() -> array[int]:
-    """Return an empty column of unsigned integers of 4 bytes."""
+    """Return an empty column of 4-byte unsigned integers."""
     return array("I")
 
 
 def shorts() -> array[int]:
-    """Return an empty column of unsigned integers of 2 bytes."""
+    """Return an empty column of 2-byte unsigned integers."""
     return array("H")
 
 
 def packed_columns(parts: Iterable[Column]) -> bytes:
-    """Return the columns as bytes, one after the other, little-endian."""
+    """Return the bytes of the columns one after the other, little-endian."""
     return b"".join(map(_little_endian, parts))
 
 
@@ -43,9 +43,9 @@ def _little_endian(column: Column) -> bytes:
 
 
 class Contents:
-    """The packed contents of messages, by their numbers. They are stored in pages of 4 MiB, which are never copied.
+    """The packed contents of messages, by message number, in pages of 4 MiB that are never copied.
 
-    The memory needed is the size of the messages in transit.
+    They need as much memory as the messages had bytes on the network.
     """
 
     _LARGEST = 1 << 22

@@ -1,4 +1,4 @@
-"""Conversations in forms for other programs: FIPA ACL text, a table (CSV), a diagram (Mermaid), data of a page.
+"""Exports conversations: as FIPA ACL text, table (CSV), diagram (Mermaid), or data embedded in a page.
 
 The table follows RFC 4180, in UTF-8. Cells that a spreadsheet could interpret as formulas are not changed.
 """
@@ -27,9 +27,10 @@ _LEVEL = 6
 
 
 def embedded_answers(data: PageData, journal: Journal | None = None, *, most_states: int = 20_000) -> dict[str, bytes]:
-    """Return the answers about the complete trace of `data`; with its `journal` also robots' states.
+    """Return the answers about the complete trace in `data`, with the robots' states if `journal` is given.
 
-    States are computed by replay, for robots in the order of their names, until they have `most_states` steps together.
+    States are computed by replay for the robots in the order of their names, until they have `most_states` steps in
+    total.
     """
     return {name: zlib.compress(answer, _LEVEL) for name, answer in _answers(data, journal, most_states)}
 
@@ -68,15 +69,15 @@ HEADINGS = (
     "message", "run", "step", "sent_at", "taken_at", "taken_in_step", "sender", "receiver", "type", "performative",
     "bytes", "clock", "taken_clock", "causes", "words", "content",
 )  # fmt: skip
-"""`message`, `step` and `causes` are numbers from 0, `run` is a number from 1; clocks are NCCC clocks."""
+"""The columns of the table. `message`, `step` and `causes` are numbers from 0, `run` from 1; clocks are NCCC clocks."""
 MOST_ARROWS = 400
-"""The maximum for readable diagrams, far below Mermaid's limit of 50,000 characters."""
+"""The maximum number of arrows in a readable diagram, far below Mermaid's limit of 50,000 characters."""
 MOST_CHARACTERS = 50_000
 _LONGEST_LABEL = 60
 
 
 class TooMuchToDrawError(RobochocError, ValueError):
-    """A selection with more messages than a diagram can have."""
+    """The selection has more messages than a diagram can show."""
 
 
 def acl_texts(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
@@ -121,7 +122,7 @@ def _row(cells: Sequence[object]) -> bytes:
 
 
 def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
-    """Return the messages as a Mermaid sequence diagram for a Markdown page, with notes for decisions.
+    """Return the messages as a Mermaid sequence diagram for a Markdown page, with notes on decisions.
 
     Raises:
         TooMuchToDrawError: if there are too many messages.
@@ -151,7 +152,7 @@ def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
 
 
 def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
-    """Return the first messages, as many as fit in a diagram."""
+    """Return as many of the first messages as fit into a diagram."""
     part = messages[:MOST_ARROWS]
     while part:
         try:
@@ -183,7 +184,7 @@ def _note(trace: Trace, step: int, assignment: Mapping[str, int | str], drawn: s
 
 
 def _label(words: str) -> str:
-    """Return `words` with Mermaid's special characters escaped by their numbers."""
+    """Return `words` with Mermaid's special characters replaced by their character codes."""
     shown = printable(words)
     if len(shown) > _LONGEST_LABEL:
         shown = f"{shown[: _LONGEST_LABEL - 1]}…"

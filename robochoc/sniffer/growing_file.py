@@ -1,4 +1,4 @@
-"""Reading a journal's file while another process writes it."""
+"""Reads a journal's file while another process writes it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _HEAD_BYTES = 256
 
 
 class NoFileError(RobochocError, OSError):
-    """A pipe, device or folder, which cannot be read repeatedly."""
+    """The path is a pipe, device or folder, which cannot be read repeatedly."""
 
 
 def open_to_read(path: Path) -> int:
-    """Open the file at `path` for reading, without waiting for a FIFO; return its descriptor. Raises `OSError`."""
+    """Open the file at `path` for reading without waiting for a FIFO, and return its descriptor. Raises `OSError`."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         _check_file(descriptor)
@@ -34,9 +34,9 @@ def _check_file(descriptor: int) -> None:
 
 
 class GrowingFile(io.RawIOBase):
-    """Reads the file `descriptor` from its start up to `end`, which the caller increases by `widen`.
+    """Reads the file `descriptor` from the start up to `end`, which the caller increases by `widen`.
 
-    It has its own position, so that a writer with the same open file, such as a parent process, is not disturbed.
+    Its position is independent of other users of the same open file, such as a parent process that writes it.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -47,7 +47,7 @@ class GrowingFile(io.RawIOBase):
 
     @property
     def size(self) -> int:
-        """The present length of the file."""
+        """The current length of the file."""
         return os.fstat(self._descriptor).st_size
 
     @property
@@ -56,12 +56,12 @@ class GrowingFile(io.RawIOBase):
         return os.pread(self._descriptor, _HEAD_BYTES, 0)
 
     def widen(self, most: int) -> bool:
-        """Increase `end` by up to `most` existing bytes; return whether there were any."""
+        """Increase `end` by up to `most` existing bytes. Return whether there were any."""
         before, self.end = self.end, min(self.size, self.end + most)
         return self.end > before
 
     def again(self) -> GrowingFile:
-        """Return a reader of the same file, from its start."""
+        """Return a reader of the same file that begins at the start."""
         return GrowingFile(self._descriptor)
 
     def readable(self) -> bool:
@@ -77,12 +77,12 @@ class GrowingFile(io.RawIOBase):
         return self.place
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Set the position to `offset`, relative to the start, the position, or `end`; return it."""
+        """Move the position to `offset`, relative to the start, the position, or `end`, and return it."""
         self.place = max(0, offset + {os.SEEK_SET: 0, os.SEEK_CUR: self.place, os.SEEK_END: self.end}[whence])
         return self.place
 
     def readinto(self, buffer: Any) -> int:  # noqa: ANN401 - whatever holds bytes
-        """Read into `buffer`; return the number of bytes, 0 at `end`."""
+        """Read into `buffer`, and return the number of bytes read, which is 0 at `end`."""
         content = os.pread(self._descriptor, min(len(buffer), max(0, self.end - self.place)), self.place)
         buffer[: len(content)] = content
         self.place += len(content)

@@ -1,10 +1,10 @@
-"""A trace of a growing journal, extended piece by piece.
+"""The trace of a growing journal, extended piece by piece.
 
-Robots report events in batches, so during a run the journal has events in the order of their arrival. A trace accepts
-this order: its causes are correct, and the page can show it at once. If the complete journal is not sorted by time, it
-is read again in the order of time, as all other readers use it; the resulting trace has the next generation.
+Robots report events in batches, so during a run the journal contains events in the order of their arrival. A trace
+accepts this order: its causes are correct, and the page can show it at once. If the complete journal is not sorted by
+time, it is read again in the order of time, which all other readers use. The resulting trace has the next generation.
 
-Entries are not stored after reading, so a file of any length needs only the memory of its trace.
+Entries are discarded after reading, so a file of any length needs only the memory for its trace.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from robochoc.sniffer.trace import Trace
 from robochoc.system.temporary_files import unnamed_file
 
 PIECE_BYTES = 1 << 16
-"""The number of bytes that are read at once: a fraction of a second's work."""
+"""The number of bytes read at once, which takes a fraction of a second."""
 TEXT = b'{"event":"Journal"'
 """The start of a journal in text form; the binary form starts with `MAGIC`."""
 _AT_ONCE_S = 0.5
-"""The longest work before the first display, in seconds."""
+"""The maximum time for work before the first display, in seconds."""
 _EVENTS_AT_ONCE = 5_000
 _FORSAKEN_S = 30.0
-"""The time without new entries after which the writer of an unfinished journal counts as ended."""
+"""The seconds without new entries after which the writer of an unfinished journal counts as ended."""
 
 
 class LiveTrace:
     """Follows the journal in `file`, one piece per call of `advance`.
 
-    `trace` is the trace so far: None before the first block. `loaded` is the part of the file that has been read, from
+    `trace` is the trace so far, or None before the first block. `loaded` is the fraction of the file read so far, from
     0 to 1.
     """
 
@@ -52,7 +52,7 @@ class LiveTrace:
         self.restart(file)
 
     def restart(self, file: GrowingFile) -> None:
-        """Start again with the journal in `file`, as the next generation."""
+        """Start again with the journal in `file`. The trace has the next generation."""
         self._file = file
         self._follower = Follower(BufferedReader(file))
         self._head = file.head
@@ -66,7 +66,7 @@ class LiveTrace:
 
     @property
     def loaded(self) -> float:
-        """The part of the present file that has been read, from 0 to 1."""
+        """The fraction of the file that has been read, from 0 to 1."""
         return self._file.end / max(1, self._file.size)
 
     @property
@@ -80,11 +80,11 @@ class LiveTrace:
 
     @property
     def presentable(self) -> bool:
-        """True if there is something to show. A small journal is sorted first, which is fast."""
+        """True if there is something to show. A small journal is first sorted, which is fast."""
         return self.trace is not None and (self._done or self._waits or self._worked_s > _AT_ONCE_S)
 
     def advance(self) -> bool:
-        """Do a small part of the work; return False if there was none. Raises `JournalError`, `TraceTooLargeError`."""
+        """Do a little work. Return False if there was nothing to do. Raises `JournalError`, `TraceTooLargeError`."""
         began = time.monotonic()
         done = self._advance()
         self._worked_s += time.monotonic() - began
@@ -93,14 +93,14 @@ class LiveTrace:
 
     def _advance(self) -> bool:
         if self._file.size < self._file.end or not self._file.head.startswith(self._head):
-            self.restart(self._file.again())  # another journal has been written into the same file
+            self.restart(self._file.again())  # another journal was written into the same file
         if self._ordering is not None:
             if next(self._ordering, self) is self:
                 self._ordering, self._done = None, True
             return True
         if self._done:
             continues = self._outcome is None and self._follower.damage is None and self._file.size > self._file.end
-            if continues:  # the writer was slow, not ended
+            if continues:  # the writer was slow and had not ended
                 self.restart(self._file.again())
             return continues
         if self._read() or self._file.widen(PIECE_BYTES):
@@ -114,7 +114,7 @@ class LiveTrace:
         return False
 
     def _read(self) -> bool:
-        """Read a few entries; return whether there was anything to do."""
+        """Read a few entries. Return whether there was anything to do."""
         if self.trace is None and not _may_begin(self._file.head):
             raise JournalError("the file does not start like a journal")
         lines = self._follower.read(_EVENTS_AT_ONCE)
@@ -146,14 +146,14 @@ class LiveTrace:
     def _end(self) -> None:
         if self.trace is None:
             raise JournalError("the journal has no header")
-        if self._disordered:  # the trace is not complete yet: it is sorted first
+        if self._disordered:  # the trace is not complete until it is sorted
             self._ordering = self._in_order(self.trace.header)
         else:
             self.trace.end(self._outcome, self._follower.damage)
             self._done = True
 
     def _in_order(self, header: Header) -> Iterator[None]:
-        """Build the trace again from the events sorted by time; yield after each part."""
+        """Build the trace again from the events sorted by time, and yield after each part."""
         trace = Trace(header, self._generation + 1)
         for events in events_by_time(self._file):
             trace.add(events)
@@ -164,12 +164,12 @@ class LiveTrace:
 
 
 def _may_begin(head: bytes) -> bool:
-    """Return whether `head` is the start of a journal, or may become one with more bytes."""
+    """Return whether `head` is the start of a journal, or could become one with more bytes."""
     return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
 
 
 def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[JournalEntry]:
-    """Return the next entries before `end` from the `follower`, which reads `file`; none at the end."""
+    """Return the next entries before `end` from the `follower` of `file`, or an empty list at the end."""
     lines = follower.read(_EVENTS_AT_ONCE)
     while not lines and file.end < end and file.widen(min(PIECE_BYTES, end - file.end)):
         lines = follower.read(_EVENTS_AT_ONCE)
@@ -177,12 +177,12 @@ def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Journa
 
 
 def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
-    """Yield the events of `file` up to its present end, sorted by time within each run. See `sorted_by_time`."""
+    """Yield the events up to the current end of `file`, sorted by time within each run. See `sorted_by_time`."""
     return sorted_by_time(entries_of(file))
 
 
 def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
-    """Yield lists of the entries of `file`, up to its present end."""
+    """Yield lists of entries up to the current end of `file`."""
     here = file.again()
     follower = Follower(BufferedReader(here))
     while lines := next_entries(follower, here, file.end):
@@ -192,8 +192,8 @@ def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
 def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[AnyEvent]]:
     """Yield lists of the events in `pieces`, sorted by time within each run.
 
-    A list may be empty, so that the caller can do other work meanwhile. Events with equal times remain in their order.
-    A run's events are stored in an unnamed temporary file until the end of the run; only their times and positions are
+    A list may be empty, so that the caller can do other work in between. Events with equal times stay in their order.
+    The events of a run are stored in an unnamed temporary file until the run ends; only their times and positions are
     in memory.
     """
     stored = _StoredEvents()
@@ -213,7 +213,7 @@ def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[An
 
 
 class _StoredEvents:
-    """The packed events of one run, in an unnamed temporary file."""
+    """The packed events of one run, stored in an unnamed temporary file."""
 
     def __init__(self) -> None:
         self._times = array("d")
@@ -230,7 +230,7 @@ class _StoredEvents:
         self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
 
     def sorted(self) -> Iterator[list[AnyEvent]]:
-        """Yield lists of the events, sorted by time; then delete the file."""
+        """Yield lists of the events sorted by time, then delete the file."""
         import numpy as np  # noqa: PLC0415 - slow, and only needed for sorting
 
         with self._file as file:

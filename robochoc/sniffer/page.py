@@ -1,8 +1,9 @@
-"""The sniffer's page: one document with its style and scripts (`assets/`), and Meshcat's viewer.
+"""The sniffer's page: one document with its style, scripts (`assets/`), and Meshcat's viewer.
 
-A served page requests its data from its server. An embedded page contains all data, so it can be opened as a file. The
-scripts are classic scripts that extend one object `Sniffer`: `model.js` creates it and is first, `main.js` starts the
-page and is last, and the others are in alphabetical order, since they use each other only in later calls.
+A served page requests its data from the server. An embedded page contains all data and can be opened as a file. The
+scripts are classic scripts that extend one object `Sniffer`. `model.js`, which creates the object, comes first, and
+`main.js`, which starts the page, last. The other scripts are in alphabetical order, since they use each other only
+later.
 """
 
 from __future__ import annotations
@@ -20,25 +21,25 @@ Mode = Literal["served", "embedded"]
 
 _FIRST, _LAST = "model.js", "main.js"
 _TITLE = "<title>Sniffer</title>"
-"""The title in `index.html`, which is replaced."""
+"""The title in `index.html`, which is replaced by the actual title."""
 
 
 def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
-    """Return the page, in UTF-8. Equal arguments give equal pages.
+    """Return the page in UTF-8. Equal arguments give equal pages.
 
     Args:
-        mode: Served by a server, or embedded: one file with all data.
-        embedded: The page's data by name (`columns`, `details:0`), zlib-compressed. The names are trusted, the data is
-            not.
-        title: The title, as untrusted plain text.
+        mode: Whether the page is served by a server, or embedded: one file with all data.
+        embedded: The page's data by name (`columns`, `details:0`), zlib-compressed. The names are trusted, but not the
+            data.
+        title: The title as untrusted plain text.
 
-    An embedded page without a `scene` leaves out Meshcat's viewer, a megabyte.
+    If there is no `scene`, an embedded page does not include Meshcat's viewer (1 MB).
     """
     answers = embedded or {}
     connections = "'self'" if mode == "served" else "'none'"
     scripts = [_asset(name) for name in _scripts()]
     if mode == "served" or "scene" in answers:
-        scripts += [labels_script(), viewer_script()]  # last, so that the page does not wait for them
+        scripts += [labels_script(), viewer_script()]  # at the end, so that the page does not wait for them
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy(scripts, connections)}">\n'
         f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'
@@ -55,7 +56,7 @@ def _script(script: str) -> str:
 
 
 def _block(name: str, content: bytes) -> str:
-    """Return an answer of `PageData` as a script element with a type that browsers do not execute."""
+    """Return an answer of `PageData` as a script element of a type that browsers do not execute."""
     text = base64.b64encode(content).decode()
     return f'<script id="feed:{escape(name)}" type="application/octet-stream">{text}</script>'
 

@@ -1,4 +1,4 @@
-"""The answers to a page about a trace: JSON, or columns of numbers (little-endian).
+"""The answers to requests of a page about a trace: JSON, or columns of numbers (little-endian).
 
     about       JSON: the run, the robots, the number of messages, the outcome
     columns     messages: t, clock (8 bytes, floating point), step, bytes (4), sender, receiver, kind, run (2)
@@ -6,7 +6,7 @@
     decisions   JSON: [[step, {variable: value}], ...]
     details     JSON: the contents of messages, in words and as FIPA ACL
 
-Steps and messages are numbered (`trace.py`). The number of rows of an answer is limited.
+Steps and messages are numbered (`trace.py`). Each answer has a maximum number of rows.
 """
 
 from __future__ import annotations
@@ -32,15 +32,15 @@ from robochoc.system.errors import RobochocError
 
 FORMAT = 1
 MOST_ROWS = 1 << 16
-"""The maximum number of messages, steps, or decisions in one answer."""
+"""The maximum number of messages, steps or decisions in one answer."""
 DETAILS = 1024
-"""The number of messages in one chunk of details."""
+"""The number of messages in one chunk of message contents."""
 STATES = 64
-"""The number of a robot's steps in one chunk of its states."""
+"""The number of steps in one chunk of a robot's states."""
 MOST_NOTES = 1000
-"""The maximum number of notes on improvements, and of all other notes."""
+"""The maximum number of notes on improvements, and likewise of all other notes."""
 MOST_EPOCHS = 8
-"""The maximum number of epochs whose results are in the verdict."""
+"""The maximum number of epochs whose results the verdict shows."""
 
 _OFTEN = {"heard", "improved"}
 
@@ -48,18 +48,18 @@ _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 
 class BadRequestError(RobochocError, ValueError):
-    """A request for data that do not exist, or for too much data."""
+    """A request for data that do not exist, or for too many data."""
 
 
 def message_columns(trace: Trace, first: int, end: int) -> bytes:
-    """Return the columns of the messages from `first` up to, but not including, `end`."""
+    """Return the columns for the messages from `first` up to, but not including, `end`."""
     of = trace.messages
     columns = (of.t, of.clock, of.step, of.bytes, of.sender, of.receiver, of.kind, of.run)
     return packed_columns(column[first:end] for column in columns)
 
 
 def step_columns(trace: Trace, first: int, end: int) -> bytes:
-    """Return the columns of the steps from `first` up to, but not including, `end`, with their received messages."""
+    """Return the columns for the steps from `first` up to, but not including, `end`, with their received messages."""
     of = trace.steps
     packets = trace.packets[_end_before(of.packet_end, first) : _end_before(of.packet_end, end)]
     columns = (of.t[first:end], of.clock[first:end], of.checks[first:end], of.packet_end[first:end], packets)
@@ -71,9 +71,9 @@ def _end_before(ends: Sequence[int], step: int) -> int:
 
 
 class PageData:
-    """The answers about one trace. `live`: the trace may still grow.
+    """The answers to requests about one trace. `live`: whether the trace may still grow.
 
-    `chosen`: names or patterns (`patterns.py`) of the robots to show at first; empty: all.
+    `chosen`: names or patterns (`patterns.py`) of the robots that are shown at first. Empty: all robots.
     """
 
     def __init__(self, trace: Trace, *, live: bool = False, chosen: Sequence[str] = ()) -> None:
@@ -113,7 +113,7 @@ class PageData:
     def news(self) -> dict[str, Any]:
         """Return the parts of `about` that change during a run, as numbers and words.
 
-        A page whose counts differ requests `about` again.
+        If the counts differ from those of a page, the page requests `about` again.
         """
         trace = self.trace
         return {
@@ -132,7 +132,7 @@ class PageData:
         }
 
     def cannot_replay(self) -> str:
-        """Return the reason why robots' states are not available; empty if they are."""
+        """Return the reason why robots' states are unavailable, or an empty text if they are available."""
         if not self.trace.runs:
             return "no run has started"
         for run in self.trace.runs:
@@ -141,12 +141,12 @@ class PageData:
         return ""
 
     def columns(self, first: int, end: int) -> bytes:
-        """Return the columns of messages. Raises `BadRequestError`, as the other methods do."""
+        """Return the columns for messages. Raises `BadRequestError`, as the other methods do."""
         _check(first, end, len(self.trace.messages.t))
         return message_columns(self.trace, first, end)
 
     def steps(self, first: int, end: int) -> bytes:
-        """Return the columns of steps, with their received messages."""
+        """Return the columns for steps, with the messages they received."""
         _check(first, end, len(self.trace.steps.t))
         return step_columns(self.trace, first, end)
 
@@ -156,7 +156,7 @@ class PageData:
         return _encode([(step, self.names.labelled(values)) for step, values in self.trace.decisions[first:end]])
 
     def details(self, chunk: int) -> bytes:
-        """Return the contents of the messages of a chunk."""
+        """Return the contents of the messages in a chunk."""
         first = chunk * DETAILS
         count = len(self.trace.messages.t)
         if chunk < 0 or first >= max(count, 1):
@@ -164,7 +164,7 @@ class PageData:
         return _encode([self.detail(message) for message in range(first, min(first + DETAILS, count))])
 
     def detail(self, message: int) -> dict[str, Any]:
-        """Return the content of a message: its fields, in words, and as FIPA ACL."""
+        """Return the content of a message: in fields, in words, and as FIPA ACL."""
         acl = self.acl_messages.acl_of(message)
         return {
             "content": self.acl_messages.plain(message),
@@ -205,7 +205,7 @@ def _run(run: RunRecord) -> dict[str, Any]:
 
 
 def _last_notes(notes: Sequence[TraceNote]) -> list[TraceNote]:
-    """Return the last notes in their order. Frequent notes on improvements do not displace losses and refusals."""
+    """Return the last notes in order. Frequent notes on improvements do not displace losses and refusals."""
     often = [place for place, note in enumerate(notes) if note.kind in _OFTEN]
     seldom = [place for place, note in enumerate(notes) if note.kind not in _OFTEN]
     return [notes[place] for place in sorted([*often[-MOST_NOTES:], *seldom[-MOST_NOTES:]])]
@@ -216,7 +216,7 @@ def _note_of(note: TraceNote) -> dict[str, Any]:
 
 
 def verdict_of(trace: Trace) -> str:
-    """Return the result of the run in words; for several epochs, the result of each."""
+    """Return the result of the run in words, or of each epoch if there are several."""
     outcome = trace.outcome
     if outcome is None:
         return "The run ended without an outcome." if trace.over else "The run continues."
@@ -252,7 +252,7 @@ def _verdict_words(verdict: Verdict) -> str:
 
 
 def _by(outcome: Outcome) -> str:
-    """Return the robot that concluded alone, in words. A robot that gave up is named in the reason instead."""
+    """Return the robot that concluded alone, in words. The reason names a robot that gave up, so it is not repeated."""
     if outcome.witness is None or outcome.verdict == Verdict.UNKNOWN:
         return ""
     return f", as {outcome.ruled_out if outcome.verdict == Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"

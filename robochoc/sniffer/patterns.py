@@ -1,6 +1,6 @@
-"""Names and patterns of robots in options of `robochoc sniff` and `robochoc journal`, such as `Robot3.1,Robot2.*`.
+"""Names and patterns of robots, such as `Robot3.1,Robot2.*`, in options of `robochoc sniff` and `robochoc journal`.
 
-`*` matches any characters, `?` any single character, as in the properties of JADE's sniffer.
+`*` matches any characters, and `?` any single character, as in the properties of JADE's sniffer.
 """
 
 from __future__ import annotations
@@ -15,21 +15,21 @@ def patterns_in(text: str) -> tuple[str, ...]:
 
 
 def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Return the names that match one of the patterns, in their order."""
+    """Return the names that match at least one pattern, in their original order."""
     wholes = [_expression(pattern) for pattern in patterns]
     return [name for name in names if any(whole.fullmatch(name) for whole in wholes)]
 
 
 def unmatched(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Return the patterns that match none of the names."""
+    """Return the patterns that match no name."""
     known = list(names)
     return [pattern for pattern in patterns if not matching(known, (pattern,))]
 
 
 def _expression(pattern: str) -> re.Pattern[str]:
-    """Return a regular expression in which each part between two `*` matches only at its first occurrence.
+    """Return a regular expression in which each part between two `*` matches only its first occurrence.
 
-    There is no backtracking, so names that almost match are not slow.
+    Without backtracking, names that almost match are not slow.
     """
     first, *rest = ("".join("." if sign == "?" else re.escape(sign) for sign in part) for part in pattern.split("*"))
     if not rest:

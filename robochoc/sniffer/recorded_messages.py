@@ -1,4 +1,4 @@
-"""Recorded messages: the protocols of a trace's runs, and message objects rebuilt from recorded fields."""
+"""Recorded messages: finds the protocols of a trace's runs, and rebuilds message objects from recorded fields."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _LISTS = (CollectionType, TupleType, StructType)
 
 
 class RunProtocols:
-    """The installed protocols of the runs of `trace`."""
+    """The installed protocols for the runs in `trace`."""
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
@@ -40,25 +40,25 @@ class RunProtocols:
         self._types: dict[int, Mapping[str, type[Message]]] = {}
 
     def of_run(self, run: int) -> tuple[str, type[Protocol]] | None:
-        """Return the name and the class of a run's protocol; None if it is not installed."""
+        """Return the name and class of a run's protocol, or None if it is not installed."""
         if run not in self._found:
             self._found[run] = installed_protocol(self._trace.runs[run].protocol, self._trace.header.protocol)
         return self._found[run]
 
     def message_types(self, run: int) -> Mapping[str, type[Message]]:
-        """Return the message types of a run's protocol by name; none if it is not installed."""
+        """Return the message types of a run's protocol by name; empty if it is not installed."""
         if run not in self._types:
             found = self.of_run(run)
             self._types[run] = types_by_name(found[1]) if found else {}
         return self._types[run]
 
     def type_of(self, message: int) -> type[Message] | None:
-        """Return the class of the message of this number; None if it is not known."""
+        """Return the class of the message with this number, or None if it is unknown."""
         columns = self._trace.messages
         return self.message_types(columns.run[message]).get(self._trace.kinds[columns.kind[message]])
 
     def act_of(self, message: int) -> Act:
-        """Return the FIPA act of the message of this number."""
+        """Return the FIPA act of the message with this number."""
         kind = self.type_of(message)
         return kind.act if kind else INFORM
 
@@ -77,9 +77,9 @@ def message_types(protocol: type[Protocol]) -> tuple[type[Message], ...]:
 
 
 def message_of(kind: type[Message], content: Mapping[str, Any]) -> Message | None:
-    """Return the message of type `kind` with these recorded fields; None if they do not fit the type.
+    """Return a message of type `kind` with these recorded fields, or None if they do not fit the type.
 
-    A journal in its text form has bytes in base64, and null for an infinite number; both are restored.
+    In its text form, a journal contains bytes in base64, and null for infinite numbers; both are restored.
     """
     try:
         info = _declared(kind)
@@ -101,11 +101,11 @@ def types_by_name(protocol: type[Protocol]) -> Mapping[str, type[Message]]:
 
 
 def installed_protocol(name: str, asked: str) -> tuple[str, type[Protocol]] | None:
-    """Return the name and the class of a run's protocol; None if it is not installed.
+    """Return the name and class of a run's protocol, or None if it is not installed.
 
     Args:
-        name: The protocol's class, as recorded at the start of the run; its name if the start is not recorded.
-        asked: The name of the requested protocol, from the journal's header.
+        name: The protocol's class, as recorded at the start of the run, or its name if the start was not recorded.
+        asked: The name of the requested protocol in the journal's header.
     """
     if name == asked:
         with suppress(UnknownProtocolError):
@@ -114,7 +114,7 @@ def installed_protocol(name: str, asked: str) -> tuple[str, type[Protocol]] | No
 
 
 def _with_infinity(value: Any, declared: Type) -> Any:  # noqa: ANN401 - fields are of any type
-    """Return `value` with `inf` for each None whose declared type is a number that cannot be None."""
+    """Return `value` with None replaced by `inf` where the declared type is a number that cannot be None."""
     if value is None:
         return math.inf if _is_number(declared) else None
     if isinstance(value, dict):
@@ -131,7 +131,7 @@ def _is_number(declared: Type) -> bool:
 
 
 def _items(declared: Type, count: int) -> Sequence[Type]:
-    """Return the declared types of the `count` items of a list."""
+    """Return the declared types of the `count` items in a list."""
     match declared:
         case UnionType(types):
             return _items(next((kind for kind in types if isinstance(kind, _LISTS)), AnyType()), count)

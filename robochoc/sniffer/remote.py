@@ -1,4 +1,4 @@
-"""Follow the run of a remote master: receive its journal, block by block, from the first block."""
+"""Follows the run of a remote master: receives its journal block by block, from the first block."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from robochoc.run.networked.directory_query import ANSWER_S, ASK_AGAIN_S, NoAnsw
 LOOK_S = 0.1
 """The interval between requests for new blocks."""
 PIECE_S = 1.0
-"""The time limit of an answer, after which the request is repeated."""
+"""The time limit for an answer, after which the request is repeated."""
 _NUMBER_BITS = 32
 
 
 class WholeBlocks(BlockReader):
-    """Collects the bytes of a journal, and returns complete blocks, each of which must continue the previous one."""
+    """Collects the bytes of a journal and returns complete blocks. Each block must continue the previous one."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class WholeBlocks(BlockReader):
         self._passed = 0
 
     def add(self, content: bytes) -> bytes:
-        """Add `content`; return the newly completed blocks. Raises `JournalError` and `JournalDamagedError`."""
+        """Add `content` and return the completed blocks. Raises `JournalError` and `JournalDamagedError`."""
         self._pending += content
         self.feed(content)
         while self.next() is not None:
@@ -50,7 +50,7 @@ class WholeBlocks(BlockReader):
 
 
 class FollowResult(NamedTuple):
-    """The end of a followed journal. `over`: the run has ended, and the journal is complete; `why`: the reason."""
+    """How following a journal ended. `over`: the run has ended, and the journal is complete; `why`: the reason."""
 
     over: bool
     why: str
@@ -68,21 +68,21 @@ def receive(
     stopped: Callable[[], bool] = lambda: False,
     granted: Callable[[], None] = lambda: None,
 ) -> FollowResult:
-    """Pass the run's journal to `sink` in complete blocks, until the run or the master ends.
+    """Pass the run's journal to `sink` in complete blocks until the run or the master ends.
 
-    Each block's checksum covers that of the previous block, and is verified before the block is passed to `sink`.
+    Each block's checksum covers the previous block's checksum, and is verified before the block is passed to `sink`.
 
     Args:
         place: The master's address.
-        identity: The key pair to connect with.
+        identity: The key pair for the connection.
         sink: Receives the blocks.
-        patience_s: The time to wait for an answer, in seconds.
-        stopped: Called regularly; if it returns True, following ends.
+        patience_s: The maximum time to wait for an answer, in seconds.
+        stopped: Called regularly. If it returns True, the function returns.
         granted: Called when the master has accepted the connection.
 
     Raises:
-        CannotConnectError: if there is no connection.
-        NoAnswerError: if the master does not accept.
+        CannotConnectError: if the connection fails.
+        NoAnswerError: if the master does not accept the connection.
     """
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
         sniffer = _MasterClient(place, transport)
@@ -94,7 +94,7 @@ def receive(
 
 
 class IncomingJournal:
-    """The received part of the journal of `run`, from the master at `place`; its valid blocks are passed to `sink`."""
+    """The received part of the journal of `run` from the master at `place`. Valid blocks are passed to `sink`."""
 
     def __init__(self, place: Address, run: str, sink: Callable[[bytes], object]) -> None:
         self._place = place
@@ -103,7 +103,7 @@ class IncomingJournal:
         self._sink = sink
         self._start = 0
         self.idle = False
-        """True if the last answer had no new content."""
+        """True if the last answer contained nothing new."""
 
     @property
     def question(self) -> bytes:
@@ -111,12 +111,12 @@ class IncomingJournal:
         return question(self._run, self._start)
 
     def receive(self, content: bytes) -> FollowResult | None:
-        """Process an answer; return the end of the journal if it was reached."""
+        """Process an answer. If it is the last, return how following ended."""
         try:
             piece = piece_in(content)
             if piece.run != self._run:
                 return FollowResult(over=False, why=f"the master at {self._place} was restarted")
-            if piece.start != self._start:  # the answer to an earlier request
+            if piece.start != self._start:  # an answer to an earlier request
                 return None
             whole = self._blocks.add(piece.content)
         except (JournalError, JournalDamagedError) as bad:
@@ -143,7 +143,7 @@ class _MasterClient:
         self._number = secrets.randbits(_NUMBER_BITS)
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
-        """Return the run to follow; None if stopped. Raises `NoAnswerError` after a refusal, or without an answer."""
+        """Return the run to follow, or None if stopped. Raises `NoAnswerError` if there is a refusal or no answer."""
         until, last_request = time.monotonic() + patience_s, 0.0
         while time.monotonic() < until and not stopped():
             if time.monotonic() - last_request > ASK_AGAIN_S:
@@ -163,7 +163,7 @@ class _MasterClient:
         )
 
     def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> FollowResult:
-        """Request the journal, piece by piece, until it ends."""
+        """Request the journal piece by piece until it ends."""
         last_answer = time.monotonic()
         while not stopped():
             content = self._transport.ask(journal_key(self._name), journal.question, PIECE_S)
@@ -187,7 +187,7 @@ class _MasterClient:
         self._transport.send(MASTER, self._framing.write(MASTER, JournalRequest(self._number)))
 
     def _refused(self) -> FollowResult | None:
-        """Request the reason for a missing answer; return None if there is none, or no answer."""
+        """Ask why an answer is missing. Return None if there is no reason or no answer."""
         self._request()
         answer = self._answer(PIECE_S)
         if answer is None or not answer.why:
@@ -198,7 +198,7 @@ class _MasterClient:
         )
 
     def _answer(self, patience_s: float) -> JournalAnswer | None:
-        """Return the master's next answer; None if there is none within `patience_s`."""
+        """Return the master's next answer, or None if there is no answer within `patience_s`."""
         until = time.monotonic() + patience_s
         while (left := until - time.monotonic()) > 0:
             try:

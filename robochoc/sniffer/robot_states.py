@@ -1,7 +1,7 @@
-"""Robots' states after each of their steps, in chunks, by replay of the journal's file.
+"""The states of robots after each of their steps, computed in chunks by replaying the journal's file.
 
-A robot is replayed with the messages that it received. Its events are read from the file on request; those of other
-robots only if the replay needs them.
+A robot is replayed with the messages that it received. Its events are read from the file on request; the events of
+other robots are only read if the replay needs them.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from robochoc.sniffer.live_trace import next_entries
 from robochoc.sniffer.page_data import STATES, BadRequestError
 
 MOST_EVENTS = 1_000_000
-"""The maximum number of events of one robot: some hundred MB."""
+"""The maximum number of events of one robot, which need some hundred MB."""
 _KEPT_BYTES = 1 << 26
 
 
 class _Playing(NamedTuple):
     robot: str
     size: int
-    """The length of the file when the replay started."""
+    """The length of the file at the start of the replay."""
     states: Iterator[RobotState]
 
 
 class RobotStates:
-    """Replays the robot of the last request, and caches its states."""
+    """Replays the most recently requested robot, and caches its states."""
 
     def __init__(self) -> None:
         self._cache = Cache(_KEPT_BYTES)
@@ -44,9 +44,9 @@ class RobotStates:
         self.stopped = False
 
     def chunk(self, file: GrowingFile, robot: str, number: int, *, final: bool) -> bytes:
-        """Return the states after the steps of chunk `number`, as JSON; `[]` after the last chunk.
+        """Return the states after the steps in chunk `number` as JSON; `[]` after the last chunk.
 
-        The file is read up to its present end, without moving the reader `file`. Only `final` states are cached:
+        The file is read up to its current end, without moving the reader `file`. States are only cached if `final`:
         during a run, messages to the robot may still be missing.
 
         Raises:
@@ -72,7 +72,7 @@ class RobotStates:
         return answer
 
     def _next_states(self, playing: _Playing) -> list[RobotState]:
-        """Return the states of the next chunk. Raise `BadRequestError`."""
+        """Return the states in the next chunk. Raises `BadRequestError`."""
         try:
             return list(islice(playing.states, STATES))
         except CannotReplayError as reason:
@@ -91,7 +91,7 @@ class RobotStates:
         )
 
     def _events(self, file: GrowingFile, robot: str | None = None) -> Iterator[AnyEvent]:
-        """Yield the events of `robot`, or of all robots, each run's sorted by time."""
+        """Yield the events of `robot`, or of all robots, sorted by time within each run."""
         whose = f"the states of {robot}" if robot else "all robots together"
         here = file.again()
         follower = Follower(BufferedReader(here))

@@ -1,7 +1,7 @@
-"""The 3D scene of the page: the drones, which move to the positions that their robots decide.
+"""The page's 3D scene: drones move to the positions that their robots decide.
 
-A drone hovers at the position of its robot's decision; before a decision it stands at its home on the ground. Lengths
-are in cells, as in `layout`.
+A drone hovers at the position of its robot's decision. Before a decision it stands at its home on the ground. Lengths
+are measured in cells, as in `layout`.
 """
 
 from __future__ import annotations
@@ -25,22 +25,22 @@ from robochoc.view.drawing import commands_at_home, path_of
 from robochoc.view.scene import DrawnDrone, Scene
 
 _MOST_DRONES = 2_000
-"""The maximum number of drones that browsers animate smoothly and readers can distinguish."""
+"""The maximum number of drones that browsers can animate smoothly and readers can distinguish."""
 _MOST_PLACES = 1_000
-"""If more positions are known, decisions of known robots are not checked for the size of the box."""
+"""If more positions are known, the decisions of known robots are ignored when the size of the box is computed."""
 
 Move = tuple[int, int, float, float, float]
-"""A step, the number of a drone, and its position x, y, z from that step on."""
+"""A step, the number of a drone, and the drone's position x, y, z from that step on."""
 
 
 def complete_scene(trace: Trace) -> bytes:
-    """Return the scene of a complete trace as JSON, from the robots' files in the trace."""
+    """Return the scene for a complete trace as JSON, using the robots' files in the trace."""
     stage = TraceScene(trace, robots_given(trace))
     return msgspec.json.encode(stage.answer() if stage else None)
 
 
 def robots_given(trace: Trace) -> dict[str, Robot]:
-    """Return the robots of the last run by name, without those with an invalid file."""
+    """Return the robots in the last run by name, except those with an invalid file."""
     robots = {}
     for name, file in (trace.runs[-1].files if trace.runs else {}).items():
         with suppress(InvalidInputError, UnicodeEncodeError):
@@ -49,9 +49,9 @@ def robots_given(trace: Trace) -> dict[str, Robot]:
 
 
 class TraceScene:
-    """The drones of one trace. `robots`: the robots with known files; of others, only decisions are known.
+    """The drones in one trace. `robots`: the robots with known files. Of other robots, only decisions are known.
 
-    The box contains all possible positions of known robots, and the past positions of others.
+    The box contains all possible positions of known robots, and the past positions of other robots.
     """
 
     def __init__(self, trace: Trace, robots: Mapping[str, Robot]) -> None:
@@ -73,7 +73,7 @@ class TraceScene:
         return bool(self._owners)
 
     def answer(self, first: int = 0) -> dict[str, Any]:
-        """Return the page's data, with the moves of the decisions from `first`; JSON-compatible."""
+        """Return the page's data as JSON-compatible values, with the moves for the decisions from `first`."""
         upto = len(self._trace.decisions)
         if first > upto:
             raise BadRequestError(f"decision {first} does not exist; there are {upto}")

@@ -1,4 +1,4 @@
-"""A selection of messages of a trace by robots, types, numbers, and conversation, and an excerpt of its journal."""
+"""Selects messages in a trace by robot, type, number and conversation, and extracts them from a journal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.system.errors import RobochocError
 
 
 def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
-    """Return `journal`, whose trace is `trace`, without the events of messages other than `messages`.
+    """Return `journal`, whose trace is `trace`, without the events of messages that are not in `messages`.
 
     All other events remain.
     """
@@ -22,9 +22,9 @@ def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journ
 
 
 def _selected_events(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iterator[AnyEvent]:
-    """Yield the events without those of messages that are not selected.
+    """Yield the events, except those of messages that are not selected.
 
-    A sender's messages in a run have ascending numbers, and each receiver receives them in this order.
+    In a run, a sender's messages have ascending numbers, and each receiver receives them in this order.
     """
     of = trace.messages
     spoken: dict[tuple[int, str], list[int]] = defaultdict(list)
@@ -60,15 +60,15 @@ def _selected_events(events: Sequence[AnyEvent], trace: Trace, messages: set[int
 
 
 class NothingSelectedError(RobochocError, ValueError):
-    """A part of a selection matches nothing in the journal; the message lists the existing names or numbers."""
+    """A part of the selection matches nothing in the journal. The message lists the existing names or numbers."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """A selection of messages: both robots must match `robots`, and the type must match `kinds`.
+    """A selection of messages. Both the sender and the receiver must match `robots`, and the type `kinds`.
 
-    `robots` and `kinds` are names or patterns. `first` and `last` are numbers of messages, from 0, both included.
-    `run` is the number of a run (a conversation), from 1. Empty parts, and None, do not restrict the selection.
+    `robots` and `kinds` are names or patterns. `first` and `last` are message numbers from 0, both included. `run` is
+    the number of a run (a conversation) from 1. Empty parts and None do not restrict the selection.
     """
 
     robots: Sequence[str] = ()
@@ -78,7 +78,7 @@ class Selection:
     run: int | None = None
 
     def numbers_in(self, trace: Trace) -> range | list[int]:
-        """Return the numbers of the selected messages, in order. Raises `NothingSelectedError`."""
+        """Return the numbers of the selected messages in order. Raises `NothingSelectedError`."""
         count = len(trace.messages.t)
         numbers = range(min(self.first, count), count if self.last is None else min(self.last + 1, count))
         if count and not numbers:

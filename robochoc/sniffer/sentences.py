@@ -1,7 +1,7 @@
-"""Messages in words: `Robot2.1 says: as long as V1.1 = 2, V2.1 cannot be 3`.
+"""Messages in words, such as `Robot2.1 says: as long as V1.1 = 2, V2.1 cannot be 3`.
 
-The words are defined in the message's class (`Message.in_words`). A message without words, or of a protocol that is not
-installed, is shown by its type, its FIPA act and its fields, so that any journal can be shown.
+The words are defined in the message's class (`Message.in_words`). If there are no words, or the protocol is not
+installed, the message is shown by its type, FIPA act and fields, so that any journal can be shown.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ from robochoc.sniffer.team_names import RunNames, run_names
 from robochoc.system.plain_text import MOST_LISTED, listed, printable
 
 ValueLabel = Callable[[str, int], str]
-"""Returns the name of a variable's value."""
+"""Returns the name for a variable's value."""
 
 
 class JournalSentences:
     """Follows a journal entry by entry, and returns its messages in words. Only names are stored.
 
-    `called` returns the names of values. None: values are shown as in the journal, and symbols by their names.
+    `called` returns the names for values. None: values are shown as in the journal, and symbols by their names.
     """
 
     def __init__(self, called: ValueLabel | None = None) -> None:
@@ -41,7 +41,7 @@ class JournalSentences:
         self._names = RunNames()
 
     def follow(self, entry: JournalEntry) -> None:
-        """Update the present protocol, and the names of the robots and their variables."""
+        """Update the current protocol, and the names of the robots and their variables."""
         match entry:
             case Header():
                 self._requested = entry.protocol
@@ -54,7 +54,7 @@ class JournalSentences:
                 pass
 
     def sentence(self, sent: Sent) -> str:
-        """Return a message as a sentence of its sender."""
+        """Return a message as a sentence spoken by its sender."""
         words = self._names.wording(sent.sender, sent.receiver, on_tree=self._on_tree)
         return sentence(sent.type, sent.content, words, self._types.get(sent.type))
 
@@ -75,7 +75,7 @@ class JournalSentences:
 
 
 class _SymbolNames(Mapping[str, Sequence[str]]):
-    """The names of the values of all variables."""
+    """The names for the values of all variables."""
 
     def __init__(self, called: ValueLabel) -> None:
         self._called = called
@@ -91,7 +91,7 @@ class _SymbolNames(Mapping[str, Sequence[str]]):
 
 
 class _ValueNames(Sequence[str]):
-    """The names of the values of one variable: item n is the name of the value n (n >= 0)."""
+    """The names for the values of one variable: item n is the name for value n (n >= 0)."""
 
     def __init__(self, called: ValueLabel, variable: str) -> None:
         self._called, self._variable = called, variable
@@ -115,13 +115,13 @@ _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 
 def sentence(kind: str, content: Mapping[str, Any], words: Wording, message_type: type[Message] | None) -> str:
-    """Return a recorded message as a sentence of its sender.
+    """Return a recorded message as a sentence spoken by its sender.
 
     Args:
-        kind: The name of its type.
-        content: Its recorded fields by name.
-        words: Its sender and receiver, and the names of the team.
-        message_type: Its class; None if the protocol is not installed or does not have this type.
+        kind: The name of the message type.
+        content: The recorded fields by name.
+        words: The message's sender and receiver, and the names in the team.
+        message_type: The message class. None: the protocol is not installed or lacks this type.
     """
     said = _in_words(content, words, message_type) if message_type else ""
     text = f"{words.sender} says: {said}" if said else _by_fields(kind, content, words.sender, message_type)

@@ -1,8 +1,8 @@
-"""The sniffer's server: the page and its data, for browsers on this machine only.
+"""The sniffer's server: sends the page and its data to browsers on this machine only.
 
-The path of the page cannot be guessed, since others may also use this machine. News to a browser are small, and only
-the newest are sent, so that a slow or stopped browser blocks nothing and needs no buffer. One thread uses the trace, in
-small pieces of work; another thread computes robots' states.
+The path of the page cannot be guessed, since other users may also have access to this machine. Updates to a browser are
+small, and only the newest are sent, so that a slow or stopped browser blocks nothing and needs no buffer. One thread
+works on the trace in small steps; another thread computes robots' states.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from robochoc.view.local_address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
 POLL_S = 0.1
-"""The interval between reads of a file without new content."""
+"""The interval between reads of a file without new content, in seconds."""
 NEWS_S = 0.2
-"""The shortest interval between two news to the same page."""
+"""The minimum interval between two updates to the same page, in seconds."""
 _PIECE = 1 << 16
 """The number of bytes of a journal that are sent at once."""
 _MOST_DIGITS = 10
 _HEAD_PATIENCE_S = 20.0
-"""The longest time for which a request waits for the first block of the journal."""
+"""The maximum time for which a request waits for the first block of the journal, in seconds."""
 
 R = TypeVar("R")
 
@@ -40,9 +40,9 @@ R = TypeVar("R")
 def serve_sniffer(
     session: SnifferSession, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
 ) -> None:
-    """Serve `session` to browsers of this machine, until interrupted (Ctrl-C); then return.
+    """Serve `session` to browsers on this machine until interrupted (Ctrl-C), then return.
 
-    Port 0 selects any free port. `ready` is called with the URL when it can be opened.
+    Port 0 selects any free port. `ready` is called with the URL as soon as it can be opened.
 
     Raises:
         OSError: if the port is in use.
@@ -67,7 +67,7 @@ async def _serve(
 class Server:
     """Serves the journal of `session` on the socket `listener`, below `/token/`.
 
-    `seen` is called when the first page has connected. The journal is not read before the first request.
+    `seen` is called when the first page has connected. The journal is only read after the first request.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Server:
         self._wanted = asyncio.Event()
         self._changed = asyncio.Event()
         self.version = 0
-        """Changes whenever there is something new."""
+        """A version that changes whenever there is something new."""
         self.trouble: str | None = None
 
     async def serve(self) -> None:
@@ -100,7 +100,7 @@ class Server:
     # Requests of handlers
 
     async def read(self, answer: Callable[[], R]) -> R:
-        """Run `answer` in the thread of the trace, as soon as there is a trace; return its result."""
+        """Run `answer` in the thread that works on the trace, as soon as there is a trace, and return the result."""
         self.connected()
         loop = asyncio.get_running_loop()
         while self.trouble is None:
@@ -113,7 +113,7 @@ class Server:
         raise BadRequestError(self.trouble)
 
     async def compute(self, answer: Callable[[], R]) -> R:
-        """Run `answer` in the thread for slow requests; return its result."""
+        """Run `answer` in the thread for slow requests, and return the result."""
         return await asyncio.get_running_loop().run_in_executor(self._states_thread, answer)
 
     async def change(self, since: int) -> None:
@@ -166,7 +166,7 @@ class Server:
 
 
 class _TokenHandler(SecretHandler):
-    """Accepts requests with the right token, and refuses pages of other sites."""
+    """Accepts requests with the correct token, and refuses requests from pages of other sites."""
 
     def initialize(self, server: Server) -> None:
         self.server = server
@@ -222,7 +222,7 @@ class _AnswerHandler(_TokenHandler):
 
 
 class _JournalHandler(_TokenHandler):
-    """Sends the journal's file in its present state."""
+    """Sends the journal's file in its current state."""
 
     def head(self, _token: str) -> None:
         self._describe()
@@ -247,7 +247,7 @@ class _JournalHandler(_TokenHandler):
 
 
 class _NewsSocket(SecretSocket):
-    """Sends a page the progress; changes during sending go into the next message."""
+    """Sends the progress to a page. Changes during sending are included in the next message."""
 
     def initialize(self, server: Server) -> None:
         self.server = server
@@ -266,7 +266,7 @@ class _NewsSocket(SecretSocket):
                 news = encode(await self.server.read(self.server.session.news)).decode()
                 if news != last:
                     last = news
-                    await self.write_message(news)  # returns when it is sent, so that the next news are the newest
+                    await self.write_message(news)  # returns after sending, so that the next update is the newest
                 await asyncio.sleep(NEWS_S)
                 await self.server.change(version)
         except (WebSocketClosedError, BadRequestError, TimeoutError):

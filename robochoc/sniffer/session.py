@@ -1,4 +1,4 @@
-"""The data of the server: a journal's file, its trace so far, and the answers about it."""
+"""The server's data: a journal's file, its trace so far, and the answers to requests about it."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ class NotBegunError(BadRequestError):
 
 
 class SnifferSession:
-    """A journal. `source`: its path, or a descriptor of its file, which may still be written.
+    """A journal that may still be written. `source`: the path or a descriptor of its file.
 
-    `chosen`: names or patterns of the robots to show at first; `robots`: robots whose files are known from elsewhere.
-    All methods except `states` must be called in one thread.
+    `chosen`: names or patterns of the robots that are shown at first; `robots`: robots whose files are known from
+    another source. All methods except `states` must be called in the same thread.
 
     Raises:
         OSError: if the file cannot be read.
@@ -62,16 +62,16 @@ class SnifferSession:
         return self._live_trace.presentable
 
     def advance(self) -> bool:
-        """Read a small part; return False if there was none. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
+        """Read a little; return False at the end. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
         return self._live_trace.advance() or self._replaced()
 
     def read_header(self) -> None:
-        """Read up to the header, if there is one. Raises as `advance`."""
+        """Read until the header, if there is one. Raises the exceptions of `advance`."""
         while self._live_trace.trace is None and self._live_trace.advance():
             pass
 
     def _replaced(self) -> bool:
-        """Return whether another file has replaced the journal; if so, open it."""
+        """Return whether another file has replaced the journal, and if so, open that file."""
         if self._path is None:
             return False
         try:
@@ -79,7 +79,7 @@ class SnifferSession:
                 return False
             descriptor = open_to_read(self._path)
             file = GrowingFile(descriptor)
-        except OSError:  # the file was removed: the content read so far is still shown
+        except OSError:  # the file was removed: what has been read is still shown
             return False
         self._robot_states = None
         os.close(self._descriptor)
@@ -101,7 +101,7 @@ class SnifferSession:
             self._robot_states.stopped = True
 
     def _age_s(self) -> float:
-        """Return the seconds since the file was last written; 0 if it is known to have a writer."""
+        """Return the seconds since the file was last written, or 0 if it is known to have a writer."""
         if self._written:
             return math.inf
         return 0.0 if self._live else time.time() - os.fstat(self._descriptor).st_mtime
@@ -127,7 +127,7 @@ class SnifferSession:
         return self._answers.about()
 
     def news(self) -> dict[str, Any]:
-        """Return the progress: the page's news, and the part of the file that has been read, from 0 to 1."""
+        """Return the progress: the updates for the page, and the fraction of the file read so far, from 0 to 1."""
         return {**self._answers.news(), "loaded": round(self._live_trace.loaded, 3)}
 
     def rows(self, what: str, first: int, end: int) -> bytes:
@@ -141,7 +141,7 @@ class SnifferSession:
                 return self._answers.decisions(first, end)
 
     def details(self, chunk: int) -> bytes:
-        """Return the contents of the messages of a chunk as JSON. Raises `BadRequestError`."""
+        """Return the contents of the messages in a chunk as JSON. Raises `BadRequestError`."""
         trace = self._trace
         key = (trace.generation, chunk)
         answer = self._details.get(key)
@@ -159,7 +159,7 @@ class SnifferSession:
         return robots[number]
 
     def states(self, robot: str, chunk: int) -> bytes:
-        """Return the robot's states after its steps of a chunk as JSON. This is slow. Raises `BadRequestError`."""
+        """Return the robot's states after the steps in a chunk as JSON; this is slow. Raises `BadRequestError`."""
         from robochoc.sniffer.robot_states import RobotStates  # noqa: PLC0415 - slow, and the page is shown first
 
         self._robot_states = self._robot_states or RobotStates()
@@ -168,7 +168,7 @@ class SnifferSession:
     # The scene
 
     def scene(self, first: int = 0) -> bytes:
-        """Return the drones, and their moves for the decisions from `first`, as JSON; `null` if there will be none."""
+        """Return the drones and their moves for the decisions from `first` as JSON; `null` if there are no drones."""
         from robochoc.sniffer.scene import TraceScene, robots_given  # noqa: PLC0415 - as above
 
         trace = self._trace
@@ -184,7 +184,7 @@ class SnifferSession:
 
     @property
     def size(self) -> int:
-        """The present length of the file."""
+        """The current length of the file."""
         return self._file.size
 
     @property
@@ -195,5 +195,5 @@ class SnifferSession:
         return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "._-") else "_" for sign in name)[:100]
 
     def bytes_at(self, place: int, most: int) -> bytes:
-        """Return up to `most` bytes of the file, from the position `place`."""
+        """Return up to `most` bytes of the file, starting at position `place`."""
         return os.pread(self._descriptor, most, place)

@@ -1,4 +1,4 @@
-"""Names for messages in words, from a journal: the order of the robots, their variables, and symbols."""
+"""Names that describe a journal's messages in words: the order of the robots, their variables, and symbols."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from robochoc.sniffer.trace import Trace
 
 
 class RunNames(NamedTuple):
-    """The names for the messages of a run; empty if the team is not known.
+    """The names for the messages in a run; empty if the team is unknown.
 
     Attributes:
         order: All robots, the highest priority first.
-        interfaces: The variables whose values are in a robot's messages, by robot.
-        symbols: The names of the values of a symbolic variable, by variable.
-        tree: The pseudo-tree induced by the order, if the protocol uses it.
+        interfaces: The variables whose values a robot sends, by robot.
+        symbols: The names for the values of a symbolic variable, by variable.
+        tree: The pseudo-tree induced by the order, if the protocol uses a pseudo-tree.
     """
 
     order: tuple[str, ...] = ()
@@ -30,7 +30,7 @@ class RunNames(NamedTuple):
     tree: PseudoTree | None = None
 
     def wording(self, sender: str, receiver: str, *, on_tree: bool) -> Wording:
-        """Return the words for a message. `on_tree`: whether the protocol uses the order's pseudo-tree."""
+        """Return the names for describing a message. `on_tree`: whether the protocol uses the order's pseudo-tree."""
         branch = self.order
         if on_tree:
             known = self.tree if self.tree and sender in self.tree.parents else None
@@ -39,7 +39,7 @@ class RunNames(NamedTuple):
 
 
 def run_names(team: Team, *, on_tree: bool) -> RunNames:
-    """Return the names of the robots and variables of `team`."""
+    """Return the names of the robots and variables in `team`."""
     tree = None
     if on_tree:
         parents = {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
@@ -50,7 +50,7 @@ def run_names(team: Team, *, on_tree: bool) -> RunNames:
 
 
 class _DecidedVariables(Mapping[str, tuple[str, ...]]):
-    """The variables that each robot has decided in the part of the journal read so far."""
+    """The variables that each robot has decided in the part of the journal that has been read."""
 
     def __init__(self, variables: Mapping[str, Mapping[str, None]]) -> None:
         self._variables = variables
@@ -68,8 +68,8 @@ class _DecidedVariables(Mapping[str, tuple[str, ...]]):
 class TeamNames:
     """The known names of the robots and their variables in each run of `trace`.
 
-    They are from the robots' files. If the journal has no files, the variables decided by a robot are assumed to be
-    those in its messages, which is correct for robots without private variables.
+    The names come from the robots' files. If the journal has no files, a robot's messages are assumed to contain the
+    variables that the robot decided, which is correct for robots without private variables.
     """
 
     def __init__(self, trace: Trace, protocols: RunProtocols) -> None:
@@ -88,14 +88,14 @@ class TeamNames:
         return list(self._trace.variables.get(robot, ()))
 
     def wording(self, run: int, sender: str, receiver: str) -> Wording:
-        """Return the words for a message of a run."""
+        """Return the names for describing a message in a run."""
         names = self._of_run(run)
         if not names.interfaces:
             names = names._replace(interfaces=_DecidedVariables(self._trace.variables))
         return names.wording(sender, receiver, on_tree=self._uses_tree(run))
 
     def labelled(self, values: Mapping[str, int]) -> Mapping[str, int | str]:
-        """Return decided values, with the names of symbols that are known from the last run."""
+        """Return decided values, with the names of symbols known from the last run."""
         symbols = self._of_run(len(self._trace.runs) - 1).symbols if self._trace.runs else {}
         if not symbols:
             return values
@@ -117,12 +117,12 @@ class TeamNames:
         return self._known[number]
 
     def _team(self, number: int) -> Team | None:
-        """Return the team of a run. Each run records only the changed robots."""
+        """Return the team in a run. Each run records only the robots that have changed."""
         runs = self._trace.runs
         while len(self._teams) <= number:
             given = runs[len(self._teams)].given
             if given is None and len(self._teams) == len(runs) - 1 and not self._trace.over:
-                return None  # it may still come
+                return None  # the file may still arrive
             team = None
             if given is not None:
                 try:

@@ -1,9 +1,9 @@
-"""The trace: runs as columns of numbers, for drawing them in a page, and for the causes of messages.
+"""The trace: runs as columns of numbers, from which a page draws them and the causes of messages are found.
 
-A trace is built from events. A robot's step is the processing of one packet: receiving messages, changing state, and
-sending messages. Steps are numbered in the order of their ends, and the messages of a step are consecutive, so the
-numbers of messages are in causal order. This holds whatever the order of the events is: a step with a received message
-whose sending is missing waits for that event, since the robots' clocks and the order of their reports may differ.
+A trace is built from events. A robot's step is the processing of one packet: receiving messages, changing its state,
+and sending messages. Steps are numbered in the order of their ends, and the messages sent in a step are consecutive, so
+message numbers are in causal order. This is true for any order of events: if a step received a message whose sending is
+not yet recorded, the step waits for that event, since the robots' clocks and the order of their reports may differ.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from robochoc.system.errors import RobochocError
 class RunRecord(msgspec.Struct, frozen=True):
     """A run, or epoch: its first message and step, and the robots' problems (`given`; None: unknown).
 
-    `files`: the robots' XML files by name, also those from earlier runs.
+    `files`: the robots' XML files by name, including files from earlier runs.
     """
 
     number: int
@@ -58,7 +58,7 @@ class RunRecord(msgspec.Struct, frozen=True):
 
 
 class TraceNote(msgspec.Struct, frozen=True):
-    """An event other than messages and decisions. `step`: the number of its step of `robot`.
+    """An event that is neither a message nor a decision. `step`: the step of `robot` in which it happened.
 
     For events outside of steps, such as losses and refusals, `step` is the number of the next step.
     """
@@ -71,10 +71,10 @@ class TraceNote(msgspec.Struct, frozen=True):
 
 
 class MessageTable(NamedTuple):
-    """The columns of the messages; see `columns.py` for their kinds.
+    """The columns for messages; see `columns.py` for their types.
 
-    `taken`: the step that received the message, or `NOT_YET`, which may change. `sequence`: the number of the message
-    among those of its sender in a run, from 1.
+    `taken`: the step that received the message, or `NOT_YET`, which may change later. `sequence`: the sender's number
+    for the message within the run, from 1.
     """
 
     t: Any
@@ -90,7 +90,7 @@ class MessageTable(NamedTuple):
 
 
 class StepTable(NamedTuple):
-    """The columns of the steps. `packet_end` and `said_end` count the messages received and sent up to a step's end."""
+    """The columns for steps. `packet_end`, `said_end`: the numbers of messages received and sent up to a step's end."""
 
     t: Any
     clock: Any
@@ -102,7 +102,7 @@ class StepTable(NamedTuple):
 
 
 def note_of(event: AnyEvent, step: int) -> TraceNote | None:
-    """Return the note for an event other than a message; None if the event has no note."""
+    """Return the note for an event that is not a message, or None if the event has no note."""
     match event:
         case Improved():
             return TraceNote(event.t, step, "improved", "", f"the best cost so far is {cost_shown(event.cost)}")
@@ -119,20 +119,20 @@ def note_of(event: AnyEvent, step: int) -> TraceNote | None:
 
 
 MOST_NAMES = 0xFFFF
-"""The maximum number of robots, types of messages, and runs, which are numbered by two bytes."""
+"""The maximum number of robots, message types, and runs, which are numbered by two bytes."""
 
 
 MOST_COUNTED = 1 << 53
 
 
 class TraceTooLargeError(RobochocError, ValueError):
-    """A journal with more robots, types of messages, or runs than a trace can number."""
+    """The journal has more robots, message types, or runs than a trace can number."""
 
 
 class PendingChannel:
     """The messages in transit from one robot to another in a run.
 
-    `owed`: the number of received messages whose sending is not recorded yet.
+    `owed`: the number of received messages whose sending is not yet recorded.
     """
 
     __slots__ = ("in_transit", "owed")
@@ -143,7 +143,7 @@ class PendingChannel:
 
 
 class PendingStep:
-    """A step that has not ended, or waits for the recorded sending of messages that it received."""
+    """A step that has not ended, or waits until the sending of its received messages is recorded."""
 
     __slots__ = ("checks", "clock", "decided", "notes", "packet", "received", "sent", "t")
 
@@ -157,7 +157,7 @@ class PendingStep:
         self.clock = self.checks = 0
 
     def is_complete(self) -> bool:
-        """Move known received messages to the step's packet; return whether all received messages are known."""
+        """Move known received messages to the step's packet. Return whether all received messages are known."""
         while self.received:
             if not self.received[0].in_transit:
                 return False
@@ -166,9 +166,9 @@ class PendingStep:
 
 
 class Trace:
-    """The events of all runs of a journal. Columns, lists and numbers only grow.
+    """The events in all runs of a journal. Columns, lists and numbers only grow.
 
-    `generation` distinguishes traces with different numberings: a rebuilt trace has the next one.
+    `generation` distinguishes traces with different numberings: a rebuilt trace has the next generation.
     """
 
     def __init__(self, header: Header, generation: int = 0) -> None:
@@ -185,7 +185,7 @@ class Trace:
         self.decisions: list[tuple[int, dict[str, int]]] = []
         self.notes: list[TraceNote] = []
         self.variables: dict[str, dict[str, None]] = {}
-        """The variables that each robot has decided, in the order of their first decisions, by robot."""
+        """The variables that each robot has decided, by robot, in the order of their first decisions."""
         self.over = False
         self.outcome: Outcome | None = None
         self.damage: str | None = None
@@ -207,7 +207,7 @@ class Trace:
         return trace
 
     def add(self, events: Iterable[AnyEvent]) -> None:
-        """Add `events`, each robot's in its own order. Raises `TraceTooLargeError`."""
+        """Add `events`, in which each robot's events are in order. Raises `TraceTooLargeError`."""
         for event in events:
             match event:
                 case Sent():
@@ -221,7 +221,7 @@ class Trace:
                     self._add_rare(event)
 
     def flush(self) -> None:
-        """Stop waiting: received messages whose sending is not recorded are counted as unseen."""
+        """Stop waiting: count received messages whose sending is not recorded as unseen."""
         waiting = [(queue[0].t, robot) for robot, queue in self._waiting.items()]
         heapq.heapify(waiting)
         while waiting:
@@ -244,16 +244,16 @@ class Trace:
         return self._contents[message]
 
     def packet(self, step: int) -> list[int]:
-        """Return the messages that a step received, in their order."""
+        """Return the messages received in a step, in order."""
         first = self.steps.packet_end[step - 1] if step else 0
         return list(self.packets[first : self.steps.packet_end[step]])
 
     def sent_in(self, step: int) -> range:
-        """Return the messages that were sent in a step."""
+        """Return the messages sent in a step."""
         return range(self.steps.said_end[step - 1] if step else 0, self.steps.said_end[step])
 
     def causes(self, message: int) -> list[int]:
-        """Return the messages received by the step that sent this message; none if it was sent at the start."""
+        """Return the messages received by the step that sent this message; empty if it was sent at the start."""
         return self.packet(self.messages.step[message])
 
     def consequences(self, message: int) -> range:
@@ -262,7 +262,7 @@ class Trace:
         return range(0) if taken == NOT_YET else self.sent_in(taken)
 
     def number_of(self, robot: str) -> int:
-        """Return the number of a robot; assign one if it is new. Raises `TraceTooLargeError`."""
+        """Return the number of a robot, which is assigned if the robot is new. Raises `TraceTooLargeError`."""
         return _number(robot, self._number_of_robot, self.robots)
 
     # Runs
@@ -275,7 +275,7 @@ class Trace:
         self._sent_counts: dict[str, int] = {}
 
     def _close(self) -> None:
-        """End the run: stop waiting, and end the steps without a recorded end."""
+        """End the run: stop waiting, and end the steps whose end is not recorded."""
         for robot, step in list(self._open.items()):
             step.checks = self._checks.get(robot, 0)
             self._ready(robot, step)
@@ -298,7 +298,7 @@ class Trace:
         )
 
     def _set_given(self, given: Given) -> None:
-        """Record the robots' problems of this run, and number the robots in their order."""
+        """Record the robots' problems in this run, and number the robots in their order."""
         if not self.runs:
             self._new_run(Began(t=given.t, protocol=self.header.protocol))
         known = self.runs[-2].files if len(self.runs) > 1 else {}
@@ -360,7 +360,7 @@ class Trace:
         self._ready(robot, step)
 
     def _ready(self, robot: str, step: PendingStep) -> None:
-        """Write an ended step, or store it until the sending of its received messages is recorded."""
+        """Write an ended step, or store it until the sending of the messages it received is recorded."""
         self._open.pop(robot, None)
         queue = self._waiting.get(robot)
         if queue is not None:
@@ -373,7 +373,7 @@ class Trace:
             self._waiting[robot] = deque([step])
 
     def _write_ready(self, robots: Iterable[str]) -> None:
-        """Write the complete stored steps of `robots`, and of receivers of their messages."""
+        """Write the complete stored steps of `robots`, and of the robots that received messages from these."""
         ready = list(robots)
         while ready:
             robot = ready.pop()
@@ -386,13 +386,13 @@ class Trace:
                 del self._waiting[robot]
 
     def _give_up(self, step: PendingStep) -> None:
-        """Count the messages for which `step` still waits as unseen."""
+        """Count the messages for which `step` is still waiting as unseen."""
         while not step.is_complete():
             step.received.popleft().owed += 1
             self.unseen += 1
 
     def _write(self, robot: str, step: PendingStep) -> None:
-        """Write the step and each of its messages as rows."""
+        """Write a step and each of its messages as rows."""
         steps, number = self.steps, len(self.steps.t)
         run = len(self.runs) - 1
         for message in step.packet:
@@ -448,5 +448,5 @@ def _number(name: str, numbers: dict[str, int], names: list[str]) -> int:
 
 
 def _counted(number: int) -> int:
-    """Return a count, limited to integers that a float represents exactly; a journal may contain any number."""
+    """Return a count clamped to integers that a float represents exactly, since a journal may contain any number."""
     return min(max(number, 0), MOST_COUNTED)

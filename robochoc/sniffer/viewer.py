@@ -1,8 +1,8 @@
-"""A viewer: a separate process that serves the page of a run, so that viewing does not slow down the robots.
+"""A viewer: a separate process that serves the page for a run, so that viewing does not slow down the robots.
 
-It is started before the robots, with the journal's file and a listening socket, so that its URL is known at once. The
-robots and the viewer share only the file, which the viewer reads when a page has connected. It ends when its parent
-closes the pipe or ends.
+The viewer is started before the robots, with the journal's file and a listening socket, so that its URL is known at
+once. The robots and the viewer share only the file, which the viewer reads once a page has connected. The viewer ends
+when its parent closes the pipe or ends.
 """
 
 from __future__ import annotations
@@ -20,16 +20,16 @@ from robochoc.system.signals import signals_delayed
 from robochoc.view.local_address import RedirectFile, loopback_socket, secret_path, url_of
 
 _PATIENCE_S = 2.0
-"""The time limit for the end of the process."""
+"""The time limit for ending the process, in seconds."""
 _MOST_CHOSEN = 1000
 _PROGRAM = "robochoc.sniffer.viewer_process"
 
 
 class Viewer:
-    """The viewer of the journal in the file `journal` (a descriptor, open for reading).
+    """The viewer for the journal in the file `journal` (a descriptor that is open for reading).
 
-    `chosen`: names or patterns of robots to show at first. Port 0 selects any free port. With `open_browser`, the page
-    is opened in the user's browser.
+    `chosen`: names or patterns of the robots that are shown at first. Port 0 selects any free port. With
+    `open_browser`, the page is opened in the user's browser.
 
     Raises:
         OSError: if the port is in use, or the process cannot be started.
@@ -55,10 +55,10 @@ class Viewer:
                 os.close(theirs_in)
                 os.close(theirs_out)
         self._heard, self._lifeline = heard, lifeline
-        # Not as arguments, which are visible to all users of this machine.
+        # On the pipe instead of as arguments, which all users of this machine can see.
         shown = self._redirect.url if self._redirect else None
         settings = json.dumps({"token": token, "chosen": [*chosen][:_MOST_CHOSEN], "shown": shown}).encode()
-        with suppress(BrokenPipeError):  # the process has already ended, which is reported later
+        with suppress(BrokenPipeError):  # the process has already ended; this is reported later
             os.write(lifeline, settings + b"\n")
 
     def __enter__(self) -> Self:
@@ -68,7 +68,7 @@ class Viewer:
         self.close()
 
     def wait_until_seen(self, most_s: float) -> bool:
-        """Wait until a page has connected; return False after `most_s` seconds without one."""
+        """Wait until a page has connected. Return False if none has connected after `most_s` seconds."""
         ready, _, _ = select.select([self._heard], [], [], most_s)
         seen = bool(ready and os.read(self._heard, 1))
         if seen and self._redirect:
@@ -106,8 +106,8 @@ class Viewer:
 
 
 def _started(listening: int, journal: int, theirs_in: int, theirs_out: int) -> subprocess.Popen[bytes]:
-    """Start the viewer's process with these descriptors, and return it."""
-    with signals_delayed():  # until the process handles them: Ctrl-C is also sent to it
+    """Start the viewer's process with these descriptors."""
+    with signals_delayed():  # until the process handles signals, since Ctrl-C is also sent to it
         return subprocess.Popen(  # noqa: S603 - our own module
             [sys.executable, "-P", "-m", _PROGRAM, str(listening), str(journal)],
             stdin=theirs_in,

@@ -1,7 +1,7 @@
 """The main program of a viewer's process: `python -m robochoc.sniffer.viewer_process SOCKET JOURNAL` (descriptors).
 
-The first line of standard input has the settings, a further byte means that the journal is complete, and the end of
-the input means that the parent has ended. A byte on standard output means that a page has connected. Before the first
+The first line on standard input contains the settings. A further byte means that the journal is complete, and the end
+of the input that the parent has ended. A byte on standard output means that a page has connected. Before the first
 request, the process imports nothing else, so it needs little memory.
 """
 
@@ -30,7 +30,7 @@ class _Parent(NamedTuple):
     output: int
 
     def line(self) -> bytes:
-        """Read the first line, and no further byte; return it, or empty if the parent has ended."""
+        """Read the first line but no further byte. Return the line, or an empty value if the parent has ended."""
         line = b""
         while not line.endswith(b"\n"):
             sign = os.read(self.input, 1)
@@ -55,7 +55,7 @@ def main() -> None:
         return
     settings = json.loads(line)
     if settings["shown"]:
-        # In a thread: a browser for the terminal returns when it is closed.
+        # In a thread, since a text-mode browser returns only when it is closed.
         threading.Thread(target=partial(webbrowser.open, settings["shown"]), daemon=True).start()
     over = False
     listening = socket.socket(fileno=int(sys.argv[1]))
@@ -86,11 +86,11 @@ async def _serve(
     asyncio.get_running_loop().add_reader(parent.input, read_parent)
     with suppress(asyncio.CancelledError):
         await serving
-    os._exit(0)  # without waiting for computations in threads
+    os._exit(0)  # do not wait for computations in threads
 
 
 def _parent() -> _Parent:
-    """Return the pipes from and to the parent, moved so that a started browser does not inherit them."""
+    """Return the pipes to and from the parent, moved so that a browser started here does not inherit them."""
     parent = _Parent(os.dup(0), os.dup(1))
     with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - not a path of this project
         os.dup2(nothing.fileno(), 0)
