@@ -1,1 +1,1 @@
-"""Protocols that search for the least cost, and prove it: one file each."""
+"""Protocols that search for the least cost and prove that it is optimal, one file each."""

@@ -1,9 +1,9 @@
 """Asynchronous Distributed Optimization (ADOPT).
 
-Complete search for minimum cost on a pseudo-tree, best-first. Each robot takes the value with the least lower bound, by
-the costs that its children report, and changes it as soon as its lower bound is above the threshold. So it may leave a
-value and return to it; the threshold, split among the children, lets them rebuild earlier solutions quickly. The search
-ends when the root has LB = UB.
+Complete, best-first search for minimum cost on a pseudo-tree. Each robot takes the value with the least lower bound,
+based on the costs that its children report, and changes it as soon as its lower bound is above the threshold. So it may
+leave a value and return to it; the threshold, split among the children, lets them rebuild earlier solutions quickly.
+The search ends when the root has LB = UB.
 
 - **When to use**: to compare with BnB-ADOPT+, which needs fewer messages.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The number of
@@ -12,7 +12,7 @@ ends when the root has LB = UB.
 - **References**: Modi, Shen, Tambe, Yokoo: "Adopt: asynchronous distributed constraint optimization with quality
   guarantees", Artificial Intelligence 161(1-2), 2005, Section 3.
 
-The methods have the names of its procedures:
+The methods have the names of the paper's procedures:
 
     initialize     `start_in_tree`                 maintainThresholdInvariant        `_maintain_threshold_invariant`
     when received  `handle`                maintainChildThresholdInvariant   `_maintain_child_threshold_invariant`
@@ -22,21 +22,21 @@ Choices that the paper leaves open, and differences:
 
 - The robots build the pseudo-tree themselves (`dfs`); each connected component has its own.
 - One decision is made for all waiting messages.
-- Constraints may be n-ary (the robot of the scope that is lowest in the tree pays, once it knows all others) and hard
-  (LB may become infinite; then a root ends the search).
+- Constraints may be n-ary (the robot that is lowest in the tree in the scope pays, once it knows all other values) and
+  hard (LB may become infinite; then a root ends the search).
 - UB is infinite until the values of all neighbours above are known.
-- A value in a context has a counter, as in BnB-ADOPT (`bnb_adopt`); the larger one wins, from any sender. Without it,
-  late costs would restore obsolete values of robots further up.
+- A value in a context has a counter, as in BnB-ADOPT (`bnb_adopt`); the larger counter wins, whoever sent it. Without
+  it, late costs would restore obsolete values of robots further up.
 - No message is repeated (Gutierrez, Meseguer: "Saving redundant messages in ADOPT-based algorithms", DCR workshop
   2010). The paper's robots repeat messages; under a slow schedule these would accumulate without end. Therefore a
   robot stores the last threshold, which is valid whenever its context is, and keeps the better of two bounds in one
   context.
-- The context of a threshold contains only the values that the child's subtree depends on.
+- The context of a threshold contains only the values on which the child's subtree depends.
 
 Termination: at quiescence all robots have terminated. Otherwise there is a highest robot that has not: its threshold is
 below UB. All contexts agree, so all robots have their parents' bounds and thresholds. With LB(d) <= threshold < UB(d)
-for its value d, some child has t < ub. That is a threshold below UB again, and so on, down to a leaf, where LB = UB: a
-contradiction.
+for its value d, some child has t < ub. At that child, the threshold is again below UB. The argument repeats down to a
+leaf, where LB = UB: a contradiction.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -65,7 +65,7 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class ADOPT(BoundingProtocol):
-    """One agent of ADOPT. State besides the bounds: `threshold`, and its shares for the children, `t`.
+    """One agent of ADOPT. State besides the bounds: `threshold`, and the children's shares of it, `t`.
 
     `parent_threshold` is the last Threshold that the parent sent.
     """
@@ -104,7 +104,7 @@ class ADOPT(BoundingProtocol):
                 assert_never(never)
 
     def act(self) -> None:
-        """Choose a value and send values, thresholds and costs that changed (backTrack)."""
+        """Choose a value and send the values, thresholds and costs that have changed (backTrack)."""
         self._maintain_threshold_invariant()
         self._choose()
         value = Value(*self.own)
@@ -129,14 +129,14 @@ class ADOPT(BoundingProtocol):
             self._maintain_child_threshold_invariant(child, index)
 
     def forget(self, child: str) -> None:
-        """Drop the bounds of `child`, and reset its share of the threshold."""
+        """Drop the bounds on `child`, and reset its share of the threshold."""
         super().forget(child)
         self.t[child] = [0] * len(self.problem.values)
 
     # Invariants
 
     def _maintain_threshold_invariant(self) -> None:
-        """Set the threshold: LB <= threshold <= UB; the parent's if its context is the current one."""
+        """Set the threshold: LB <= threshold <= UB; use the parent's if its context is current."""
         if self.agrees(self.parent_threshold.context):
             self.threshold = self.parent_threshold.threshold
         self.threshold = min(max(self.threshold, self.lb), self.ub)

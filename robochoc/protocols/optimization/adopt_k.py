@@ -1,9 +1,9 @@
 """ADOPT(k): between ADOPT and BnB-ADOPT.
 
-Complete search for minimum cost on a pseudo-tree. ADOPT leaves a value as soon as another one might be cheaper, and
-returns to it often; BnB-ADOPT keeps it until it cannot be the best. Here a robot leaves its value when the lower bound
-is k above ADOPT's threshold (TH^A), or has reached BnB-ADOPT's (TH^B). With k = 1 it decides as ADOPT does, with an
-infinite k as BnB-ADOPT.
+Complete search for minimum cost on a pseudo-tree. ADOPT leaves a value as soon as another value might be cheaper, and
+returns to it often; BnB-ADOPT keeps it until it cannot be the best. In ADOPT(k), a robot leaves its value when the
+lower bound is k above ADOPT's threshold (TH^A), or has reached BnB-ADOPT's (TH^B). With k = 1 it decides as ADOPT does,
+with an infinite k as BnB-ADOPT.
 
 - **When to use**: costs, a sparse graph, little memory.
 - **Guarantees**: complete for every k; it terminates with an optimum, or with a proof that there is no solution. The
@@ -13,7 +13,7 @@ infinite k as BnB-ADOPT.
   of a constraint, or more, works best. `heuristic`: as in `bnb_adopt`.
 - **Reference**: Gutierrez, Meseguer, Yeoh: "Generalizing ADOPT and BnB-ADOPT", IJCAI 2011.
 
-The procedures are BnB-ADOPT's (`bnb_adopt`), and ADOPT's of the threshold:
+The procedures are those of BnB-ADOPT (`bnb_adopt`), and those of ADOPT for the threshold:
 
     InitSelf                           `drop_threshold`
     MaintainThresholdInvariant         `act`
@@ -23,19 +23,20 @@ The procedures are BnB-ADOPT's (`bnb_adopt`), and ADOPT's of the threshold:
 
 Choices that the paper leaves open, and differences:
 
-- All of BnB-ADOPT+'s hold here: redundant messages are saved, constraints may be n-ary and hard.
-- With the same value, a child receives a lower TH^A, but not a higher one, which it does not need to continue. (ADOPT
-  sends both, in a separate message.) Measured, this saves messages for every k.
-- A changed context sets TH^A to 0, as it may not be valid there.
-- TH^A is kept when the parent has ended. It is then at most the least cost of the subtree, so that a robot whose UB is
-  not higher need not search further.
-- With an infinite k no TH^A is sent, and all messages are BnB-ADOPT+'s. A large finite k is not quite the same: where
-  TH^A = UB, a robot takes the value with the least UB, as in ADOPT.
+- All choices and differences of BnB-ADOPT+ also apply here: redundant messages are saved, constraints may be n-ary and
+  hard.
+- If the value is the same, a child receives a lower TH^A, but not a higher one, which it does not need to continue.
+  (ADOPT sends both, in a separate message.) In measurements, this saves messages for every k.
+- A changed context sets TH^A to 0, because it may not be valid in the new context.
+- TH^A is kept after the parent has ended. It is then at most the least cost of the subtree, so a robot whose UB is not
+  higher need not search further.
+- With an infinite k no TH^A is sent, and all messages are those of BnB-ADOPT+. A large finite k is not quite the same:
+  if TH^A = UB, a robot takes the value with the least UB, as in ADOPT.
 
 Termination: as in BnB-ADOPT, with one more condition. At quiescence there is a highest robot that has not terminated,
 with LB < UB, LB < TH^B, and TH^A < UB. For its value d, LB(d) < min(TH^B, UB), so each child has lb < its TH^B. The
-allowance split among the children is less than UB(d), so for some child t < ub, and thus TH^A < UB there, as it has
-received every lower t. And so on, down to a leaf, where LB = UB: a contradiction.
+allowance split among the children is less than UB(d), so for some child t < ub, and thus TH^A < UB at that child,
+because it has received every lower t. The argument repeats down to a leaf, where LB = UB: a contradiction.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -97,7 +98,7 @@ class Value(bnb_adopt.Value, frozen=True):
 
 
 class ADOPTk(BnBADOPT):
-    """One agent of ADOPT(k). State besides BnB-ADOPT's: `allowance` (TH^A), and its shares for the children, `t`.
+    """One agent of ADOPT(k). State besides that of BnB-ADOPT: `allowance` (TH^A), and the children's shares of it, `t`.
 
     BnB-ADOPT's `threshold` is TH^B.
     """
@@ -148,7 +149,7 @@ class ADOPTk(BnBADOPT):
     # The children's shares of the allowance
 
     def forget(self, child: str) -> None:
-        """Drop the bounds of `child`, and reset its share to them."""
+        """Drop the bounds on `child`, and reset its share to the new bounds."""
         super().forget(child)
         self.t[child] = [*self.bounds[child].lb]
 
@@ -159,7 +160,7 @@ class ADOPTk(BnBADOPT):
             clamp_share(self.t[child], self.bounds[child], index)
 
     def bound(self, child: str, context: Mapping[str, Entry], lb: Number, ub: Number) -> int | None:
-        """Store the bounds of a Cost of `child`, and keep its share within them."""
+        """Store the bounds in a Cost from `child`, and keep its share within them."""
         index = super().bound(child, context, lb, ub)
         if index is not None:
             clamp_share(self.t[child], self.bounds[child], index)
@@ -174,7 +175,7 @@ class ADOPTk(BnBADOPT):
 
     @property
     def _current_threshold(self) -> Number:
-        """TH^A, limited to the bounds of the value: LB(d) may be above it."""
+        """TH^A, clamped to the bounds on the value: LB(d) may be above it."""
         return min(max(self.allowance, self.lower[self.index]), self.upper[self.index])
 
     def value_for(self, name: str) -> Value:
@@ -189,5 +190,5 @@ class ADOPTk(BnBADOPT):
 
     @property
     def _searches_depth_first(self) -> bool:
-        """Whether this is BnB-ADOPT: the allowance does not matter."""
+        """Whether this is BnB-ADOPT, in which the allowance does not matter."""
         return self.settings.k == INFINITE

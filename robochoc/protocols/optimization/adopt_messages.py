@@ -1,4 +1,4 @@
-"""Messages of ADOPT: apart from `adopt.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of ADOPT, separate from `adopt.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,11 +1,11 @@
 """Asynchronous Forward Bounding (AFB), with backjumping (AFB-BJ).
 
 Complete search for minimum cost with a current partial assignment (CPA), which goes from robot to robot in priority
-order. Copies of it go to all lower robots, which answer with an estimate: a lower bound on the cost of adding their own
-values. The sender does not wait. Once the CPA and the estimates cost as much as the best solution (B), it takes its
-next value, wherever the CPA is at that moment. So there may be several CPAs. Each value carries its robot's counter of
-assignments (together the time-stamp). The first counter that differs decides which CPA is stronger; the others are
-obsolete.
+order. Copies of the CPA go to all lower robots, which answer with an estimate: a lower bound on the cost of adding
+their own values. The sender does not wait. Once the CPA and the estimates cost as much as the best solution (B), the
+sender takes its next value, wherever the CPA is at that moment. So there may be several CPAs. Each value carries its
+robot's counter of assignments; together, these counters are the time-stamp of the CPA. The first counter that differs
+decides which CPA is stronger; the others are obsolete.
 
 - **When to use**: costs, a dense graph, little memory.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
@@ -21,24 +21,26 @@ The methods have the names of its procedures, or of the messages that they handl
 
 Backjumping: if no value is cheap enough, a prefix of the CPA may already be the cause. So a robot sends an estimate for
 each prefix, and a CPA carries a lower bound for each of its prefixes (`least`): the costs of its own robots, and the
-estimates of all robots after the prefix that the CPA has passed. With the estimates of lower robots, that is a lower
-bound for the whole team. The CPA goes back to the last robot of the shortest prefix whose bound is not below B, as no
-solution with that prefix is better. (The paper's bound has no estimates of the robots in between. Wahbi, Ezzahir,
+estimates of all robots after the prefix that the CPA has passed. Together with the estimates of lower robots, this is a
+lower bound for the whole team. The CPA goes back to the last robot of the shortest prefix whose bound is not below B,
+because no solution with that prefix is better. (The paper's bound has no estimates from the robots in between. Wahbi,
+Ezzahir,
 Bessiere: "Asynchronous forward bounding revisited", CP 2013, also send one bound for each prefix.)
 
 An estimate is the minimum, over the robot's values, of the cost with the prefix plus h, a lower bound on constraints
 with lower robots only. So each constraint is in at most one term: in its highest robot's h until that robot has a
-value; later, once all others of the scope have values, in the estimate of the lowest robot, which pays it in the end.
-h is computed from the declared domains, without messages; for robots that may withdraw it is 0.
+value; later, once all other robots in the scope have values, in the estimate of the lowest robot, which finally pays
+it. h is computed from the declared domains, without messages; for robots that may withdraw it is 0.
 
 Choices that the paper leaves open, and differences:
 
-- Messages are read in packets; a robot decides when the inbox has been drained.
+- Messages are read in batches; a robot decides when the inbox has been drained.
 - Constraints may be n-ary. Values are tried by increasing cost.
 - Estimates are kept as long as their prefix is valid. Robots are asked only when their estimates may have changed, and
-  answer only with new ones. The next robot's answer is about the CPA itself.
+  answer only with new estimates. The next robot's answer is about the CPA itself.
 - A robot also checks its bound when B has changed, and when the CPA arrives.
-- Every CPA carries B, so that no robot concludes that there is no solution while the message about one is in transit.
+- Every CPA carries B, so that no robot concludes that there is no solution while the message about a solution is in
+  transit.
 - A robot that finds that no prefix allows a better solution ends the search (`Terminate`).
 - A robot with an empty domain reports it at the start.
 
@@ -89,10 +91,10 @@ from robochoc.system.plain_text import counted
 
 
 class CPA(Message, frozen=True):
-    """The current partial assignment, of the robots from the first one on (`CPA_MSG`).
+    """The current partial assignment of all robots from the first one to the sender (`CPA_MSG`).
 
     If its last value is the receiver's own, it was sent back: no extension of it costs less than `bound` (B). On the
-    way down, `least` holds a lower bound for each of its prefixes, the empty one first.
+    way down, `least` contains a lower bound for each of its prefixes, the empty prefix first.
     """
 
     assignments: list[Assignment]
@@ -142,7 +144,7 @@ class FBCPA(Message, frozen=True):
 class FBEstimate(Message, frozen=True):
     """Lower bounds on the cost of adding a value of the sender to each prefix of the CPA (`FB_ESTIMATE`).
 
-    The empty prefix is first; the last estimate holds for all longer ones. `stamp` is the CPA's time-stamp.
+    The empty prefix is first; the last estimate also holds for all longer prefixes. `stamp` is the CPA's time-stamp.
     """
 
     stamp: Sequence[int]
@@ -195,7 +197,7 @@ class NewSolution(Message, frozen=True):
 
 
 class Terminate(Message, frozen=True):
-    """The end of the search: no solution is better than the best one (`TERMINATE`)."""
+    """The end of the search: no solution is better than the best one found (`TERMINATE`)."""
 
     act = acts.TERMINATE
 
@@ -216,7 +218,7 @@ class AFB(Protocol):
     These are set while this robot holds a CPA or has passed it on:
 
     - `lower_bounds`: a lower bound for each prefix of the CPA, including this robot's estimate.
-    - `paid`: the cost of the CPA. `cost`: the same with this robot's value.
+    - `paid`: the cost of the CPA. `cost`: the cost including this robot's value.
     - `left`: the values not yet tried, the most costly first.
 
     `solution` is the best solution that this robot knows.
@@ -252,7 +254,7 @@ class AFB(Protocol):
         self._sent_estimates: dict[str, CPAEstimates] = {}
 
     def _cost_lookup(self) -> CostLookup:
-        """Return the lookup of this robot's costs; subclasses that know more costs override it."""
+        """Return the lookup of this robot's costs; overridden in subclasses that know more costs."""
         return CostLookup(self.problem, self.order)
 
     def start(self) -> None:
@@ -323,7 +325,7 @@ class AFB(Protocol):
             self._asked[sender] = assignments
 
     def _receive_new_solution(self, solution: NewSolution) -> None:
-        """Record a solution. Only the last robot finds them, each better than the one before."""
+        """Record a solution. Only the last robot finds solutions, each better than the one before."""
         self.solution = solution
         self.bound = min(self.bound, solution.cost)
         if self.over:
@@ -351,7 +353,7 @@ class AFB(Protocol):
             self.left = self.costs.by_decreasing_cost()
 
     def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
-        """Keep the value while its bound is below B; otherwise choose the cheapest one left, or backtrack."""
+        """Keep the value while its bound is below B; otherwise choose the cheapest remaining value, or backtrack."""
         while True:
             totals = self.estimates.totals(stamp_of(self._cpa))
             shortest = self._backtrack_to(lower_bounds, totals)
@@ -370,7 +372,7 @@ class AFB(Protocol):
                 return
 
     def _pass_on(self, lower_bounds: list[Cost]) -> bool:
-        """Send the CPA with this robot's value to the next robot. Return False if it is complete: it is a solution."""
+        """Send the CPA with this robot's value to the next robot. Return False if the CPA is complete, a solution."""
         if not self.below:
             self._send_new_solution()
             return False
@@ -406,12 +408,12 @@ class AFB(Protocol):
         self.value = None
 
     def _backtrack_to(self, lower_bounds: list[Cost], totals: list[Cost]) -> int | None:
-        """Return the length of the shortest prefix of the CPA with a bound of B or more; None: there is none."""
+        """Return the length of the shortest prefix of the CPA with a bound of at least B; None if there is none."""
         pairs = enumerate(zip(lower_bounds, totals, strict=False))
         return next((length for length, (cost, more) in pairs if cost + more >= self.bound), None)
 
     def _backtrack(self, length: int) -> None:
-        """Send the CPA back to the last robot of its prefix of `length`, which has no better solution."""
+        """Send the CPA back to the last robot in its prefix of this `length`, which has no better solution."""
         self.lower_bounds = self.value = None
         self._asked = {robot: asked for robot, asked in self._asked.items() if len(asked) < length}
         if length:
@@ -443,7 +445,7 @@ class AFB(Protocol):
         self._adopt_best()
 
     def _adopt_best(self) -> None:
-        """Adopt this robot's value in the best solution. Its message may arrive after `Terminate`."""
+        """Adopt this robot's value in the best solution. The solution may arrive after `Terminate`."""
         self.value = None if self.solution is None else self.problem.values.index(self.solution.values[self.rank])
 
     def _bound_of_all(self) -> Cost | None:

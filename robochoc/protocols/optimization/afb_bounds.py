@@ -1,4 +1,4 @@
-"""Lower bounds of AFB: a robot's estimates for each prefix of a CPA, and the estimates received from robots below."""
+"""Lower bounds in AFB: a robot's estimates for each prefix of a CPA, and the estimates received from robots below."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.local_problem import LocalProblem
 
 Cost = int | float
-"""Costs are integers, and `inf` where a hard constraint is broken."""
+"""Costs are integers, or `inf` if a hard constraint is broken."""
 
 Assignment = tuple[Value, int]
 """A robot's value, and the number of values that it has taken so far."""
 
 Stamp = Sequence[int]
-"""The time-stamp of a CPA: its robots' counters. Counters are never reused, so it identifies the assignments."""
+"""The time-stamp of a CPA: the counters of its robots. Counters are never reused, so it identifies the assignments."""
 
 
 class CostLookup:
     """The costs of this robot's values for each prefix of a CPA. Each constraint is evaluated once per prefix.
 
-    The prefix that a CPA shares with the last one is not evaluated again. `estimates` holds, for each prefix, the empty
-    one first, the minimum cost over this robot's values, including h.
+    The prefix that a CPA shares with the previous one is not evaluated again. `estimates` contains, for each prefix,
+    the empty one first, the minimum cost over this robot's values, including h.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -38,7 +38,7 @@ class CostLookup:
         self.estimates: list[Cost] = []
 
     def look_ahead(self) -> None:
-        """Compute the bounds that do not depend on a CPA (h)."""
+        """Compute the lower bounds that do not depend on a CPA (h)."""
         self._rows = [self._problem.costs({})]
         self.estimates = [self._estimate(self._rows[0])]
 
@@ -85,7 +85,7 @@ class CostLookup:
         self.estimates.append(self._estimate(self._rows[-1]))
 
     def _added(self, robot: str) -> Sequence[Cost] | None:
-        """Return the additional cost of each value with the value of `robot`, the lowest one known; None: no cost."""
+        """Return the additional cost of each value with the value of `robot`, the lowest known robot; None: no cost."""
         return self._problem.added(robot, self._view)
 
     def _estimate(self, row: Sequence[Cost]) -> Cost:
@@ -100,7 +100,7 @@ class CostLookup:
 class CPAEstimates(NamedTuple):
     """The estimates for the CPA with one time-stamp and all its prefixes, the empty one first.
 
-    The last estimate holds for all longer prefixes.
+    The last estimate also holds for all longer prefixes.
     """
 
     stamp: Stamp
@@ -109,7 +109,7 @@ class CPAEstimates(NamedTuple):
     def along(self, stamp: Stamp) -> list[Cost]:
         """Return the estimates that are valid for the prefixes of another CPA, given its time-stamp.
 
-        Estimates hold for the common prefix only. An estimate for a prefix is also a (weaker) one for all its
+        Estimates hold for the common prefix only. An estimate for a prefix is also a (weaker) estimate for all its
         extensions.
         """
         known = self.estimates[: common_length(self.stamp, stamp) + 1]
@@ -123,8 +123,8 @@ class CPAEstimates(NamedTuple):
 class Estimates:
     """The estimates received from lower-priority robots, each with the CPA that it was requested for.
 
-    An estimate for a prefix is valid while the CPA has that prefix. A robot sends nothing if its estimates follow from
-    those it sent before.
+    An estimate for a prefix is valid while the CPA has that prefix. A robot sends nothing if its new estimates follow
+    from those that it sent before.
     """
 
     def __init__(self) -> None:
@@ -132,7 +132,7 @@ class Estimates:
         self._received: dict[str, CPAEstimates] = {}
 
     def outdated(self, robot: str, stamp: Stamp) -> bool:
-        """Return whether the estimate of `robot` may differ from that for the last CPA sent to it.
+        """Return whether the estimate of `robot` may differ from its estimate for the last CPA sent to it.
 
         The first estimates that a robot sends show the number of robots on whose values they depend.
         """

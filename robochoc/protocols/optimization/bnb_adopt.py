@@ -1,20 +1,20 @@
 """Branch-and-Bound ADOPT (BnB-ADOPT+).
 
-Complete search for minimum cost on a pseudo-tree: ADOPT's messages and bounds, with depth-first branch and bound
-instead of best-first search. A robot keeps its value until LB(d) reaches the cost of the best known complete solution
-(UB), or its threshold (TH). It sends far fewer messages than ADOPT, as it does not return to the same values
-repeatedly.
+Complete search for minimum cost on a pseudo-tree, with the messages and bounds of ADOPT, but depth-first branch and
+bound instead of best-first search. A robot keeps its value until LB(d) reaches the cost of the best known complete
+solution (UB), or its threshold (TH). It sends far fewer messages than ADOPT, because it does not return to the same
+values repeatedly.
 
 - **When to use**: costs, a sparse graph, little memory.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
 - **Parameters (`--set`)**: `heuristic`. With `dp`, children first send lower bounds on the costs of their subtrees for
-  each value of their parent (two messages a robot); with `none` (default) lower bounds are 0 at first.
+  each value of their parent (two messages for each robot); with `none` (default) lower bounds are 0 at first.
 - **References**: Yeoh, Felner, Koenig: "BnB-ADOPT: an asynchronous branch-and-bound DCOP algorithm", JAIR 38, 2010,
   Section 4; for redundant messages: Gutierrez, Meseguer: "Saving redundant messages in BnB-ADOPT", AAAI 2010;
   for the heuristic: Ali, Koenig, Tambe: "Preprocessing techniques for accelerating the DCOP algorithm ADOPT", AAMAS
   2005.
 
-The methods have the names of the procedures, some of them in `depth_first`:
+The methods have the names of the paper's procedures; some of them are in `depth_first`:
 
     Start          `start_in_tree`                 InitSelf        `_merge`, `_choose`
     When Received  `handle`                InitChild       `forget` (in `bounding`, as the next ones)
@@ -26,24 +26,24 @@ Choices that the papers leave open, and differences:
 - Constraints may be n-ary, and there may be several trees (see `adopt`, also for hard constraints and unknown values
   of neighbours above).
 - Heuristic values h of a child include its costs with its parent, and the h of its own children, but not its costs with
-  other robots above. A robot begins once it has the values of all its children.
+  other robots above. A robot begins once it has received the floors from all its children.
 - A context grows as values become known; there is no initial value that all robots know. A value that was unknown
   before does not invalidate the threshold.
 - Bounds are computed when the inbox has been drained, also for InitSelf. The ID grows when the value changes. SCP of a
-  child contains the robots that its contexts have named.
+  child contains the robots that its contexts have mentioned.
 - A value is repeated only to a child that requests its threshold after InitSelf dropped it (ThReq). A lower threshold
-  alone is not sent. A higher one is, even with the same value: otherwise the child would wait for its parent, and its
-  parent for the child.
-- When UB <= LB, the robot takes the value with the least UB, as another one with the same LB may cost more.
-- Terminate contains the final values above. The search of the subtree continues with these, without a threshold, until
-  UB <= LB there, too: since the parent's bounds were computed, the robot may have taken other values in other
-  contexts. Before it sends Terminate, a robot sends its final value to all neighbours below, as robots further down
-  may need it.
+  alone is not sent. A higher threshold is sent even with the same value: otherwise the child would wait for its parent,
+  and the parent for its child.
+- When UB <= LB, the robot takes the value with the least UB, because another value with the same LB may cost more.
+- Terminate contains the final values above. The search of the subtree continues with these values, without a threshold,
+  until UB <= LB holds there, too: since the parent's bounds were computed, the robot may have taken other values in
+  other contexts. Before it sends Terminate, a robot sends its final value to all neighbours below, because robots
+  further down may need it.
 
 Termination: at quiescence all robots have terminated. Otherwise there is a highest robot that has not; its TH is
 infinite, and UB > LB. All contexts agree, so LB(d) < UB for its value d, and for some child lb < ub and lb < TH of the
-child. By the child's last message, LB < UB there, and LB < TH; so LB(d) < min(TH, UB) for its value d, and so on, down
-to a leaf, where LB = UB: a contradiction.
+child. By the child's last message, LB < UB at the child, and LB < TH; so LB(d) < min(TH, UB) for its value d. The
+argument repeats down to a leaf, where LB = UB: a contradiction.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -71,9 +71,9 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class BnBADOPT(DepthFirstProtocol):
-    """One agent of BnB-ADOPT+. State besides the search's (`depth_first`): `floors`.
+    """One agent of BnB-ADOPT+. State besides that of the search (`depth_first`): `floors`.
 
-    They are, for each value of this robot, the least cost of each child's subtree in any context (h).
+    A floor is, for each value of this robot, the least cost of a child's subtree in any context (h).
     """
 
     messages: ClassVar[Any] = TreeMessage | Value | Cost | Domain | Floor | Terminate
@@ -102,7 +102,7 @@ class BnBADOPT(DepthFirstProtocol):
                 self.send(child, Domain(list(self.problem.values)))
 
     def decide(self) -> None:
-        """Compute the bounds and act, unless floors of children are still to come."""
+        """Compute the bounds and act, unless floors from children are still missing."""
         if self.settings.heuristic == "none" or len(self.floors) == len(self.children):
             super().decide()
 
@@ -127,7 +127,7 @@ class BnBADOPT(DepthFirstProtocol):
         self._send_floor()
 
     def raise_floor(self, child: str, costs: list[Number]) -> None:
-        """Raise the lower bounds of `child` to the least costs of its subtree."""
+        """Raise the lower bounds on `child` to the least costs of its subtree."""
         if child not in self.bounds or child in self.floors or len(costs) != len(self.problem.values):
             raise ValueError(f"unexpected or repeated floor from {child}")
         self.floors[child] = costs
@@ -148,7 +148,7 @@ class BnBADOPT(DepthFirstProtocol):
         self.send(self.parent, Floor(floor))
 
     def forget(self, child: str) -> None:
-        """Drop the bounds of `child`, down to its floor."""
+        """Drop the bounds on `child`, down to its floor."""
         super().forget(child)
         floor = self.floors.get(child)
         if floor is not None:

@@ -1,7 +1,7 @@
 """BnB-ADOPT+ with soft arc consistency (BnB-ADOPT+-FDAC, BnB-ADOPT+-AC).
 
 Complete search for minimum cost on a pseudo-tree. Before the search, costs are moved up the tree: a robot below hands
-over its least cost with each value of a robot above, and the robot above counts it as its own cost. So robots above
+over its least cost for each value of a robot above, and the robot above counts this as its own cost. So robots above
 begin with good values, and with lower bounds near the optimum. Then BnB-ADOPT+ searches the resulting problem, in which
 every assignment has the same cost as before. This usually saves half or more of its messages.
 
@@ -20,33 +20,35 @@ The papers' terms:
     binary costs C_ij        `SoftArc.costs`             extension         within `project_up`
     C_phi                    the root's least `unary`    AC*, FDAC*        `move_costs`
 
-Ownership: the lowest robot of a constraint on the tree pays it, and only this robot moves its costs, to itself and to
-the other end. So no two robots ever change the same table, and no robot needs a copy of it: a robot above only needs
-the sum that it receives. A robot moves costs when those of all robots below have arrived. Its moves change only tables
-of robots further up, so one pass from the leaves to the roots reaches the fixpoint: two messages for each pair with a
-binary constraint, and for each parent and child.
+Ownership: the lowest robot of a constraint in the tree pays it, and only this robot moves its costs, to itself and to
+the other robot. So no two robots ever change the same table, and no robot needs a copy of it: a robot above only needs
+the sum that it receives. A robot moves costs when the costs from all robots below have arrived. Its moves change only
+tables of robots further up, so one pass from the leaves to the roots reaches the fixpoint, with two messages for each
+pair with a binary constraint, and for each parent and child.
 
 In the search, delta of a robot with the values `a` above is its cost in the given problem, plus the costs moved to its
-value, minus the costs it has moved to `a`. For a robot above whose value is unknown, only the costs put into the arc
-are missing, so delta is never negative and grows as values become known, which is all that the bounds require. Infinite
-costs are moved, never subtracted. A value with infinite cost after the moves keeps it, and is ignored elsewhere.
+value, minus the costs that it has moved to `a`. For a robot above whose value is unknown, only the costs put into the
+arc are missing, so delta is never negative and grows as values become known, which is all that the bounds require.
+Infinite costs are moved, never subtracted. A value whose cost is infinite after the moves keeps this cost, and is
+ignored elsewhere.
 
 Choices that the papers leave open, and differences:
 
-- The tree takes the place of the papers' total order: costs are moved up branches.
-- In the papers a copy of the costs is kept consistent, and the search uses the given ones: consistency serves to delete
-  values during the search. Here the search uses the moved costs, and nothing is deleted: measured, deletions would cost
-  as many messages as they save (docs/explanation/replications/complete-search.md).
-- All binary constraints between two robots are one arc, also if robots have several variables. Costs of constraints
-  over more robots are not moved, nor those of tables with more than 65,536 entries. The parent receives the cost of the
-  cheapest value even if there is no constraint.
-- A robot whose values all have infinite cost after the moves ends the search of all.
-- A robot begins its search with the first value of its parent. Earlier messages would have to be repeated then.
+- The tree replaces the papers' total order: costs are moved up along branches.
+- In the papers a copy of the costs is kept consistent, and the search uses the given costs: consistency serves to
+  delete values during the search. Here the search uses the moved costs, and nothing is deleted, because in measurements
+  deletions cost as many messages as they save (docs/explanation/replications/complete-search.md).
+- All binary constraints between two robots form one arc, even if robots have several variables. Costs of constraints
+  between more than two robots are not moved, and neither are tables with more than 65,536 entries. The parent receives
+  the cost of the cheapest value even if there is no constraint.
+- A robot whose values all have infinite cost after the moves ends the whole search.
+- A robot begins its search when the first value of its parent arrives. Messages sent earlier would have to be repeated.
 
-Termination: as in `bnb_adopt`. Domains arrive from above at once, and costs from below, leaves first; then the roots
-have their costs and send values, and so on down the tree: every robot begins its search.
+Termination: as in `bnb_adopt`. Domains arrive from above at once, and costs arrive from below, leaves first; then the
+roots have their costs and send values, and so on down the tree: every robot begins its search.
 
-Bounds and thresholds in messages are on costs after the moves: a subtree that costs 7, and has moved 5 up, sends 2.
+Bounds and thresholds in messages are on costs after the moves: if a subtree costs 7 and has moved 5 up, its robot sends
+2.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -87,7 +89,8 @@ class SoftArc:
     Attributes:
         costs: The costs left in the arc: a row for each value of that robot, with an entry for each value of this one.
         up: For each row, the cost moved to that robot's value. Infinite: all of this robot's values conflict with it.
-        put_in: For each value of this robot, the cost moved into the arc, less the cost moved out of it to that value.
+        put_in: For each value of this robot, the cost moved into the arc, minus the cost moved from the arc to that
+            value.
     """
 
     def __init__(self, costs: Sequence[Row], size: int) -> None:
@@ -96,10 +99,10 @@ class SoftArc:
         self.put_in: Row = [0] * size
 
     def project_up(self, own: Row, *, extending: bool) -> bool:
-        """Move costs to the values above; return whether there were any.
+        """Move costs to the values above; return whether any were moved.
 
-        With `extending`, as much of the `own` unary costs as possible is moved with them: full arc consistency of the
-        robot above.
+        With `extending`, as much of the `own` unary costs as possible is moved, too: full arc consistency of the robot
+        above.
         """
         live = _live(own)
         gains = [min([(own[i] if extending else 0) + row[i] for i in live], default=INFINITE) for row in self.costs]
@@ -136,7 +139,7 @@ class SoftArc:
             self.put_in[index] += least
 
     def _extend(self, own: Row, rows: Sequence[tuple[Row, Number]]) -> None:
-        """Move enough of the `own` costs into the arc for each of `rows` to yield its gain."""
+        """Move enough of the `own` costs into the arc so that each of `rows` can yield its gain."""
         for index in _live(own):
             needed = max([gain - row[index] for row, gain in rows], default=0)
             if needed > 0:
@@ -156,8 +159,8 @@ def move_costs(own: Row, arcs: Sequence[SoftArc], *, extending: bool) -> None:
     """Make `arcs` soft arc consistent; costs that could not be moved up remain in `own`.
 
     Args:
-        own: The unary cost of each value, including the costs that robots below have moved to it. It is changed.
-        arcs: The arcs, that of the parent first: the parent receives the least cost of all values (C_phi).
+        own: The unary cost of each value, including the costs that robots below have moved to it. Modified in place.
+        arcs: The arcs, the arc with the parent first: the parent receives the least cost of all values (C_phi).
         extending: Full directional arc consistency (FDAC*): unary costs are moved up. Otherwise arc consistency (AC*).
     """
     going_on = bool(arcs)
@@ -170,7 +173,7 @@ def move_costs(own: Row, arcs: Sequence[SoftArc], *, extending: bool) -> None:
 
 
 def _live(own: Row) -> list[int]:
-    """Return the places of the values that a solution may have."""
+    """Return the indices of the values that a solution may have."""
     return [index for index, cost in enumerate(own) if cost < INFINITE]
 
 
@@ -195,9 +198,9 @@ class Domain(Message, frozen=True):
 
 
 class Moved(Message, frozen=True):
-    """For each value of the receiver, a cost of the sender's subtree that the receiver counts as its own from now on.
+    """For each value of the receiver, a cost in the sender's subtree that the receiver counts as its own from now on.
 
-    Infinite: all values of the sender conflict with that value.
+    Infinite means that all values of the sender conflict with that value.
     """
 
     costs: list[Number]
@@ -219,7 +222,7 @@ class Moved(Message, frozen=True):
 
 
 class Value(bnb_adopt.Value, frozen=True):
-    """The sender's value, the number of its changes (ID), and the receiver's threshold (TH), less costs moved up."""
+    """The sender's value, the number of its changes (ID), and the receiver's threshold (TH), minus costs moved up."""
 
     def in_words(self, words: Wording) -> str:
         change = f"{words.own_value(self.value)} from now on (change {self.counter})"
@@ -229,7 +232,7 @@ class Value(bnb_adopt.Value, frozen=True):
 
 
 class Cost(bnb_adopt.Cost, frozen=True):
-    """Bounds on the cost of the sender's subtree in `context`, less costs moved up, and a threshold request."""
+    """Bounds on the cost of the sender's subtree in `context`, minus costs moved up, and a threshold request."""
 
     def in_words(self, words: Wording) -> str:
         told = bounds_in_words(words, self.context, self.lb, self.ub)
@@ -249,8 +252,9 @@ MAX_ENTRIES = 65_536
 class BnBADOPTFDAC(DepthFirstProtocol):
     """One agent of BnB-ADOPT+-FDAC.
 
-    State besides the search's: for each value of this robot, `moved_here`, the cost that robots below have moved to it,
-    and `unary`, its unary cost after this robot has moved costs (infinite: no solution has it); `arcs`, by robot above.
+    State besides that of the search: for each value of this robot, `moved_here`, the cost that robots below have moved
+    to it, and `unary`, its unary cost after this robot has moved costs (infinite: it is in no solution); `arcs`, by
+    robot above.
     """
 
     messages: ClassVar[Any] = TreeMessage | Domain | Moved | Value | Cost | Terminate
@@ -271,10 +275,10 @@ class BnBADOPTFDAC(DepthFirstProtocol):
         self.unary: list[Number] = [*problem.charges]
         self.arcs: dict[str, SoftArc] = {}
         self._rows: dict[str, dict[message.Value, int]] = {}
-        """By robot above, the row of the arc for each of its values."""
+        """For each robot above, the rows of the arc by that robot's values."""
         self._above: set[str] = set()
         self._below: set[str] = set()
-        """Robots above whose values, and below whose costs, have not arrived yet."""
+        """Robots above whose values have not arrived yet, and robots below whose costs have not arrived yet."""
         self._given: list[Number] = []
         """The unary cost of each value of this robot in the given problem."""
 
@@ -383,5 +387,5 @@ class BnBADOPTFDAC(DepthFirstProtocol):
         return Value(value.value, value.counter, value.threshold)
 
     def bounds_for_parent(self) -> Cost:
-        """Return the bounds on the subtree's cost, less the costs it has moved up."""
+        """Return the bounds on the subtree's cost, minus the costs that the subtree has moved up."""
         return Cost(dict(self.context), self.lb, self.ub)

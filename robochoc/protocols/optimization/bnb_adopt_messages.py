@@ -1,4 +1,4 @@
-"""Messages of BnB-ADOPT, and its settings: apart from `bnb_adopt.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages and settings of BnB-ADOPT, separate from `bnb_adopt.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """The common base of ADOPT and BnB-ADOPT: contexts, and bounds on the cost of each value of a robot.
 
-Names and formulas are those of both papers (`adopt`, `bnb_adopt`). In the present context the subtree of child l costs
-between `lb(d, l)` and `ub(d, l)` if this robot takes value d; with this robot's cost, delta(d), the sums are LB(d) and
-UB(d), and LB and UB are the least of them. A context contains the values of robots above on which a bound depends.
+Names and formulas are those of both papers (`adopt`, `bnb_adopt`). In the current context the subtree of child l costs
+between `lb(d, l)` and `ub(d, l)` if this robot takes value d; adding this robot's cost, delta(d), gives LB(d) and
+UB(d), and LB and UB are their minima over d. A context contains the values of robots above on which a bound depends.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ from robochoc.system.compiling import mypyc_attr
 class Bounds:
     """Bounds on the cost of a child's subtree, for each value of this robot, in a context.
 
-    `scope` holds the ancestors, without this robot, on whose values the subtree depends, as far as the child has sent
-    them.
+    `scope` contains the ancestors, without this robot, on whose values the subtree depends, as far as the child has
+    sent them.
     """
 
     def __init__(self, size: int, scope: Iterable[str] = ()) -> None:
@@ -42,9 +42,10 @@ class BoundingProtocol(TreeProtocol):
     """One agent with bounds. State: `context` (CurrentContext), and for each child its `bounds`.
 
     - `counter`: the number of changes of the value.
-    - `lower` and `upper`: LB(d) and UB(d) for each value. `lb` and `ub`: LB and UB. They are computed when the inbox is
+    - `lower` and `upper`: LB(d) and UB(d) for each value. `lb` and `ub`: LB and UB. All are computed when the inbox is
     empty, before `act`.
-    - `last_values`: all ancestors have taken their final values. `terminated`: this robot has, too.
+    - `last_values`: all ancestors have taken their final values. `terminated`: this robot has taken its final value,
+      too.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -72,7 +73,7 @@ class BoundingProtocol(TreeProtocol):
 
     @abstractmethod
     def act(self) -> None:
-        """Choose a value and send what changed; the bounds are up to date."""
+        """Choose a value and send the changes; the bounds are up to date."""
 
     def decide(self) -> None:
         """Compute the bounds and act; a root whose lower bound is infinite ends the search of all trees."""
@@ -86,7 +87,7 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for a root also LB, a lower bound on the cost of its tree."""
+        """The position in the tree; for a root also LB, a lower bound on the cost of its tree."""
         root = self.placed and self.parent is None
         return msgspec.structs.replace(super().findings, bound=self.lb if root else None)
 
@@ -99,7 +100,7 @@ class BoundingProtocol(TreeProtocol):
     def merge(self, context: Mapping[str, Entry]) -> tuple[list[str], bool]:
         """Merge newer values into the context; return the changed robots, and whether a known value changed.
 
-        Bounds whose context contains an old value are dropped.
+        Bounds are dropped if their context contains an old value.
         """
         news = [name for name, entry in context.items() if self._is_newer(name, entry)]
         if not news:
@@ -128,9 +129,9 @@ class BoundingProtocol(TreeProtocol):
     # Bounds
 
     def bound(self, child: str, context: Mapping[str, Entry], lb: Number, ub: Number) -> int | None:
-        """Store the bounds of a Cost of `child`, after its context was merged; return the value that they apply to.
+        """Store the bounds in a Cost from `child`, after its context was merged; return the value that they apply to.
 
-        Return None if there is no such value: the child did not know it yet, or its context is obsolete.
+        Return None if there is no such value: the child did not know the value yet, or its context is obsolete.
         """
         values = {name: value for name, (value, _) in context.items()}
         own = values.pop(self.problem.agent, None)
@@ -146,7 +147,7 @@ class BoundingProtocol(TreeProtocol):
     def _weigh(self) -> None:
         """Compute LB(d), UB(d), LB and UB in the current context.
 
-        UB is infinite until the values of all neighbours above are known, as delta(d) may still grow.
+        UB is infinite until the values of all neighbours above are known, because delta(d) may still grow.
         """
         if self._outdated:
             self._outdated = False
@@ -160,11 +161,11 @@ class BoundingProtocol(TreeProtocol):
         self.lb, self.ub = min(self.lower), min(self.upper)
 
     def costs_in(self, view: Mapping[str, message.Value]) -> list[Number]:
-        """Return the cost of each value here with the values of neighbours above in `view` (delta)."""
+        """Return the cost of each value of this robot with the values of neighbours above in `view` (delta)."""
         return self.problem.costs(view)
 
     def cheapest(self, costs: Sequence[Number]) -> int:
-        """Return the value with the minimum of `costs`; the current value if it is one of several."""
+        """Return the value with the minimum of `costs`; if there are several, the current value if it is among them."""
         least = min(costs)
         if self.value is not None and costs[self.value] == least:
             return self.value
@@ -185,7 +186,7 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def index(self) -> int:
-        """The place of the value in the domain; it exists after `start_in_tree`."""
+        """The index of the value in the domain; available after `start_in_tree`."""
         assert self.value is not None  # noqa: S101
         return self.value
 
@@ -200,13 +201,13 @@ class BoundingProtocol(TreeProtocol):
         return self.parent is None or self.last_values
 
     def terminate(self) -> None:
-        """Keep the current value for good: send `Terminate` to the children, and nothing afterwards."""
+        """Keep the current value permanently: send `Terminate` to the children, and nothing afterwards."""
         self.terminated = True
         for child in self.children:
             self.send(child, Terminate({**self.context, self.problem.agent: self.own}))
 
     def send_if_new(self, receiver: str, message: Message) -> None:
-        """Send a message to `receiver` unless it is equal to the last one of its type sent there."""
+        """Send a message to `receiver` unless it equals the last message of its type sent there."""
         key = receiver, type(message)
         last = self._last.get(key)
         if last is not message and last != message:

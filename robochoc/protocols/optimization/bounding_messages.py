@@ -1,4 +1,4 @@
-"""Message parts that ADOPT and BnB-ADOPT share; apart, as mypyc cannot compile msgspec's classes."""
+"""Message parts that ADOPT and BnB-ADOPT share; separate, because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ Entry = tuple[message.Value, int]
 
 
 Context = dict[str, Entry]
-"""The values of robots above, as far as they are known."""
+"""The values of robots above, as far as these values are known."""
 
 
 Number = int | float
-"""Infinite where a hard constraint is broken, or the cost is unknown; integers remain integers on the wire."""
+"""Infinite if a hard constraint is broken, or if the cost is unknown; integers remain integers in messages."""
 
 
 class Terminate(Message, frozen=True):
@@ -51,9 +51,10 @@ def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Numb
 
 
 def bounds_prove(context: Context, lower: Number, upper: Number, reception: Reception) -> Sequence[Proof]:
-    """Return the proofs of bounds on the cost of the sender's subtree. Costs below the sender are at least 0.
+    """Return the proofs in bounds on the cost of the sender's subtree. Costs below the sender are at least 0.
 
-    If all neighbours of the sender are in the context, no robot is below it, and the lower bound is on its own cost.
+    If all neighbours of the sender are in the context, no robot is below the sender, and the lower bound is on its own
+    cost.
     """
     view = {robot: value for robot, (value, _) in context.items()}
     found: list[Proof] = [SomeValuePays(reception.sender, view, upper)]

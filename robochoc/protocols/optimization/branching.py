@@ -1,4 +1,4 @@
-"""The common base of NCBB, PT-FB and HS-CAI: branch and bound in every subtree of a pseudo-tree separately.
+"""The common base of NCBB, PT-FB and HS-CAI: separate branch and bound in each subtree of a pseudo-tree.
 
 While the robots above keep their values, a robot has the subtrees of its children searched for a cost below a limit. It
 does not commit to a value: it tries its values in each subtree by increasing lower bound, and different subtrees may be
@@ -7,8 +7,8 @@ and later the cost itself; or that no solution with the value costs less than th
 once its own cost and the bounds of all subtrees add up to that cost. The cheapest value with all subtrees searched is
 the best.
 
-A child returns its subtree's best assignment with its cost. So nothing is searched again, and the root knows the best
-assignment of its tree at any time.
+A child returns the best assignment of its subtree with the assignment's cost. So nothing is searched again, and the
+root knows the best assignment of its tree at any time.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import listed
 
 Number = int | float
-"""Infinite where a hard constraint is broken, or the cost is unknown; integers remain integers on the wire."""
+"""Infinite if a hard constraint is broken, or if the cost is unknown; integers remain integers in messages."""
 
 
 class Members(Message, frozen=True):
-    """For each robot above, the robots of the sender's subtree that share a constraint with it."""
+    """For each robot above, the robots in the sender's subtree that share a constraint with it."""
 
     linked: dict[str, list[str]]
 
@@ -61,7 +61,7 @@ class Members(Message, frozen=True):
 
 
 class Request(Message, frozen=True):
-    """A request for a lower bound on the receiver's cost with this value of the sender."""
+    """A request for a lower bound on the receiver's cost given this value of the sender."""
 
     value: Value
 
@@ -75,7 +75,7 @@ class Request(Message, frozen=True):
 
 
 class Report(Message, frozen=True):
-    """A lower bound on the sender's own cost, with the values of the receiver and of robots above it."""
+    """A lower bound on the sender's own cost, given the values of the receiver and of robots above it."""
 
     bound: Number
 
@@ -97,7 +97,7 @@ class Report(Message, frozen=True):
 
 
 class Result(Message, frozen=True):
-    """The cost of the sender's subtree and its `values`; infinite and without values: none is below the bound."""
+    """The cost of the sender's subtree and its `values`; infinite without values if no cost is below the bound."""
 
     cost: Number
     values: dict[str, Value]
@@ -110,7 +110,7 @@ class Result(Message, frozen=True):
         return f"my subtree costs {cost_text(self.cost)}, with {words.assigned(self.values.items())}"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        # No robot of the subtree pays more than all of them together. A sender that shares constraints only with the
+        # No robot in the subtree pays more than all of them together. A sender that shares constraints only with the
         # receiver answers with its least cost.
         found: list[Proof] = []
         asked = reception.last(Request, reception.receiver, reception.sender)
@@ -146,17 +146,17 @@ def _without(robot: str, values: dict[str, Value]) -> dict[str, Value]:
 
 
 Assignment = dict[str, Value]
-"""The values of the robots of a subtree."""
+"""The values of the robots in a subtree."""
 
 
 class Branch:
     """The search of a child's subtree, for each value of this robot.
 
-    - `lower`: a lower bound on the subtree's cost. Once the value is `known` it is the cost itself, or infinite: no
+    - `lower`: a lower bound on the subtree's cost. Once the value is `known`, this is the cost itself, or infinite: no
       solution with the value costs less than the best known one.
-    - `values`: the assignment of this cost.
-    - `index`: the value that is searched now; None: all have been searched. `sent_limit` is the limit that the child
-      has received for it; None: it has not begun.
+    - `values`: the assignment that has this cost.
+    - `index`: the value that is being searched; None if all have been searched. `sent_limit`: the limit that the child
+      has received for this value; None if its search has not begun.
     """
 
     def __init__(self, lower: Sequence[Number]) -> None:
@@ -172,7 +172,7 @@ class Branch:
         return [index for index, known in enumerate(self.known) if not known]
 
     def close(self, indices: Iterable[int], cost: Number = INFINITE) -> None:
-        """Store the cost of values; infinite: they are ruled out."""
+        """Store the cost of values; infinite means that they are ruled out."""
         for index in indices:
             self.lower[index] = cost
             self.known[index] = True
@@ -182,8 +182,9 @@ class Branch:
 class BranchingProtocol(TreeProtocol):
     """One agent that searches its children's subtrees.
 
-    - `branches`: for each child its search. `local`: the cost of each value of this robot with the values above.
-    - `limit`: only lower costs matter above. `best` and `solution`: the cheapest assignment of the subtree below it.
+    - `branches`: the search of each child. `local`: the cost of each value of this robot with the values above.
+    - `limit`: only lower costs matter to the robots above. `best` and `solution`: the cheapest assignment of the
+      subtree below this limit.
     - `searching`: the subtree is being searched. `over`: the search of the whole tree has ended.
     - `optimum`: at the root, its tree's least cost, once it is known.
     """
@@ -202,14 +203,14 @@ class BranchingProtocol(TreeProtocol):
 
     @abstractmethod
     def request_bound(self, child: str) -> None:
-        """Request a lower bound for the present value of the child's branch; call `descend` when it has arrived."""
+        """Request a lower bound for the current value in the child's branch; call `descend` when it has arrived."""
 
     @abstractmethod
     def explore(self, child: str, limit: Number) -> None:
-        """Request that `child` search its subtree for less than `limit`, with the present value of its branch."""
+        """Request that `child` search its subtree for a cost below `limit`, with the current value in its branch."""
 
     def tighten(self, child: str, limit: Number) -> None:
-        """Send `child`, which is searching, a lower limit. Not all protocols do so."""
+        """Send a lower limit to `child`, which is searching. Not all protocols do so."""
 
     def floor(self, child: str) -> Sequence[Number]:  # noqa: ARG002 - for those that know one
         """Return a lower bound on the cost of the child's subtree for each value of this robot, before any request."""
@@ -223,7 +224,7 @@ class BranchingProtocol(TreeProtocol):
         return min(self.limit, self.best)
 
     def search(self, limit: Number, local: Sequence[Number]) -> None:
-        """Search the subtree for less than `limit`; `local` is the cost of each value with the values above."""
+        """Search the subtree for a cost below `limit`; `local` is the cost of each value with the values above."""
         self.limit, self.local = limit, local
         self.best, self.solution = INFINITE, {}
         self.searching = True
@@ -240,11 +241,11 @@ class BranchingProtocol(TreeProtocol):
 
     @property
     def cheapest(self) -> int:
-        """The place of the cheapest value of this robot with the values above."""
+        """The index of this robot's cheapest value with the values above."""
         return min(range(len(self.local)), key=self.local.__getitem__)
 
     def descend(self, child: str) -> None:
-        """Let `child` search, or choose the next value if the present one is ruled out: its bound has arrived."""
+        """Let `child` search, or choose the next value if the arrived bound rules the current one out."""
         index = self.present(child)
         branch = self.branches[child]
         total = self.estimate(index)
@@ -272,10 +273,10 @@ class BranchingProtocol(TreeProtocol):
         self._finish_if_idle()
 
     def present(self, child: str) -> int:
-        """Return the place of the value that is searched in the subtree of `child`.
+        """Return the index of the value that is being searched in the subtree of `child`.
 
         Raises:
-            ValueError: if no value is, so that `child` must not send anything.
+            ValueError: if no value is being searched, so that `child` must not send anything.
         """
         branch = self.branches.get(child)
         if branch is None or branch.index is None or not self.searching:
@@ -289,7 +290,7 @@ class BranchingProtocol(TreeProtocol):
         self._below.setdefault(child, tuple(result.values))
 
     def send_lower_limits(self) -> None:
-        """Send the searching children the limits that have become lower (`tighten`)."""
+        """Send the searching children those limits that have become lower (`tighten`)."""
         for child, branch in self.branches.items():
             if branch.index is not None and branch.sent_limit is not None:
                 total = self.estimate(branch.index)
@@ -311,7 +312,7 @@ class BranchingProtocol(TreeProtocol):
         self.request_bound(child)
 
     def _improve(self, index: int) -> None:
-        """Store the value at `index` as the best one if it is: the costs of all its subtrees are known."""
+        """Store the value at `index` as the best one if it is better: the costs of all its subtrees are known."""
         cost = self.estimate(index)
         if cost < self.bound:
             self.best = cost
@@ -340,32 +341,32 @@ class BranchingProtocol(TreeProtocol):
         self.finish(solution)
 
     def finish(self, values: Mapping[str, Value]) -> None:
-        """Choose this robot's final value, and send the children the values of their subtrees.
+        """Choose this robot's final value, and send the children the final values in their subtrees.
 
         Raises:
-            ValueError: if a value is missing, or this robot's is invalid.
+            ValueError: if a value is missing, or the value of this robot is invalid.
         """
         wanted = {self.problem.agent, *(name for names in self._below.values() for name in names)}
         if not wanted <= values.keys() or len(self._below) < len(self.children):
             raise ValueError(f"the final values of {self.problem.agent} and the robots below it are incomplete")
-        # The first of several values that look alike to neighbours: the last may mean withdrawal.
+        # The first of several values that look alike to neighbours, because the last may mean withdrawal.
         self.value = self.problem.values.index(values[self.problem.agent])
         self.over = True
         for child in self.children:
             self.send(child, Terminate({name: values[name] for name in self._below[child]}))
 
-    # Knowledge of the whole search
+    # Knowledge about the whole search
 
     @property
     def incumbent(self) -> Incumbent | None:
-        """The cheapest assignment that this root knows, if it is one of all robots."""
+        """The cheapest assignment that this root knows, if it contains all robots."""
         if self.parent is not None or len(self.solution) < len(self.order.names):
             return None
         return Incumbent(self.best, self.solution)
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for a root also its best assignment, and a lower bound on the cost of its tree."""
+        """The position in the tree; for a root also its best assignment, and a lower bound on the cost of its tree."""
         return msgspec.structs.replace(super().findings, best=self.incumbent, bound=self._bound_of_tree())
 
     def _bound_of_tree(self) -> Number | None:

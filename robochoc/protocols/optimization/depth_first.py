@@ -1,4 +1,4 @@
-"""The search of BnB-ADOPT+ itself; its subclasses decide when it begins (`bnb_adopt`, `bnb_adopt_fdac`).
+"""The search of BnB-ADOPT+ itself; the subclasses decide when it begins (`bnb_adopt`, `bnb_adopt_fdac`).
 
 A robot keeps its value until LB(d) reaches the cost of the best known complete solution (UB), or its threshold (TH).
 The rules, the choices that the paper leaves open, and the proof of termination are in `bnb_adopt`.
@@ -22,9 +22,9 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class DepthFirstProtocol(BoundingProtocol):
-    """One agent of BnB-ADOPT+'s search. State besides the bounds: `threshold` (TH).
+    """One agent in the search of BnB-ADOPT+. State besides the bounds: `threshold` (TH).
 
-    `sent_values` are the last Values sent to each child, `sent_cost` the last Cost, without its request.
+    `sent_values` are the last Values sent to each child, `sent_cost` is the last Cost, without its threshold request.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -36,7 +36,7 @@ class DepthFirstProtocol(BoundingProtocol):
         self._moved = False
 
     def handle(self, sender: str, message: Message) -> None:
-        """Process a message of the search; the types are the subclass's `messages`."""
+        """Process a message of the search; the message types are those in the subclass's `messages`."""
         if self.terminated:
             return
         match cast("Value | Cost | Terminate", message):
@@ -67,12 +67,12 @@ class DepthFirstProtocol(BoundingProtocol):
             self.drop_threshold()
 
     def drop_threshold(self) -> None:
-        """Forget the threshold of the previous context, and request a new one."""
+        """Forget the threshold for the previous context, and request a new one."""
         self.threshold = INFINITE
         self.threshold_request = True
 
     def act(self) -> None:
-        """Choose a value and send values and costs that changed (Backtrack)."""
+        """Choose a value and send the values and costs that have changed (Backtrack)."""
         self._choose()
         self.send_values()
         for name in self.pseudo_children:
@@ -102,12 +102,12 @@ class DepthFirstProtocol(BoundingProtocol):
     # Sending
 
     def send_values(self) -> None:
-        """Send the children the changes."""
+        """Send each child what has changed for it."""
         for child in self.children:
             self._send_value(child)
 
     def _send_value(self, child: str) -> None:
-        """Send `child` a new value, a higher threshold, or a threshold that it requested."""
+        """Send `child` a new value, a higher threshold, or a threshold that it has requested."""
         value, last = self.value_for(child), self.sent_values.get(child)
         if last is None or self.must_send(value, last):
             self.sent_values[child] = value

@@ -1,15 +1,16 @@
-"""The common base of NCBB and PT-FB: before a value is searched in a subtree, its robots are asked for bounds.
+"""The common base of NCBB and PT-FB: before a subtree is searched for a value, its robots are asked for bounds.
 
 A robot asks all robots of the subtree with which it shares a constraint. Each answers with the least cost of its values
 with the values of the requester and of robots above it. It ignores robots *below* the requester: their last values are
 from an earlier search. So it must know the order of the robots above, which it learns from the order of the first
 requests: a robot lets a subtree search only when all its linked robots there have answered.
 
-At the beginning each robot sends its parent, for each robot above, the linked robots of its subtree (`Members`). A leaf
-answers its parent with the cost itself and its value, as all constraints of a leaf are with robots above.
+At the beginning each robot tells its parent, for each robot above, which robots in its subtree share a constraint with
+that robot (`Members`). A leaf answers its parent with the cost itself and its value, because all constraints of a leaf
+are with robots above.
 
 A constraint belongs to its lowest robot, which pays it: constraints may be n-ary. It is checked when the last of the
-other robots asks. Costs with robots above that robot are known from their requests.
+other robots asks. Costs with robots above that robot are known from the requests of those robots.
 """
 
 from __future__ import annotations
@@ -26,10 +27,10 @@ from robochoc.system.compiling import mypyc_attr
 
 
 class CostsAbove:
-    """The costs of this robot's values with robots above, which ask one after the other, the highest first.
+    """The costs of this robot's values with the robots above, which ask one after the other, the highest first.
 
-    `values` are theirs. `totals`: for each of them, the cost of every value of this robot with its value and those of
-    robots above it.
+    `values` are the values of the robots that have asked. `totals` contains, for each of them, the cost of every value
+    of this robot with its value and the values of robots above it.
     """
 
     def __init__(self, problem: LocalProblem) -> None:
@@ -40,7 +41,7 @@ class CostsAbove:
         self.totals: dict[str, Sequence[Number]] = {}
 
     def ask(self, name: str, value: Value) -> Sequence[Number]:
-        """Return the costs when `name` has taken `value`."""
+        """Return the costs after `name` has taken `value`."""
         self.values[name] = value
         names = [*self.values]
         place = names.index(name)
@@ -51,7 +52,7 @@ class CostsAbove:
         return self.totals[name]
 
     def added(self, name: str, view: Mapping[str, Value]) -> Sequence[Number]:
-        """Return the additional cost of each value with the value of `name`, below all others in `view`."""
+        """Return the additional cost of each value with the value of `name`, which is below all others in `view`."""
         return self._problem.added_by(name, view)
 
 
@@ -59,10 +60,10 @@ class CostsAbove:
 class ForwardBoundingProtocol(BranchingProtocol):
     """One agent that asks for bounds.
 
-    - `asked`: for each child, the robots of its subtree that share a constraint with this one. `members`: these robots,
+    - `asked`: for each child, the robots in its subtree that share a constraint with this one. `members`: these robots,
       and those that share a constraint with robots above this one.
-    - `handed`: lower bounds on the costs of single robots of this robot's subtree, with the values above it.
-    - `answers`: the same with the value that is searched, from robots that were asked.
+    - `handed`: lower bounds on the costs of single robots in this robot's subtree, with the values above it.
+    - `answers`: the same bounds with the value that is searched, from robots that were asked.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -77,20 +78,20 @@ class ForwardBoundingProtocol(BranchingProtocol):
         self._waiting: dict[str, set[str]] = {}
 
     def costs_above(self) -> CostsAbove:
-        """Return the costs of this robot with robots above; subclasses that know more costs override it."""
+        """Return the costs of this robot with robots above; overridden in subclasses that know more costs."""
         return CostsAbove(self.problem)
 
     def start_in_tree(self) -> None:
-        """Send the parent the links of the subtree, once all children have done the same."""
+        """Send the parent the links between the subtree and the robots above, once all children have done the same."""
         self._linked = {name: [self.problem.agent] for name in self.ancestors}
         self._send_members()
 
     @abstractmethod
     def begin_search(self) -> None:
-        """Begin, as the root; all robots know their members."""
+        """Begin, as the root, after all robots know the members of their subtrees."""
 
     def store_members(self, child: str, linked: Mapping[str, Sequence[str]]) -> None:
-        """Store the robots of the child's subtree."""
+        """Store which robots in the child's subtree share constraints with robots above."""
         own = linked.get(self.problem.agent, ())
         if child not in own or child in self.asked or not {*own} <= {*self.descendants}:
             raise ValueError(f"{child} sends impossible links: {linked}")
@@ -113,7 +114,7 @@ class ForwardBoundingProtocol(BranchingProtocol):
     # Bounds
 
     def floor(self, child: str) -> Sequence[Number]:
-        # The bounds of its robots that were handed down.
+        # The bounds on its robots that were handed down.
         return [sum(self.handed.get(name, 0) for name in self.members[child])] * len(self.problem.values)
 
     def request_bound(self, child: str) -> None:
@@ -124,7 +125,7 @@ class ForwardBoundingProtocol(BranchingProtocol):
             self.send(name, Request(value))
 
     def answer_request(self, sender: str, value: Value) -> None:
-        """Answer with a lower bound, or as a leaf to the parent with the cost."""
+        """Answer with a lower bound, or, as a leaf that answers its parent, with the cost."""
         if sender not in self.ancestors:
             raise ValueError(f"{sender} is not above {self.problem.agent}")
         costs = self.above.ask(sender, value)
@@ -136,11 +137,11 @@ class ForwardBoundingProtocol(BranchingProtocol):
             self.send(sender, Result(least, {self.problem.agent: value} if least < INFINITE else {}))
 
     def knows_cost(self, sender: str) -> bool:
-        """Return whether the least cost of a value is the cost of the subtree, once `sender` has asked."""
+        """Return whether the least cost of a value is the cost of the whole subtree, once `sender` has asked."""
         return sender == self.parent and not self.children
 
     def store_report(self, sender: str, bound: Number) -> None:
-        """Store a bound; when all have arrived, let the child search or take the next value."""
+        """Store a bound; when all bounds have arrived, let the child search or try the next value."""
         child = self._child_above.get(sender)
         if child is None or sender not in self._waiting.get(child, ()):
             raise ValueError(f"unexpected bound from {sender}, which was not asked")
@@ -152,17 +153,17 @@ class ForwardBoundingProtocol(BranchingProtocol):
             self.descend(child)
 
     def child_above(self, robot: str) -> str:
-        """Return the child whose subtree a linked `robot` is in; raise `ValueError` for any other robot."""
+        """Return the child whose subtree contains a linked `robot`; raise `ValueError` for any other robot."""
         if robot not in self._child_above:
             raise ValueError(f"{robot} is not known to be below {self.problem.agent}")
         return self._child_above[robot]
 
     def store_result(self, child: str, result: Result) -> None:
-        """Store the cost of a subtree; a leaf sends it as its answer."""
+        """Store the cost of a subtree; the result of a leaf is its answer to the request."""
         self._waiting.pop(child, None)
         super().store_result(child, result)
 
     @property
     def reports(self) -> Mapping[str, Number]:
-        """For each robot of this robot's subtree, its latest bound."""
+        """The latest bound on each robot in this robot's subtree."""
         return {**self.handed, **self.answers}

@@ -1,11 +1,11 @@
 """HS-CAI: search with context-based inference.
 
 Complete search for minimum cost on a pseudo-tree, with lower bounds from tables. Before the search each robot sends its
-parent a table of its subtree's least costs (PREUTIL), as in DPOP, but over at most k robots: others above are left
-out, so it is a lower bound. Then subtrees are searched in parallel, and values tried by increasing bound, without
-requests for bounds. When values of omitted robots stay the same for more than t searches, a robot requests new tables
-from its children with these values (INFERCTXT, CTXTUTIL). These bounds are tighter while the values stay. The search
-continues meanwhile.
+parent a table of its subtree's least costs (PREUTIL), as in DPOP, but over at most k robots: the other robots above are
+left out, so the table is a lower bound. Then subtrees are searched in parallel, and values are tried by increasing
+bound, without requests for bounds. When the values of omitted robots stay the same for more than t searches, a robot
+requests new tables from its children for these values (INFERCTXT, CTXTUTIL). The new bounds are tighter while the
+values stay the same. The search continues meanwhile.
 
 - **When to use**: costs, few but larger messages, a pseudo-tree too wide for DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table is over
@@ -15,16 +15,16 @@ continues meanwhile.
 - **Reference**: Chen, Zhang, Deng, Chen, Li: "HS-CAI: a hybrid DCOP algorithm via combining search with context-based
   inference", AAAI 2020.
 
-The messages have the names of the paper, except BACKTRACK, which is `Result`. The frame of the search is in
+The messages have the names in the paper, except BACKTRACK, which is `Result`. The framework of the search is in
 `branching`.
 
 Choices that the paper leaves open, and differences:
 
-- Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
-- The highest robots are left out of a table. Each part of a sum is minimised over them separately.
-- Robots first send their domain and depth to the robots below (`Domain`). A CPA holds the values that matter to the
+- Constraints may be n-ary: the lowest robot in the scope pays them. There may be several trees.
+- The highest robots are left out of a table. Each summand is minimised over them separately.
+- Robots first send their domain and depth to the robots below (`Domain`). A CPA contains the values that matter to the
   subtree.
-- A robot infers with all values that have stayed long enough, for one table of a child at a time.
+- A robot infers with all values that have stayed the same long enough, for one table of a child at a time.
 - Constraints are checked once for the tables, and again with each CPA. Sums and minima of tables are not checks.
 - Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
 
@@ -62,17 +62,17 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import listed
 
 MOST_CELLS = 1 << 17
-"""The maximum number of cells of a table and of its message; while it is computed, for each value of the robot."""
+"""The maximum number of cells in a table and in its message; while it is computed, for each value of the robot."""
 
 
 class RobotTable(NamedTuple):
-    """Costs, with an axis for each robot of `names`."""
+    """Costs, with an axis for each robot in `names`."""
 
     names: tuple[str, ...]
     costs: NDArray[np.float64]
 
     def at(self, places: Mapping[str, int]) -> RobotTable:
-        """Return the part of the table with these robots' values at these places."""
+        """Return the part of the table for these robots' values, given as indices."""
         index = tuple([places.get(name, slice(None)) for name in self.names])
         return RobotTable(tuple(name for name in self.names if name not in places), self.costs[index])
 
@@ -87,7 +87,7 @@ class RobotTable(NamedTuple):
 
 
 def limited_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
-    """Return the axes that a table may have: the lowest robots, at most `most`, without exceeding the cell limit."""
+    """Return the axes that a table may have: the lowest robots, at most `most`, within the cell limit."""
     kept: list[Axis] = []
     for axis in sorted(axes, key=lambda axis: axis[1], reverse=True)[:most]:
         if math.prod([size for _, _, size in kept]) * axis[2] > MOST_CELLS:
@@ -97,7 +97,7 @@ def limited_axes(axes: Sequence[Axis], most: int) -> list[Axis]:
 
 
 def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables: Sequence[RobotTable]) -> list[Number]:
-    """Return the least sum of `charges` and `tables` over the robot's values, for each combination of `axes`' values.
+    """Return the least sum of `charges` and `tables` over the robot's values, for each combination of values on `axes`.
 
     Each table is minimised separately over robots that are not in `axes`, so the sum is a lower bound.
     """
@@ -114,7 +114,7 @@ def least_over(axes: Sequence[Axis], own: str, charges: Sequence[Number], tables
 
 
 def table_of(axes: Sequence[Axis], costs: Sequence[Number]) -> RobotTable:
-    """Return the table of a message.
+    """Return the table in a message.
 
     Raises:
         ValueError: if the number of costs does not match the axes, or is too large.
@@ -166,10 +166,10 @@ class Domain(Message, frozen=True):
 
 
 class PreUtil(Message, frozen=True):
-    """A lower bound on the cost of the sender's subtree for all values of the robots of `axes` (PREUTIL).
+    """A lower bound on the cost of the sender's subtree for all values of the robots in `axes` (PREUTIL).
 
-    `dropped`: other robots above that matter to the subtree; the bound holds for all of their values. `dearest`: no
-    solution of the subtree costs more.
+    `dropped`: other robots above that matter to the subtree; the bound holds for all their values. `dearest`: the
+    maximum cost of a solution of the subtree.
     """
 
     axes: list[Axis]
@@ -189,9 +189,9 @@ class PreUtil(Message, frozen=True):
 
 
 class CPA(Message, frozen=True):
-    """A request to search the receiver's subtree for less than `bound` (CPA).
+    """A request to search the receiver's subtree for a cost below `bound` (CPA).
 
-    `places`: the places in their domains of the values of robots above that matter to it.
+    `places`: the values of the robots above that matter to the subtree, as indices in their domains.
     """
 
     bound: Number
@@ -205,7 +205,7 @@ class CPA(Message, frozen=True):
 
 
 class InferCtxt(Message, frozen=True):
-    """A request for a tighter table, with the values at these places (INFERCTXT)."""
+    """A request for a tighter table for these values, given as indices (INFERCTXT)."""
 
     places: dict[str, int]
 
@@ -217,7 +217,7 @@ class InferCtxt(Message, frozen=True):
 
 
 class CtxtUtil(Message, frozen=True):
-    """A lower bound as in PREUTIL, with the values that the receiver's request named (CTXTUTIL)."""
+    """A lower bound as in PREUTIL, for the values in the receiver's request (CTXTUTIL)."""
 
     axes: list[Axis]
     costs: list[Number]
@@ -233,7 +233,7 @@ class CtxtUtil(Message, frozen=True):
 
 
 def places_in_words(places: dict[str, int]) -> str:
-    """Return values in words, by their places."""
+    """Return values in words, given as indices."""
     return listed([f"{name}'s value number {place + 1}" for name, place in places.items()]) or "any values"
 
 
@@ -247,7 +247,7 @@ def span_in_words(costs: list[Number]) -> str:
 
 
 def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], reception: Reception) -> Sequence[Proof]:
-    """Return the proofs of lower bounds over `axes`: those of a DPOP table, as they hold for all omitted robots."""
+    """Return the proofs in lower bounds over `axes`, as for a DPOP table: they hold for all omitted robots."""
     places = itertools.product(*[range(size) for _, _, size in axes])
     return table_proves([name for name, _, _ in axes], zip(places, costs, strict=True), reception)
 
@@ -268,10 +268,10 @@ class Tighter(NamedTuple):
 class HSCAI(BranchingProtocol):
     """One agent of HS-CAI.
 
-    - `domains` and `level`: the values of the linked robots above; the number of all robots above.
-    - `tables`: the children's tables from before the search; `tighter`: those of a context.
-    - `places`: the places, in the last CPA, of the values of robots above that matter to the subtree.
-    - `stayed`: the number of successive CPAs for which each of them has stayed.
+    - `domains` and `level`: the values of the linked robots above, and the number of all robots above.
+    - `tables`: the children's tables from before the search; `tighter`: their tables in a context.
+    - `places`: the values of the robots above that matter to the subtree, as indices, in the last CPA.
+    - `stayed`: for each of these values, the number of successive CPAs in which it has stayed the same.
     - `inferring`: for each child, the contexts of the requested tables; None: a table for the parent.
     """
 
@@ -336,7 +336,7 @@ class HSCAI(BranchingProtocol):
         self._pre_infer()
 
     def _store_domain(self, sender: str, values: list[Value], level: int) -> None:
-        """Store the values of a robot above; the parent's depth determines this robot's."""
+        """Store the values of a robot above; the depth of the parent determines the depth of this robot."""
         if sender not in self.ancestors or sender in self.domains or not values or level < 0:
             raise ValueError(f"unexpected or invalid domain from {sender}")
         self.domains[sender] = values
@@ -390,7 +390,7 @@ class HSCAI(BranchingProtocol):
         return axes
 
     def _least(self, context: Places, tables: Mapping[str, RobotTable]) -> tuple[list[Axis], list[Number]]:
-        """Return the axes and costs of this robot's table, with the values of `context`."""
+        """Return the axes and costs of this robot's table for the values in `context`."""
         axes = limited_axes([axis for name, axis in self._axes.items() if name not in context], self.settings.k)
         parts = [table.at(context) for table in (*self._own_tables, *tables.values())]
         return axes, least_over(axes, self.problem.agent, self.problem.charges, parts)
@@ -413,7 +413,7 @@ class HSCAI(BranchingProtocol):
         return all(name in self._axes and 0 <= place < self._axes[name][2] for name, place in places.items())
 
     def floor(self, child: str) -> Sequence[Number]:
-        # The bounds of the child's table, and of a tighter one that is valid now.
+        # The bounds in the child's table, and in a tighter table that is valid now.
         bounds = self._bounds_in(self.tables[child])
         tighter = self.tighter.get(child)
         if tighter is None or any(self.places[name] != place for name, place in tighter.context.items()):
@@ -438,7 +438,7 @@ class HSCAI(BranchingProtocol):
     # Inference in a context
 
     def _ask_if_it_pays(self, child: str) -> None:
-        """Request a new table from the child with the values that have stayed, if it lacks some of them."""
+        """Request a new table from the child with the values that have stayed the same, if it lacks some."""
         dropped = [name for name, _, _ in self._from[child].dropped if name != self.problem.agent]
         context = {name: self.places[name] for name in dropped if self.stayed[name] > self.settings.t}
         under_way = any(one is not None for one in self.inferring[child])

@@ -1,7 +1,7 @@
 """No-Commitment Branch and Bound (NCBB).
 
 Complete search for minimum cost on a pseudo-tree, in linear memory. First a greedy assignment gives an upper bound.
-Then each robot has the subtrees of its children searched, for one of its values after the other. It does not commit to
+Then each robot has the subtrees of its children searched for one of its values after the other. It does not commit to
 a value: different subtrees may be searched for different values at the same time, each by increasing lower bound. The
 bounds come from the robots of the subtree that it shares constraints with: it asks them before it searches for a value.
 
@@ -12,21 +12,21 @@ bounds come from the robots of the subtree that it shares constraints with: it a
 - **Reference**: Chechetka, Sycara: "No-commitment branch and bound search for distributed constraint optimization",
   AAMAS 2006.
 
-The messages have other names where one name has two meanings in the paper:
+The messages have other names if one name has two meanings in the paper:
 
     VALUE (first phase)    `Greedy`     VALUE (search)   `Request`     SEARCH   `Search`
     COST (of a subtree)    `Result`     COST (a bound)   `Report`      STOP     `Terminate`
 
-The frame of the search is in `branching`, bounds are in `forward_bounding`: PT-FB has both, too.
+The framework of the search is in `branching`, the bounds are in `forward_bounding`; PT-FB uses both, too.
 
 Choices that the paper leaves open, and differences:
 
-- Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
+- Constraints may be n-ary: the lowest robot in the scope pays them. There may be several trees.
 - A robot sends the requester its total bound, with the values of all robots from the requester up. In the paper it
-  sends only the part that depends on the requester's value. The total bound is also valid, and higher.
-- The greedy assignment is remembered, with its cost as the bound: only cheaper ones are searched for.
-- Results hold the best assignment of the subtree. In the paper, the last search is repeated to find it.
-- A leaf answers its parent with its cost and value. It is never asked to search.
+  sends only the part that depends on the requester's value. The total bound is also valid, and it is higher.
+- The greedy assignment is remembered, and its cost is the first bound: only cheaper assignments are searched for.
+- Results contain the best assignment of the subtree. In the paper, the last search is repeated to find it.
+- A leaf answers its parent with its cost and value, so it is never asked to search.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -66,7 +66,7 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class Greedy(Message, frozen=True):
-    """The value of the sender in the greedy assignment of the first phase (VALUE)."""
+    """The sender's value in the greedy assignment of the first phase (VALUE)."""
 
     value: Value
 
@@ -80,7 +80,7 @@ class Greedy(Message, frozen=True):
 
 
 class Search(Message, frozen=True):
-    """A request to search the receiver's subtree for less than `bound`, with the values sent before (SEARCH)."""
+    """A request to search the receiver's subtree for a cost below `bound`, with the values sent before (SEARCH)."""
 
     bound: Number
 
@@ -114,12 +114,12 @@ class NCBB(ForwardBoundingProtocol):
         self._first_phase = True
 
     def start_in_tree(self) -> None:
-        """Send the parent the links of the subtree."""
+        """Send the parent the links between the subtree and the robots above."""
         super().start_in_tree()
         self._choose_greedily()
 
     def begin_search(self) -> None:
-        """Do nothing: the root begins with the first phase, whose results arrive after the members."""
+        """Do nothing: the root begins with the first phase, whose results arrive after the `Members` messages."""
 
     def handle(self, sender: str, message: Message) -> None:
         match cast("Members | Greedy | Request | Report | Search | Result | Terminate", message):
@@ -166,7 +166,7 @@ class NCBB(ForwardBoundingProtocol):
             self._add_up()
 
     def _add_up(self) -> None:
-        """Send the parent the cost of the first assignment, or begin the search with it as the root."""
+        """Send the parent the cost of the first assignment; the root begins the search with this cost as bound."""
         self._first_phase = False
         cost = sum([result.cost for result in self.greedy.values()], self.local[self.cheapest])
         values: Assignment = {}
@@ -193,7 +193,7 @@ class NCBB(ForwardBoundingProtocol):
         self.search(bound, self.above.totals[self.parent])
 
     def end_search(self, cost: Number, solution: Assignment) -> None:
-        """End the search, as the root: with the first assignment, if none is cheaper."""
+        """End the search, as the root: with the first assignment if no cheaper one was found."""
         if cost < self.greedy_cost:
             super().end_search(cost, solution)
         else:
@@ -201,7 +201,7 @@ class NCBB(ForwardBoundingProtocol):
 
     @property
     def incumbent(self) -> Incumbent | None:
-        """The cheapest assignment that this root knows, if it is one of all robots."""
+        """The cheapest assignment that this root knows, if it contains all robots."""
         cheaper = super().incumbent
         if cheaper is not None or len(self.greedy_values) < len(self.order.names):
             return cheaper

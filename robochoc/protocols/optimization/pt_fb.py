@@ -1,11 +1,11 @@
 """Pseudo-tree Forward Bounding (PT-FB).
 
 Complete search for minimum cost on a pseudo-tree, in linear memory, with bounds that are handed down. Before a robot
-has the subtree of a child searched for one of its values, it asks all robots there with which it shares a constraint
-for lower bounds. They travel with the request (CPA) to the child and further down, so that the bound of a subtree has a
-part for every robot in it that shares a constraint with a robot above. Different subtrees are searched at the same
-time, also for different values. When one of them finds a better solution, or its cost is known, the limits of the
-others are reduced (REDUCE_UB).
+has the subtree of a child searched for one of its values, it asks all robots in that subtree with which it shares a
+constraint for lower bounds. These bounds travel with the request (CPA) to the child and further down, so that the bound
+on a subtree has a part for every robot in it that shares a constraint with a robot above. Different subtrees are
+searched at the same time, also for different values. When a search finds a better solution, or the cost of its subtree
+is known, the limits of the other searches are reduced (REDUCE_UB).
 
 - **When to use**: costs, a pseudo-tree with branches, little memory; fewer messages than NCBB on dense graphs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Each robot
@@ -13,24 +13,24 @@ others are reduced (REDUCE_UB).
 - **Parameters**: none.
 - **Reference**: Litov, Meisels: "Forward bounding on pseudo-trees for DCOPs and ADCOPs", AIJ 252, 2017.
 
-The messages have the names of the paper, or these:
+The messages have the names in the paper, or these:
 
     CPA                     `CPA`                  LB_REQUEST   `Request`
     CPA (back) and UBs      `Result`               LB_REPORT    `Report`
     REDUCE_UB               `Reduce`               PCB, ECA     `Members`
     assign CPA              `_advance`, `request_bound`     STOP         `Terminate`
 
-The frame of the search is in `branching`, bounds are in `forward_bounding`: NCBB has both, too.
+The framework of the search is in `branching`, the bounds are in `forward_bounding`; NCBB uses both, too.
 
 Choices that the paper leaves open, and differences:
 
-- Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
-- The CPA holds no values: the requests for bounds have already sent them to the robots concerned.
+- Constraints may be n-ary: the lowest robot in the scope pays them. There may be several trees.
+- The CPA contains no values: the requests for bounds have already sent them to the robots concerned.
 - Every robot reduces the bounds of its children; in the paper, only robots with more than one child do. A leaf answers
   its parent with its cost and value.
-- A reduced bound always applies to the last CPA sent to that child, as no message overtakes another; so searches need
-  no numbers. A child that has answered ignores it.
-- Results hold the best assignment of the subtree, so nothing is searched again.
+- A reduced bound always applies to the last CPA sent to that child, because no message overtakes another; so searches
+  need no numbers. A child that has already answered ignores the reduced bound.
+- Results contain the best assignment of the subtree, so nothing is searched again.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -58,9 +58,9 @@ from robochoc.system.plain_text import listed
 
 
 class CPA(Message, frozen=True):
-    """A request to search the receiver's subtree for less than `bound`, with the values sent before (CPA).
+    """A request to search the receiver's subtree for a cost below `bound`, with the values sent before (CPA).
 
-    `reports`: for robots of the subtree, a lower bound on the robot's own cost, if it is more than 0.
+    `reports`: for robots in the subtree, a lower bound on the robot's own cost, if it is more than 0.
     """
 
     bound: Number
@@ -130,7 +130,7 @@ class PTFB(ForwardBoundingProtocol):
                 assert_never(never)
 
     def _search(self, bound: Number, reports: Mapping[str, Number]) -> None:
-        """Search the subtree with the bounds that were handed down."""
+        """Search the subtree, using the bounds that were handed down."""
         if self.parent not in self.above.totals or self.searching:
             raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is already searching")
         self.handed = dict(reports)
@@ -142,13 +142,13 @@ class PTFB(ForwardBoundingProtocol):
         self.search(bound, self.above.totals[self.parent])
 
     def _reduce(self, bound: Number) -> None:
-        """Adopt a lower limit, unless its search has ended."""
+        """Adopt a lower limit, unless the search that it applies to has ended."""
         if self.searching:
             self.limit = min(self.limit, bound)
             self.send_lower_limits()
 
     def explore(self, child: str, limit: Number) -> None:
-        """Send the CPA to `child`, with the bounds of the robots below it."""
+        """Send the CPA to `child`, with the bounds on the robots below it."""
         known = self.reports
         self.send(child, CPA(limit, {n: known[n] for n in self.members[child] if n != child and known.get(n)}))
 

@@ -1,6 +1,6 @@
-"""Run-length encoding of lists with an item for each robot: for the first waves of `sfb`.
+"""Run-length encoding of lists with one item for each robot, for the first waves of `sfb`.
 
-Teams often have few kinds of robots. So a list with an item for each robot is sent as its distinct items and runs: the
+Teams often have few kinds of robots. So a list with one item for each robot is sent as its distinct items and runs: the
 item, and the number of successive robots that have it. A sequence of equal robots then takes a few bytes, whatever its
 length.
 """
@@ -12,12 +12,12 @@ from itertools import groupby
 from typing import TypeVar
 
 Run = tuple[int, int]
-"""The place of an item among the distinct ones, and the number of successive robots that have it."""
+"""The index of an item among the distinct items, and the number of successive robots that have it."""
 T = TypeVar("T", bound=Hashable)
 
 
 def grouped(items: Iterable[T]) -> tuple[list[T], list[Run]]:
-    """Return the distinct `items`, in the order of their first places, and the runs."""
+    """Return the distinct `items`, in order of first occurrence, and the runs."""
     places: dict[T, int] = {}
     numbers = [places.setdefault(item, len(places)) for item in items]
     return list(places), [(place, len(list(same))) for place, same in groupby(numbers)]

@@ -1,10 +1,10 @@
 """Synchronous Forward Bounding (SFB), with many partial assignments at a time.
 
 Complete branch and bound for minimum cost. A current partial assignment (CPA) goes from robot to robot in priority
-order, as in SyncBB. Robots without a value are bounded from below, as in AFB. Here the CPA itself carries, for each of
-these robots, the cost of each of its values so far, as in partial forward checking. A robot that takes a value adds the
-costs of the constraints that it shares with them; all robots of a scope know the constraint. So the holder knows the
-bound without requests for estimates, and prunes before it sends.
+order, as in SyncBB. The costs of robots without a value are bounded from below, as in AFB. Here the CPA itself
+contains, for each of these robots, the cost of each of its values so far, as in partial forward checking. A robot that
+takes a value adds the costs of the constraints that it shares with them; all robots in a scope know the constraint. So
+the holder knows the bound without requests for estimates, and prunes before it sends.
 
 - **When to use**: costs; it is the default for such problems. It needs few messages.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Memory is bounded
@@ -26,17 +26,19 @@ and `memory`, the lowest bounds first. The search stays depth first, by batches.
 at 2 or more, robots extend the next CPAs while lower robots work on the last ones, an idea of concurrent search (Zivan,
 Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it gained nothing.
 
-The course of a search: first, two waves exchange the domains of all robots. One goes down the order; one comes back up,
-with the charges of the values and an upper bound on all costs. The last robot turns CPAs into solutions. A solution
-that is cheaper than all before goes up the order, and every robot stores its value in it; CPAs carry its cost down.
-When the first robot has nothing left to extend, the last solution is optimal, or there is none.
+The course of a search: first, two waves exchange the domains of all robots. The first goes down the order; the second
+comes back up, with the charges of the values and an upper bound on all costs. The last robot turns CPAs into solutions.
+A solution that is cheaper than all before goes up the order, and every robot stores its value in this solution; CPAs
+carry its cost down. When the first robot has nothing left to extend, the last solution is optimal, or there is none.
 
-The proof, and a comparison with other protocols: docs/explanation/sfb.md.
+For the proof, and a comparison with other protocols, see docs/explanation/sfb.md.
 
-Without costs a value is consistent or not: CPAs carry bits instead of costs (`sfb_bits`). The rest is the same.
+Without costs, a value is either consistent or not, so CPAs contain bits instead of costs (`sfb_bits`). The rest is the
+same.
 
-Constraints may be n-ary: the last but one robot of a scope adds the costs that the last one will pay. Costs are read
-from tables that are computed before the search (see `LocalProblem.tables`), so it makes no constraint checks itself.
+Constraints may be n-ary: the second-last robot in a scope adds the costs that the last one will pay. Costs are read
+from tables that are computed before the search (see `LocalProblem.tables`), so the search itself makes no constraint
+checks.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -124,7 +126,7 @@ Charges = tuple[float, ...]
 
 
 class Above(Message, frozen=True):
-    """The domains of all robots above the receiver: distinct `domains`, and the `runs` of robots that have each."""
+    """The domains of all robots above the receiver: distinct `domains`, and `runs` of robots with the same domain."""
 
     domains: list[Domain]
     runs: list[Run]
@@ -146,7 +148,7 @@ class Above(Message, frozen=True):
 
 
 class Below(Message, frozen=True):
-    """The domains and charges of all robots below the receiver; `runs` map robots to the distinct ones.
+    """The domains and charges of all robots below the receiver; `runs` map robots to the distinct entries.
 
     `most` is an upper bound on the sum of these charges and of the constraints whose lowest two robots are below.
     """
@@ -166,7 +168,7 @@ class Below(Message, frozen=True):
 
     @property
     def robots(self) -> list[tuple[Domain, Charges]]:
-        """The domain and charges of each robot."""
+        """The domain and the charges of each robot."""
         return expanded(list(zip(self.domains, self.charges, strict=True)), self.runs)
 
     def in_words(self, words: Wording) -> str:
@@ -224,7 +226,7 @@ class Explored(Message, frozen=True):
 
 
 class Solution(Message, frozen=True):
-    """A solution cheaper than all before, as the place of each robot's value in its domain."""
+    """A solution cheaper than all before, as the index of each robot's value in its domain."""
 
     cost: int
     places: list[int]
@@ -260,7 +262,7 @@ _COST, _VALUES = 1, 2
 
 
 def costs_prove(content: bytes, count: int, ceiling: int, reception: Reception) -> Iterator[Proof]:
-    """Yield the proofs of rows of costs. Raises `ValueError` if `content` is not of that form."""
+    """Yield the proofs in rows of costs. Raises `ValueError` if `content` has another form."""
     rank, domains = _known(reception)
     largest = max(2 * ceiling, *map(len, domains))
     size = next(size for size in _SIZES if largest < 1 << 8 * size - (size == _SIZES[-1]))
@@ -282,7 +284,7 @@ def costs_prove(content: bytes, count: int, ceiling: int, reception: Reception) 
 
 
 def bits_prove(content: bytes, count: int, reception: Reception) -> Iterator[Proof]:
-    """Yield the proofs of rows of bits. Raises `ValueError` if `content` is not of that form."""
+    """Yield the proofs in rows of bits. Raises `ValueError` if `content` has another form."""
     rank, domains = _known(reception)
     largest = max(map(len, domains))
     size = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
@@ -304,7 +306,7 @@ def bits_prove(content: bytes, count: int, reception: Reception) -> Iterator[Pro
 
 
 def _known(reception: Reception) -> tuple[int, list[Sequence[Value]]]:
-    """Return the receiver's rank, and all robots' values, as received."""
+    """Return the receiver's rank, and the values of all robots, as received."""
     domains = [reception.values(robot) for robot in reception.order]
     known = [values for values in domains if values is not None]
     if len(known) < len(domains):
@@ -321,9 +323,9 @@ LARGEST = 4 * MIB
 
 
 class Batch:
-    """The content of one message: `rows` have yet to be extended; `ready` is extended, and waits to be sent.
+    """The content of one message: `rows` have yet to be extended; `ready` rows are extended, and wait to be sent.
 
-    `sent` is the number of its messages that are not yet explored.
+    `sent` is the number of messages with extended rows that are not yet explored.
     """
 
     def __init__(self, rows: Any, bounds: Bounds) -> None:  # noqa: ANN401 - rows of either form
@@ -334,12 +336,12 @@ class Batch:
 
     @property
     def left(self) -> bool:
-        """Whether there are rows that have not been sent."""
+        """Whether some rows have not been sent yet."""
         return bool(len(self.rows) or len(self.ready))
 
     @property
     def bound(self) -> int | None:
-        """The minimum lower bound of the rows that have not been sent; None if there are none."""
+        """The minimum lower bound of the rows that have not been sent yet; None if there are no such rows."""
         return min((self._bounds.least(rows) for rows in (self.rows, self.ready) if len(rows)), default=None)
 
     def take(self, count: int, upper_bound: int) -> Any:  # noqa: ANN401 - as above
@@ -360,7 +362,8 @@ class SFB(Protocol):
     - `upper_bound`: the cost of the best solution.
     - `under_way`: for each unanswered message to the next robot, its batch and its minimum lower bound.
     - `width`: the number of CPAs to extend next. `first_sent`: the first CPA was sent, alone.
-    - `bounds`: the costs that this robot adds to CPAs; set once it knows all values, complete with the `ceiling`.
+    - `bounds`: the costs that this robot adds to CPAs; set once it knows the values of all robots, complete with the
+      `ceiling`.
     """
 
     bounds: Bounds
@@ -446,7 +449,7 @@ class SFB(Protocol):
 
     @property
     def _priced(self) -> bool:
-        """Whether all robots' values are known, and the constraints with them evaluated."""
+        """Whether the values of all robots are known, and the constraints with them have been evaluated."""
         return hasattr(self, "bounds")
 
     def settle(self) -> None:
@@ -471,7 +474,7 @@ class SFB(Protocol):
             self.send(self.next, Above.of(self.domains))
 
     def _send_charges(self, below: Sequence[tuple[Domain, Charges]], most: int) -> None:
-        """Store all robots' values and evaluate the constraints; the first robot begins the search."""
+        """Store the values of all robots and evaluate the constraints; the first robot then begins the search."""
         own = self.problem.values, tuple(map(_as_integer, self.problem.costs({})))
         self.domains += [domain for domain, _ in below]
         self.bounds = self._create_bounds()
@@ -526,7 +529,7 @@ class SFB(Protocol):
         return min(LARGEST, self.settings.memory // (len(self.order.names) * self.settings.window))
 
     def _complete(self, rows: Any) -> None:  # noqa: ANN401 - of either form
-        """Complete the CPAs, as the last robot; the cheapest one is a solution if it costs less than the best."""
+        """Complete the CPAs, as the last robot; the cheapest is a solution if it costs less than the best so far."""
         if len(rows):
             cost, places = self.bounds.completed(rows)
             if cost < self.upper_bound:
@@ -547,7 +550,7 @@ class SFB(Protocol):
         elif self.best is None:
             self.conclude(Verdict.NO_SOLUTION)
 
-    # Knowledge of the whole search
+    # Knowledge about the whole search
 
     @property
     def incumbent(self) -> Incumbent | None:

@@ -1,4 +1,4 @@
-"""The bounds of `sfb` for problems without costs: bits in place of numbers.
+"""The bounds in `sfb` for problems without costs: bits instead of numbers.
 
 Without costs the ceiling is 1. So an entry of a vector is 0 if the value is consistent with the chosen values, and 1 if
 not. Here it is a bit, 1 or 0: the vectors of all robots below are one integer, with a field for each robot. Choosing a
@@ -6,9 +6,9 @@ value is one AND of integers. The test for an empty field, which raises the boun
 fields together. The rows are those of `sfb_bounds` for the same team, in the same order. A row takes fewer bytes, so
 more of them fit into a message.
 
-A row is a pair: the places of the values of all robots above, and the integer. Its lowest field is that of the robot
-that extends it next. A field has a bit for each value, the first one lowest, and above them a bit that is 0, which
-stops a borrow (Lamport, "Multiple byte processing with full-word instructions", CACM 18, 1975).
+A row is a pair: the indices of the values of all robots above, and the integer. The lowest field of the integer belongs
+to the robot that extends the row next. A field has a bit for each value, the first value lowest, and above these a bit
+that is 0, which stops a borrow (Lamport, "Multiple byte processing with full-word instructions", CACM 18, 1975).
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ CEILING = 1
 
 
 class ForwardBits:
-    """The values that the choices of the robot of `problem` leave the robots below; `domains` are all robots' values.
+    """The values that remain for the robots below after the choices of the robot of `problem`.
 
-    See `ForwardBounds`, which has the same methods.
+    `domains` are the values of all robots. See `ForwardBounds`, which has the same methods.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
@@ -68,7 +68,7 @@ class ForwardBits:
         return [(b"", self._full << self._own + 1 | field)]
 
     def read(self, content: bytes, count: int) -> list[Row]:
-        """Return the `count` partial assignments in `content`. Raises `ValueError` if it is not of that form."""
+        """Return the `count` partial assignments in `content`. Raises `ValueError` if it has another form."""
         chosen = self.rank * self._place_bytes
         length = chosen + _bytes(self._bits + self._own + 1)
         if count < 1 or len(content) != count * length:
@@ -88,11 +88,11 @@ class ForwardBits:
 
     @property
     def width(self) -> int:
-        """The bytes of an extended partial assignment."""
+        """The number of bytes of an extended partial assignment."""
         return (self.rank + 1) * self._place_bytes + _bytes(self._bits)
 
     def below(self, rows: list[Row], upper_bound: int) -> list[Row]:
-        """Return the `rows` with a lower bound below `upper_bound`: all, until there is a solution."""
+        """Return the `rows` with a lower bound below `upper_bound`: all rows, until there is a solution."""
         return rows if upper_bound else []
 
     def least(self, rows: list[Row]) -> int:  # noqa: ARG002 - as `ForwardBounds`
@@ -107,7 +107,7 @@ class ForwardBits:
     def extended(self, rows: list[Row], upper_bound: int) -> list[Row]:
         """Return all extensions of `rows` by a value of this robot that leave each robot below a value.
 
-        Extensions that leave the other robots the most values come first.
+        Extensions that leave the most values to the other robots come first.
         """
         if not upper_bound:
             return []
@@ -129,7 +129,7 @@ class ForwardBits:
         return [row for _, row in found]
 
     def completed(self, rows: list[Row]) -> tuple[int, list[int]]:
-        """Return the cost and the values of the first extension of `rows`, of all robots but this one."""
+        """Return the cost and the values of the first extension of `rows`, for all robots but this one."""
         size = self._place_bytes
         for chosen, own in rows:
             if own:
@@ -140,8 +140,8 @@ class ForwardBits:
     def _ruled_out(self, allowed: Mapping[Places, int], start: int) -> dict[Places, list[int]]:
         """Return the values that each value of this robot rules out, for a robot whose field begins at `start`.
 
-        `allowed` has this robot's values that are consistent with the places of the others' values, the lowest robot's
-        last.
+        `allowed` has the values of this robot that are consistent with the indices of the others' values, the lowest
+        robot's index last.
         """
         found: dict[Places, list[int]] = {}
         for (*above, place), own in allowed.items():
@@ -165,7 +165,7 @@ def _count(found: tuple[int, Row]) -> int:
 
 
 def _largest(content: bytes, first: int, size: int, length: int) -> int:
-    """Return the largest number of `size` bytes at the place `first` of a row of `length` bytes."""
+    """Return the largest number of `size` bytes at offset `first` in the rows of `length` bytes."""
     if size == 1:
         return max(content[first::length])
     starts = range(first, len(content), length)

@@ -1,11 +1,12 @@
-"""Partial assignments as rows of an array, and the costs that one robot adds to them: for `sfb`.
+"""Partial assignments as rows of an array, and the costs that one robot adds to them, for `sfb`.
 
 A row is a partial assignment: its lower bound, its robots' cost, the place of each robot's value, and then, for each
 robot below in priority order, a vector: the cost of each of that robot's values with the values above. The bound is the
 cost plus the least of each vector.
 
-All costs are whole numbers. The `ceiling`, one more than the sum of all constraints and charges can reach, represents
-infinity, and larger numbers are cut to it. So the numbers are as small as the problem allows, usually a byte each.
+All costs are whole numbers. The `ceiling`, one more than the maximum sum of all constraints and charges, represents
+infinity, and larger numbers are reduced to it. So the numbers are as small as the problem allows, usually one byte
+each.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from robochoc.solver.local_problem import LocalProblem
 Rows = NDArray[np.integer[Any]]
 
 BOUND, COST, VALUES = 0, 1, 2
-"""The columns of a row: its bound, its cost, the first value's place."""
+"""The columns of a row: its bound, its cost, and the first value's index."""
 
 _SIZES = ("<u1", "<u2", "<u4", "<i8")
 
@@ -31,7 +32,8 @@ _SIZES = ("<u1", "<u2", "<u4", "<i8")
 class _NAry(NamedTuple):
     """The costs that an n-ary constraint adds to `columns`, the vector of its lowest robot.
 
-    `table` has an axis for the value of each robot in `ranks` (all above), then this robot's axis and the vector's.
+    `table` has an axis for the value of each robot in `ranks` (all above), then this robot's axis and the vector's
+    axis.
     """
 
     ranks: tuple[int, ...]
@@ -40,11 +42,11 @@ class _NAry(NamedTuple):
 
 
 class ForwardBounds:
-    """The costs that the robot of `problem` adds to partial assignments; `domains` are all robots' values.
+    """The costs that the robot of `problem` adds to partial assignments; `domains` are the values of all robots.
 
-    It evaluates the constraints of which it is the last robot but one, into the vector of the last one. So each
-    constraint is evaluated once, as soon as only one of its robots has no value. `most` is an upper bound on the sum of
-    their costs.
+    This robot evaluates the constraints in which it is the second-last robot, and adds the costs to the vector of the
+    last one. So each constraint is evaluated once, as soon as only one of its robots has no value. `most` is an upper
+    bound on the sum of their costs.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
@@ -70,7 +72,7 @@ class ForwardBounds:
                     self._n_ary.append(_NAry(tuple(order.rank[one] for one in agents[:-1]), columns, table))
 
     def count_up_to(self, ceiling: int) -> None:
-        """Set the `ceiling`, to which all costs are cut from now on."""
+        """Set the `ceiling`, to which all larger costs are reduced from now on."""
         self.ceiling = ceiling
         largest = max(2 * ceiling, self._largest)
         self._type = np.dtype(next(size for size in _SIZES if largest <= np.iinfo(size).max))
@@ -87,7 +89,7 @@ class ForwardBounds:
         """Return the `count` partial assignments in `content`, which the robot above made with `tobytes`.
 
         Raises:
-            ValueError: if `content` is not of that form.
+            ValueError: if `content` has another form.
         """
         columns = self._first + self._own + int(self._starts[-1])
         if count < 1 or len(content) != count * columns * self._type.itemsize:
@@ -99,7 +101,7 @@ class ForwardBounds:
 
     @property
     def width(self) -> int:
-        """The bytes of an extended partial assignment."""
+        """The number of bytes of an extended partial assignment."""
         return (self._first + 1 + int(self._starts[-1])) * self._type.itemsize
 
     def below(self, rows: Rows, upper_bound: int) -> Rows:
@@ -117,7 +119,7 @@ class ForwardBounds:
     def extended(self, rows: Rows, upper_bound: int) -> Rows:
         """Return all extensions of `rows` by a value of this robot with a lower bound below `upper_bound`.
 
-        They are sorted by lower bound, then by decreasing number of values left to the other robots.
+        The extensions are sorted by lower bound, then by decreasing number of values left to the other robots.
         """
         own = rows[:, self._first : self._first + self._own]
         before = rows[:, BOUND].astype(np.int64) - own.min(axis=1)  # the bound, without this robot's part
@@ -136,13 +138,13 @@ class ForwardBounds:
         return extended
 
     def completed(self, rows: Rows) -> tuple[int, list[int]]:
-        """Return the cost and the values of the cheapest extension of `rows`, of all robots but this one."""
+        """Return the cost and the values of the cheapest extension of `rows`, for all robots but this one."""
         costs = rows[:, COST, None].astype(np.int64) + rows[:, self._first :]
         row, value = divmod(int(costs.argmin()), self._own)
         return int(costs[row, value]), [*rows[row, VALUES : self._first].tolist(), value]
 
     def _vectors(self, rows: Rows, row: NDArray[np.intp], value: NDArray[np.intp]) -> Rows:
-        """Return the vectors of the robots below after each of the rows at `row` is extended by `value`."""
+        """Return the vectors of the robots below, after each of the rows at `row` is extended by `value`."""
         vectors = rows[row, self._first + self._own :]
         vectors += self._prices[value]
         np.minimum(vectors, self.ceiling, out=vectors)
@@ -158,7 +160,7 @@ class ForwardBounds:
             return np.minimum.reduceat(vectors, self._starts[:-1], axis=1)
         blocks = vectors.reshape(len(vectors), len(self._sizes), self._sizes[0])
         least = blocks[:, :, 0].copy()
-        for place in range(1, self._sizes[0]):  # many short rows: by columns it is four times as fast
+        for place in range(1, self._sizes[0]):  # many short rows: column by column is four times as fast
             np.minimum(least, blocks[:, :, place], out=least)
         return least
 
@@ -167,5 +169,5 @@ class ForwardBounds:
 
     @property
     def _first(self) -> int:
-        """The column after the values of the robots above: that of this robot's value, or the first of its vector."""
+        """The column after the values of the robots above: that of this robot's value, or the first in its vector."""
         return VALUES + self.rank

@@ -1,9 +1,9 @@
 """Synchronous Branch and Bound (SyncBB).
 
-Branch and bound, distributed. One path, the values of the robots so far and the cost of each, goes from robot to robot
-in priority order. Its holder adds its first value with which the path costs less than the bound n (the cost of the best
-path so far), and sends it on; without such a value, it sends the path back. A complete path is the new best one. One
-robot acts at a time, so no message is ever obsolete.
+Distributed branch and bound. One path, which contains the values of the robots so far and the cost of each, goes from
+robot to robot in priority order. Its holder adds its first value with which the path costs less than the bound n (the
+cost of the best path so far), and sends the path on; if there is no such value, it sends the path back. A complete path
+is the new best one. One robot acts at a time, so no message is ever obsolete.
 
 - **When to use**: as a simple baseline with costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The best path is
@@ -18,8 +18,8 @@ The methods:
 
 Choices that the paper leaves open:
 
-- Constraints may be n-ary. The lowest-priority robot of the scope pays them, when it holds the path.
-- `Backtrack` contains only the values of the best path, as the robot before still has its own.
+- Constraints may be n-ary. The lowest-priority robot in the scope pays them, when it holds the path.
+- `Backtrack` contains only the values in the best path, because the previous robot still has its own path.
 - The last robot looks for further, cheaper values before it sends the path back.
 - A path that costs as much as a new bound goes back at once.
 - A robot with an empty domain reports it at once.
@@ -56,7 +56,7 @@ Cost = int | float
 
 
 class BestPath(msgspec.Struct, frozen=True, array_like=True):
-    """The best path so far: all robots' values in priority order, and its cost (the bound; `inf`: none yet)."""
+    """The best path so far: the values of all robots in priority order, and its cost (the bound; `inf`: none yet)."""
 
     bound: Cost
     values: tuple[Value, ...] = ()
@@ -86,7 +86,7 @@ class Path(Message, frozen=True):
 
 
 class Backtrack(Message, frozen=True):
-    """A request to take the next value: every path with the receiver's value costs at least the bound."""
+    """A request to take the next value: every path with the receiver's current value costs at least the bound."""
 
     best: BestPath
 
@@ -110,7 +110,7 @@ class Backtrack(Message, frozen=True):
 
 
 class Terminate(Message, frozen=True):
-    """The end of the search: no path is cheaper than the best one."""
+    """The end of the search: no path is cheaper than the best one found."""
 
     best: BestPath
 
@@ -128,14 +128,14 @@ class Terminate(Message, frozen=True):
 
 
 def best_proves(best: BestPath, reception: Reception) -> list[Proof]:
-    """Return the proofs of the best path."""
+    """Return the proofs in the best path."""
     return [Total(dict(zip(reception.order, best.values, strict=False)), best.bound)] if best.values else []
 
 
 class SyncBB(Protocol):
     """One agent of SyncBB. State: the last `path` and its cost (`paid`), and the `best` path.
 
-    `over`: this robot knows that the best path is optimal.
+    `over`: whether this robot knows that the best path is optimal.
     """
 
     messages = Path | Backtrack | Terminate
@@ -199,7 +199,7 @@ class SyncBB(Protocol):
         return Findings(best=self.incumbent, bound=self._lower_bound if self.rank == 0 else None)
 
     def _extend(self, first: int) -> None:
-        """Add the first value from place `first` on with a path cheaper than the best; otherwise backtrack."""
+        """Add the first value from index `first` on that makes the path cheaper than the best; otherwise backtrack."""
         for index in range(first, len(self.problem.values)):
             if self.paid >= self.best.bound:
                 break
@@ -211,7 +211,7 @@ class SyncBB(Protocol):
         self._backtrack()
 
     def _pass_on(self, cost: Cost) -> bool:
-        """Send on the path with this robot's value and its `cost`. Return False if it is complete: the best one."""
+        """Send on the path with this robot's value and its `cost`. Return False if it is complete and so the best."""
         path = [*self.path, (self.problem.values[self.value or 0], cost)]
         if self.rank + 1 < len(self.order.names):
             self.send(self.order.names[self.rank + 1], Path(path, self.best))
@@ -220,7 +220,7 @@ class SyncBB(Protocol):
         return False
 
     def _backtrack(self) -> None:
-        """Send the path back to the robot before; the first robot ends the search."""
+        """Send the path back to the previous robot; the first robot ends the search."""
         self.value = None
         if self.rank > 0:
             self.send(self.order.names[self.rank - 1], Backtrack(self.best))
@@ -247,5 +247,5 @@ class SyncBB(Protocol):
 
     @property
     def _known(self) -> bool:
-        """Whether there is a best path."""
+        """Whether a best path is known."""
         return self.best.bound < math.inf
