@@ -81,9 +81,14 @@ class Flight:
         names: The drones' names.
         homes: The drones' initial places (N, 3), in metres.
         conditions: Distance, wind, failures and obstacles.
+        progress: Called with a description of the progress at every logged sample.
+        rises: Whether drones take off and land vertically where possible.
+        ground: The height of the ground. None: the lowest home is on the ground.
+        walls: Walls that drones fly around, at the speed for which the team was made.
 
-
-
+    Raises:
+        ValueError: There are no drones, or too many; the conditions name unknown drones; or homes are nearer to each
+            other than the distance, or in a wall.
     """
 
     def __init__(

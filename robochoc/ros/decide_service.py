@@ -1,4 +1,4 @@
-"""The service `decide`: a request names a team and changes of its problem; the answer is the team's decision.
+"""The service `decide`: a request has a team's name and changes to its problem; the answer is the team's decision.
 
 Its definition is `robochoc_msgs/srv/Decide` (docs/ros2). Requests are untrusted: an invalid request is answered with an
 error message.
@@ -30,9 +30,9 @@ DECIDE, TRIGGER = "robochoc_msgs/Decide", "std_srvs/Trigger"
 CHANGES_MAX = 1_000
 CHANGES_CHARACTERS_MAX = 64 * 1024
 REFUSAL_CHARACTERS_MAX = 1_000
-"""A refusal may quote the request, which may be long."""
+"""The maximum length of an error message, in characters: it may quote the request, which may be long."""
 RESULT_CHARACTERS_MAX = 128 * 1024
-"""Longer results are omitted from the answer."""
+"""The maximum length of a result, in characters. Longer results are omitted from the answer."""
 
 Solve = Callable[[Team, Options], Outcome]
 
@@ -57,12 +57,12 @@ class _ChangeRequest(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class DecideService:
-    """Answers requests about `teams`, one after the other.
+    """Answers requests about `teams`, one at a time.
 
     Args:
         teams: The teams from their files.
-        solve: Solves a team's problem.
-        options: The options for `solve`. Their `timeout` is the longest time for one request, in seconds.
+        solve: The function that solves a team's problem.
+        options: The options for `solve`. Their `timeout` is the maximum time for one request, in seconds.
     """
 
     def __init__(self, teams: Sequence[Team], solve: Solve, options: Options) -> None:
@@ -106,7 +106,7 @@ class DecideService:
 
 
 def _text(fields: Fields, name: str) -> str:
-    """Return the text of a field; empty if it is missing. Raises `RequestError`."""
+    """Return the text in the field `name`; empty if the field is missing. Raises `RequestError`."""
     value = fields.get(name, "")
     if not isinstance(value, str):
         raise RequestError(f"{name} is {_shown(value)}: it must be text")
@@ -127,7 +127,7 @@ def _shown(value: object) -> str:
 
 
 def refusal(why: str) -> dict[str, Any]:
-    """Return the answer to a refused request, with the reason."""
+    """Return the answer that refuses a request for the reason `why`."""
     message = on_one_line(why)
     most = REFUSAL_CHARACTERS_MAX
     return {"success": False, "message": message if len(message) <= most else f"{message[: most - 3]}..."}
@@ -152,7 +152,7 @@ def _answer(outcome: Outcome) -> dict[str, Any]:
 
 
 def _changes(text: str) -> list[Change]:
-    """Parse the changes in a request, which are JSON. Raises `RequestError`."""
+    """Parse the changes in a request, given as JSON. Raises `RequestError`."""
     if not text.strip():
         return []
     if len(text) > CHANGES_CHARACTERS_MAX:
@@ -182,4 +182,4 @@ def _as_changes(found: Sequence[_ChangeRequest]) -> Iterator[Change]:
 
 
 SERVICES: Mapping[str, str] = {DECIDE: "robochoc_msgs/srv/Decide", TRIGGER: "std_srvs/srv/Trigger"}
-"""The services' types in ROS 2's spelling."""
+"""The types of the services, in the spelling of ROS 2."""

@@ -1,8 +1,8 @@
 """ROS types: encodes the fields of messages in ROS 1 and ROS 2, and decodes their bytes.
 
-Only this module uses `rosbags.typesys`. It knows the types of ROS 1 Noetic, those of ROS 2 Humble (which later versions
-also have), those of installed packages (`waypoint_types.py`), and the offered services. A definition in a recording is
-untrusted: it is compared with ours line by line and never parsed by rosbags, which generates and runs program text.
+Only this module uses `rosbags.typesys`. It supports the types of ROS 1 Noetic, of ROS 2 Humble (which later versions
+also have), of installed packages (`waypoint_types.py`), and of the offered services. Definitions in recordings are
+untrusted: they are compared with ours line by line, and never parsed by rosbags, which generates and runs code.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ SERVICE_TYPES: Mapping[str, str] = MappingProxyType(
 )
 """The requests and responses of the offered services, as definitions of messages."""
 DEFINITION_MAX = 1 << 15
-"""The most characters of a definition in a recording. Known definitions have up to about 5,000."""
+"""The maximum number of characters in a definition in a recording. Known definitions have up to about 5,000."""
 _LINE = re.compile(r"([A-Za-z][\w/]*)((?:<=\d+)?(?:\[[<=\d]*\])?)\s+([A-Za-z]\w*)\s*(=?)", re.ASCII)
 _SECTION = re.compile(r"MSG:\s*([\w/]+)\s*", re.ASCII)
 _PRIMITIVE = re.compile(r"bool|byte|char|u?int(?:8|16|32|64)|float(?:32|64)|w?string|time|duration")
@@ -88,25 +88,25 @@ class FieldsError(RobochocError, ValueError):
 
 
 class Definition(NamedTuple):
-    """A type's definition, including its fields' types, and its MD5 sum as in ROS 1."""
+    """The definition of a type, including the types of its fields, and its MD5 sum as in ROS 1."""
 
     text: str
     md5: str
 
 
 class FieldType(NamedTuple):
-    """The type of a field: one `float64`, `string` or `geometry_msgs/Point`, or several."""
+    """The type of a field: one value (`float64`, `string`, `geometry_msgs/Point`), or an array or a sequence."""
 
     name: str
     limit: int = 0
-    """The largest number of characters of a string; 0: unlimited."""
+    """The maximum number of characters in a string; 0: unlimited."""
     shape: Literal["one", "array", "sequence"] = "one"
     size: int = 0
-    """The number of values in an array, or the largest number in a sequence; 0: unlimited."""
+    """The number of values in an array, or the maximum number in a sequence; 0: unlimited."""
 
 
 class _Conversion(NamedTuple):
-    """The conversions of a type from fields to the library's object and back, and its default object."""
+    """The conversions for a type from fields to the library's object and back, and the type's default object."""
 
     make: Converter
     fields: Converter
@@ -114,7 +114,7 @@ class _Conversion(NamedTuple):
 
 
 class _FieldError(RobochocError):
-    """The value of a field is invalid. `path` are the names of the fields that lead to it, innermost first."""
+    """The value of a field is invalid. `path` has the names of the nested fields that lead to it, innermost first."""
 
     def __init__(self, why: str, *path: str) -> None:
         super().__init__(why)
@@ -122,7 +122,7 @@ class _FieldError(RobochocError):
 
 
 class Types:
-    """The types of a version of ROS, named `geometry_msgs/PoseStamped` or `geometry_msgs/msg/PoseStamped`."""
+    """The types in a version of ROS, named `geometry_msgs/PoseStamped` or `geometry_msgs/msg/PoseStamped`."""
 
     def __init__(self, version: Version) -> None:
         self.version = version
@@ -140,7 +140,7 @@ class Types:
         return self._definitions[name]
 
     def type_hash(self, kind: str) -> str:
-        """Return the hash of `kind`, which ROS 2 uses to compare definitions (REP 2016). Raises `UnknownTypeError`."""
+        """Return the hash of `kind`, by which ROS 2 compares definitions (REP 2016). Raises `UnknownTypeError`."""
         name = self._name(kind)
         self._conversion(kind, name)
         return self._store.hash_rihs01(name)
@@ -156,7 +156,7 @@ class Types:
         return tuple((field, _field_type(desc)) for field, desc in self._store.fielddefs[name][1])
 
     def encode(self, kind: str, fields: Fields) -> bytes:
-        """Return a message's bytes: CDR in ROS 2, ROS 1's format in ROS 1.
+        """Return the bytes of a message, in CDR for ROS 2, or the format of ROS 1.
 
         Raises:
             UnknownTypeError: `kind` is unknown.
@@ -172,7 +172,7 @@ class Types:
         return bytes(store.serialize_ros1(message, name) if self.version == 1 else store.serialize_cdr(message, name))
 
     def decode(self, kind: str, content: bytes) -> dict[str, Any]:
-        """Return the fields of a message whose bytes are untrusted.
+        """Return the fields of a message from its bytes, which are untrusted.
 
         Raises:
             UnknownTypeError: `kind` is unknown.
@@ -187,7 +187,7 @@ class Types:
             raise FieldsError(f"{len(content)} bytes are not a {short_kind(kind)}: {error}") from error
 
     def _name(self, kind: str) -> str:
-        """Return the library's name, `geometry_msgs/msg/PoseStamped`. Registers a package's definition if necessary."""
+        """Return the library's name, `geometry_msgs/msg/PoseStamped`; register a package's definition if necessary."""
         short = short_kind(kind)
         name = short.replace("/", "/msg/", 1)
         if name not in self._store.fielddefs:
@@ -279,7 +279,7 @@ class Types:
 
 @cache
 def types_of(version: Version) -> Types:
-    """Return the types of a version of ROS. They are created once."""
+    """Return the types in a version of ROS. The object is created once."""
     return Types(version)
 
 
@@ -411,7 +411,7 @@ def _add(found: dict[str, list[Field] | None], current: str, content: str) -> No
 
 
 def _qualified(kind: str, inside: str) -> str:
-    """Return a field's type with its package, which definitions may omit for types of their package and for headers."""
+    """Return a field's type with its package. Definitions may omit it for headers and types in their own package."""
     if kind == "Header":
         return "std_msgs/Header"
     if "/" in kind or _PRIMITIVE.fullmatch(kind):

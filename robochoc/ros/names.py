@@ -1,8 +1,8 @@
-"""Legal names for ROS: a team's file may name a topic `/drone3.1/waypoint3.1`, which ROS 1 and ROS 2 do not allow.
+"""Conversion to legal ROS names: topics in a team's file may have illegal names, such as `/drone3.1/waypoint3.1`.
 
-A legal name is `/` and tokens of letters, digits and single underscores, each beginning with a letter, according to
-ROS 1 (wiki.ros.org/Names) and ROS 2 (design.ros2.org, "Topic and Service name mapping to DDS"). Legal names are not
-changed.
+Legal names consist of tokens that begin with a letter, contain letters, digits and single underscores, and are preceded
+by `/`. This is legal in ROS 1 (wiki.ros.org/Names) and ROS 2 (design.ros2.org, "Topic and Service name mapping to
+DDS"). Legal names are not changed.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ TEAM_TOPICS: Mapping[str, str] = MappingProxyType(
         "/diagnostics": "diagnostic_msgs/DiagnosticArray",
     }
 )
-"""The topics of the whole team, with their standard types in ROS."""
+"""The topics for the whole team, with their standard ROS types."""
 
 NAME_MAX = 240
-"""The most characters of a name. ROS 2 adds a few for DDS."""
+"""The maximum length of a name, in characters. ROS 2 adds a few characters for DDS."""
 
 _LEGAL = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*_?")
 _RESERVED = {*TEAM_TOPICS, "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/bond"}
@@ -40,11 +40,11 @@ class NameClashError(RobochocError):
 
 
 class TopicNames:
-    """The ROS names of the topics of `drones`, by the drones' numbers. Raises `NameClashError`."""
+    """The ROS names of the drones' topics, by drone number. Raises `NameClashError`."""
 
     original: Mapping[str, str]
-    """Maps the ROS name of a waypoint's topic to its name in the robot's file, and the namespace of a drone without a
-    topic to the drone's name.
+    """Maps the ROS name of a waypoint topic to the topic's name in the robot's file, and the namespace of a drone
+    without a topic to the drone's name.
     """
 
     def __init__(self, drones: Sequence[Drone]) -> None:
@@ -64,7 +64,7 @@ class TopicNames:
         )
 
     def waypoint(self, number: int) -> str | None:
-        """Return the topic of a drone's waypoints; None if its robot's file has no topic."""
+        """Return the topic of a drone's waypoints; None if the file of its robot has no topic."""
         return self._waypoints[number]
 
     def namespace(self, number: int) -> str:
@@ -85,12 +85,12 @@ class TopicNames:
 
 
 def is_for_waypoints(topic: str, kind: str) -> bool:
-    """Return whether `topic`, of the ROS type `kind`, is for waypoints: not a report or a topic of the whole team."""
+    """Return whether `topic`, with the ROS type `kind`, is for waypoints, not for reports or the whole team."""
     return topic not in TEAM_TOPICS and REPORTS.get(topic.rpartition("/")[2]) != kind.replace("/msg/", "/")
 
 
 def ros_name(name: str) -> str:
-    """Return `name` as a legal name: `/drone3_1/waypoint3_1`. Different names may become the same."""
+    """Convert `name` to a legal name, such as `/drone3_1/waypoint3_1`. Different names may become the same."""
     tokens = [_token(token) for token in name.split("/") if token] or [_token("")]
     found = "/" + "/".join(tokens)
     return f"{found}_topic" if found in _RESERVED else found
@@ -105,7 +105,7 @@ def _token(text: str) -> str:
 
 
 def _plain(char: str) -> str:
-    """Return a letter without its accent, a letter of another alphabet as its code, other characters as underscores."""
+    """Return a letter without its accent, the code of a letter from another alphabet, or `_` for other characters."""
     if char.isascii():
         return char if char.isalnum() else "_"
     if unicodedata.combining(char):
@@ -114,7 +114,7 @@ def _plain(char: str) -> str:
 
 
 def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
-    """Yield each drone's namespace: the first token of its waypoints' topic if it is unique, else the whole topic."""
+    """Yield the drones' namespaces: the first token of the waypoint topic if it is unique, else the whole topic."""
     names = [ros_name(drone.name.replace("/", "_")) for drone in drones]
     first = ["/" + topic.split("/")[1] if topic else name for topic, name in zip(waypoints, names, strict=True)]
     shared = Counter(first)

@@ -1,4 +1,4 @@
-"""Publishers of a mission: decisions, poses and reports of its drones as ROS messages."""
+"""Publishers for a mission: the drones' decisions, poses and reports as ROS messages."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _NOT_MEASURED = {
     name: float("nan")
     for name in ("voltage", "temperature", "current", "charge", "capacity", "design_capacity", "percentage")
 }
-"""NaN, as the definition of `sensor_msgs/BatteryState` requires for unmeasured values."""
+"""NaN, as required by the definition of `sensor_msgs/BatteryState` for unmeasured values."""
 
 
 class NothingToPublishError(RobochocError):
@@ -35,9 +35,9 @@ class NothingToPublishError(RobochocError):
 
 
 class Publisher:
-    """Publishes the waypoints and reports of the `drones` of `team` to all `sinks`, which it does not close.
+    """Publishes the waypoints and reports of the `drones` in `team` to all `sinks`, without closing these.
 
-    Times are in nanoseconds since the epoch; places in metres, in `frame`. `options` select further messages. Methods
+    Times are in nanoseconds since the epoch, places in metres in `frame`. `options` select further messages. Methods
     raise `SinkError`, and `NoMappingError` if a package's mapping fails.
 
     Raises:
@@ -93,14 +93,14 @@ class Publisher:
         self._goals |= {number: goal.at for number, goal in leg.goals.items()}
         header = self._header(at_ns)
         if self._options.frames:
-            # All current goals, because a latched topic stores only its last message.
+            # All current goals are sent, because a latched topic stores only its last message.
             frames = [transform(header, self._frame_of(number, GOAL), at) for number, at in sorted(self._goals.items())]
             self._team_publish("/tf_static", transforms(frames), at_ns)
         if self._options.diagnostics:
             self._team_publish("/diagnostics", status(self._team, leg, self._decisions, header), at_ns)
 
     def poses(self, positions: NDArray[np.float64], attitudes: NDArray[np.float64], at_ns: int) -> None:
-        """Publish all drones' poses: positions in metres (N, 3), and quaternions x, y, z, w (N, 4)."""
+        """Publish the poses of all drones: positions (N, 3) in metres, and quaternions x, y, z, w (N, 4)."""
         header = self._header(at_ns)
         flown = zip(positions.tolist(), attitudes.tolist(), strict=True)
         bodies = []
@@ -112,7 +112,7 @@ class Publisher:
             self._team_publish("/tf", transforms(bodies), at_ns)
 
     def report(self, report: Report, at_ns: int) -> None:
-        """Publish a drone's report. Raises `KeyError` if no drone has that name."""
+        """Publish a drone's report. Raises `KeyError` if no drone has the name in the report."""
         number, header = self._numbers[report.drone], self._header(at_ns)
         match report:
             case BatteryReport():
@@ -154,9 +154,9 @@ class Publisher:
 
 
 class SinkPublisher(MissionPublisher):
-    """Publishes decisions, poses and reports of `drones` of `team` to one `sink`, and counts them.
+    """Publishes decisions, poses and reports of the `drones` in `team` to one `sink`, and counts these messages.
 
-    Raises the exceptions of `Publisher`.
+    Raises the same exceptions as `Publisher`.
     """
 
     def __init__(
@@ -177,12 +177,12 @@ class SinkPublisher(MissionPublisher):
         self._publisher.decide(leg, at_ns)
 
     def report(self, report: Report) -> None:
-        """Publish a drone's report, at the report's time. Raises `SinkError`."""
+        """Publish a drone's report with the time in the report. Raises `SinkError`."""
         self._counts["report"] += 1
         self._publisher.report(report, nanoseconds(report.at_s))
 
     def poses(self, positions: npt.NDArray[np.float64], attitudes: npt.NDArray[np.float64], at_s: float) -> None:
-        """Publish all drones' poses, see `Publisher.poses`. Raises `SinkError`."""
+        """Publish the poses of all drones; see `Publisher.poses`. Raises `SinkError`."""
         self._counts["pose"] += len(positions)
         self._publisher.poses(positions, attitudes, nanoseconds(at_s))
 
@@ -204,9 +204,9 @@ def waypoints(
     stamp: int,
     before: Mapping[int, Point] = MappingProxyType({}),
 ) -> tuple[Waypoint, ...]:
-    """Return the waypoints of flying and landing drones in `leg`. Drones without a topic have none.
+    """Return the waypoints of flying and landing drones in `leg`, except drones without a topic.
 
-    `before` are the goals of the previous decision, by the drones' numbers.
+    `before` has the goals of the previous decision, by drone number.
     """
     found = []
     for number, goal in sorted(leg.goals.items()):
@@ -217,7 +217,7 @@ def waypoints(
 
 
 def _with_kind(drone: Drone, kind: str) -> Drone:
-    """Return `drone` with the type `kind` of its topic; unchanged if `kind` is empty."""
+    """Return `drone` with `kind` as the type of its topic; unchanged if `kind` is empty."""
     return replace(drone, topic=replace(drone.topic, type=kind)) if kind and drone.topic else drone
 
 

@@ -1,7 +1,7 @@
 """Decodes the reports of robots from messages of ROS 1 or ROS 2.
 
-A drone reports in its own namespace (`names.py`). Messages are untrusted: invalid ones are ignored, such as a value
-that is not a number, or a place in another frame.
+A drone reports in its own namespace (`names.py`). Messages are untrusted. Invalid messages are ignored, for example
+with a value that is not a number, or a place in another frame.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.robots.source import REPORTS, ReceivedMessage
 from robochoc.ros.names import TopicNames
 
 REASON_MAX = 200
-"""The most characters of a reason; longer ones are cut."""
+"""The maximum length of a reason, in characters; longer reasons are truncated."""
 _COORDINATE_MAX_M = 1e9
 """The largest valid coordinate, in metres."""
 
@@ -25,15 +25,15 @@ _COORDINATE_MAX_M = 1e9
 class ReportDecoder:
     """Decodes the reports of `drones`. Raises `NameClashError` if two of their topics would have the same name.
 
-    Only places in `frame` are accepted. Messages without a frame are assumed to be in it.
+    Only places in `frame` are accepted. Places in messages without a frame are assumed to be in `frame`.
     """
 
     topics: Mapping[str, str]
-    """The topics of reports and their types, both by their ROS names."""
+    """The ROS names of report topics, with the ROS names of their types."""
     namespaces: Mapping[str, str]
     """The namespace of each drone's topics, by the drone's name."""
     other_frames: dict[str, str]
-    """The topics with places in another frame, and the last of these frames."""
+    """The topics with places in another frame, each with the last such frame."""
 
     def __init__(self, drones: Sequence[Drone], frame: str) -> None:
         names = TopicNames(drones)
@@ -48,7 +48,7 @@ class ReportDecoder:
         self.other_frames = {}
 
     def report(self, received: ReceivedMessage) -> Report | None:
-        """Return the report in a message, with the time of its reception; None if it has no valid report."""
+        """Return the report in a message, with the time of reception; None if there is no valid report."""
         drone, token = self._tokens.get(received.topic, ("", ""))
         at_s = received.at_ns / 1e9
         match token:
@@ -69,7 +69,7 @@ class ReportDecoder:
                 return None
 
     def _place(self, received: ReceivedMessage, *path: str) -> Point | None:
-        """Return the point at `path` in the message; None if it is not in our frame."""
+        """Return the point at `path` in the message; None if the point is invalid or in another frame."""
         frame = _fields_at(received.fields, ("header",)).get("frame_id")
         if isinstance(frame, str) and frame.removeprefix("/") not in {"", self._frame}:
             self.other_frames[received.topic] = on_one_line(frame[:REASON_MAX])
@@ -80,14 +80,14 @@ class ReportDecoder:
 
 
 def _fields_at(fields: object, path: Sequence[str]) -> Mapping[str, object]:
-    """Return the fields at `path`; empty if there are none."""
+    """Return the nested fields at `path`; empty if there are none."""
     for name in path:
         fields = fields.get(name) if isinstance(fields, Mapping) else None
     return fields if isinstance(fields, Mapping) else {}
 
 
 def _number(fields: Mapping[str, object], name: str) -> float | None:
-    """Return a finite number that is not too large; None for all other values."""
+    """Return the number in the field `name`; None if it is not a finite number, or too large."""
     value = fields.get(name)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None

@@ -1,4 +1,4 @@
-"""Feedback from a source: live reports of robots, or recorded ones, and the clock of a simulation."""
+"""Feedback from a source: live or recorded reports of robots, and the clock of a simulation."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ class SourceFeedback(Feedback):
     """Reports from `source`, decoded by `decoder`.
 
     A run ends if a live source sends no report that changes the problem within `patience_s` seconds after a decision.
-    This time does not pass while the source is busy. A recording is read to its end as fast as possible; its messages
-    define the time.
+    This time does not pass while the source is busy. A recording is read to its end as fast as possible; the times of
+    its messages are the present time.
 
-    With `sim_time`, decisions have the time on `/clock`. Raises `SourceError` if none arrives within `patience_s`.
+    With `sim_time`, decisions have the time on `/clock`. Raises `SourceError` if no time arrives within `patience_s`.
     """
 
     def __init__(
@@ -58,7 +58,7 @@ class SourceFeedback(Feedback):
 
     @property
     def notes(self) -> list[str]:
-        """Notes on places in another frame, and on unused topics of a recording."""
+        """Notes on places in other frames, and on unused topics in a recording."""
         frames = [
             f"places on {topic} are in the frame '{frame}', and were ignored (set the team's frame by --frame)"
             for topic, frame in self._decoder.other_frames.items()
@@ -77,15 +77,15 @@ class SourceFeedback(Feedback):
         return ""
 
     def now_ns(self) -> int:
-        """Return the present time of the wall clock, of the recording, or on `/clock`."""
+        """Return the present time according to the wall clock, the recording, or `/clock`."""
         if self._sim is not None:
             return self._sim_ns(self._sim)
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
     def _sim_ns(self, clock: SimClock) -> int:
-        """Return the newest time of the simulation. Wait for the first one. Raises `SourceError`.
+        """Return the newest time of the simulation, after waiting for the first one. Raises `SourceError`.
 
-        Other messages that arrive meanwhile are stored in an inbox.
+        Other messages that arrive during the wait are stored in an inbox.
         """
         deadline = time.monotonic() + self._patience_s
         while self._source.live and time.monotonic() < deadline:
@@ -123,7 +123,7 @@ class SourceFeedback(Feedback):
         return report
 
     def poll(self) -> Report | None:
-        """Return an available report of a live source; see `Feedback.poll`."""
+        """Return an available report from a live source; see `Feedback.poll`."""
         if self._pending is None and self._source.live:
             self._pending = self._next_report(time.monotonic() + _SLICE_S, wait=False)
         report, self._pending = (self._pending, None) if self._source.live else (None, self._pending)
@@ -131,18 +131,18 @@ class SourceFeedback(Feedback):
         return report
 
     def _publish(self, report: Report | None) -> None:
-        """Publish a report, if any, by all publishers."""
+        """Publish a report, if there is one, with all publishers."""
         if report is not None:
             for publisher in self.publishers:
                 publisher.report(self._with_sim_time(report))
 
     def _with_sim_time(self, report: Report) -> Report:
-        """Return `report` with the time of the simulation, if it is used."""
+        """Return `report` with the time of the simulation, if simulated time is used."""
         now_ns = self._sim.now_ns if self._sim else None
         return report if now_ns is None else replace(report, at_s=now_ns / 1e9)
 
     def _end_of_wait(self, soon: float | None) -> float | None:
-        """Return the end of the wait for reports, at most `soon`; None if it is unlimited."""
+        """Return the end of the wait for reports, at most `soon`; None if the wait is unlimited."""
         if self._deadline is not None and self._source.is_busy:
             self._deadline = min(time.monotonic() + self._patience_s, self._last)
         return min((each for each in (self._deadline, soon) if each is not None), default=None)
@@ -155,7 +155,7 @@ class SourceFeedback(Feedback):
             self.idle()
 
     def _next_report(self, soon: float | None, *, wait: bool = True) -> Report | None:
-        """Return the next report of the source before `soon` and the end of the wait; None if there is none.
+        """Return the next report from the source before `soon` and the end of the wait; None if no report arrives.
 
         Without `wait`, return None as soon as no message is available, at `soon` at the latest.
         """
@@ -182,7 +182,7 @@ class SourceFeedback(Feedback):
 
 
 class SimClock:
-    """The time of a simulation, from its last message on `/clock`."""
+    """The time of a simulation, from the last message on `/clock`."""
 
     now_ns: int | None = None
     """The time in nanoseconds; None before the first message."""
@@ -197,7 +197,7 @@ class SimClock:
 
 
 def _nanoseconds(value: object) -> int | None:
-    """Return a time in nanoseconds; None if it is invalid. A rosbridge sends seconds and nanoseconds separately."""
+    """Return a time in nanoseconds; None if invalid. A rosbridge sends seconds and nanoseconds separately."""
     if isinstance(value, int) and not isinstance(value, bool):
         return value if value // _BILLION in _SECONDS else None
     match value:
@@ -210,5 +210,5 @@ def _nanoseconds(value: object) -> int | None:
 
 
 def with_clock_topic(topics: Mapping[str, str]) -> dict[str, str]:
-    """Return `topics` with the topic of the clock."""
+    """Return `topics` and the clock topic."""
     return {**topics, CLOCK: CLOCK_KIND}

@@ -15,19 +15,19 @@ from robochoc.ros.names import TEAM_TOPICS
 from robochoc.ros.waypoint_types import UPRIGHT, point
 
 GOAL, BODY = "goal", "base_link"
-"""The last part of the names of two frames: the goal of a drone, and the drone itself."""
+"""The last parts of the names of a drone's frames: its goal, and the drone itself."""
 _LEVELS: Mapping[Verdict, int] = MappingProxyType(
     {Verdict.SOLUTION: 0, Verdict.OPTIMAL: 0, Verdict.UNKNOWN: 1, Verdict.NO_SOLUTION: 2}
 )
-"""OK, WARN and ERROR of `diagnostic_msgs/DiagnosticStatus`."""
+"""The levels OK, WARN and ERROR of `diagnostic_msgs/DiagnosticStatus`."""
 
 
 @dataclass(frozen=True)
 class PublishOptions:
-    """The type of waypoints, and the messages to publish besides them."""
+    """The type of waypoints, and the other messages to publish."""
 
     kind: str = ""
-    """The ROS type of all waypoints; empty: the types in the robots' files."""
+    """The ROS type of all waypoints; if empty, the types in the robots' files are used."""
     frames: bool = False
     """True: publish goals as frames on `/tf_static`, and flying drones as frames on `/tf`."""
     diagnostics: bool = False
@@ -35,7 +35,7 @@ class PublishOptions:
 
     @property
     def topics(self) -> dict[str, str]:
-        """The topics of the team, and their types."""
+        """The topics for the whole team, and their types."""
         used = {"/tf": self.frames, "/tf_static": self.frames, "/diagnostics": self.diagnostics}
         return {topic: kind for topic, kind in TEAM_TOPICS.items() if used[topic]}
 
@@ -45,7 +45,7 @@ WAYPOINTS_ONLY = PublishOptions()
 
 
 def transform(header: Fields, child: str, at: Point, rotation: Fields = UPRIGHT) -> Fields:
-    """Return the fields of a `geometry_msgs/TransformStamped`. Names of frames have no leading slash in tf2."""
+    """Return the fields of a `geometry_msgs/TransformStamped`. In tf2, frame names have no leading slash."""
     return {
         "header": header,
         "child_frame_id": child.removeprefix("/"),

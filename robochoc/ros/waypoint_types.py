@@ -1,8 +1,8 @@
-"""Mappings from waypoints to messages of a topic's ROS type.
+"""Mappings from waypoints to messages of the ROS types of topics.
 
-Some types are built in. Packages add others in the entry point group `robochoc.waypoints`. An entry's name is the ROS
-type, such as `mavros_msgs/PositionTarget`; its value is a function from a `Waypoint` to a message's fields, or a
-`WaypointMapping`, which can also define a type that no distribution of ROS has.
+Some types are built in. Packages add others in the entry point group `robochoc.waypoints`. The name of an entry is the
+ROS type, such as `mavros_msgs/PositionTarget`; its value is a function from a `Waypoint` to the fields of a message, or
+a `WaypointMapping`, which can also define a type that no distribution of ROS has.
 """
 
 from __future__ import annotations
@@ -36,8 +36,9 @@ class NoMappingError(RobochocError):
 class WaypointMapping:
     """Converts waypoints to the fields of messages of one ROS type.
 
-    `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. The definitions of
-    such types of its fields follow, each after a line of 80 `=` and a line `MSG: package/Type`, as in a recording.
+    `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. If types of its
+    fields are of this kind, their definitions follow, each after a line of 80 `=` and a line `MSG: package/Type`, as in
+    a recording.
     """
 
     fields: Callable[[Waypoint], Fields]
@@ -45,7 +46,7 @@ class WaypointMapping:
 
 
 def short_kind(kind: str) -> str:
-    """Return `geometry_msgs/PoseStamped` for either spelling of it. Other texts are returned unchanged."""
+    """Return `geometry_msgs/PoseStamped` for both spellings of this type. Other texts are returned unchanged."""
     found = _SPELLING.fullmatch(kind.strip())
     return f"{found[1]}/{found[2]}" if found else kind
 
@@ -57,7 +58,7 @@ def kinds() -> tuple[str, ...]:
 
 @cache
 def mapping_for(kind: str) -> WaypointMapping | None:
-    """Return the mapping to `kind`, in either spelling; None if there is none.
+    """Return the mapping to the type `kind`, in either spelling; None if there is no mapping.
 
     Raises:
         NoMappingError: The mapping of an installed package is broken.
@@ -82,7 +83,7 @@ def mapping_for(kind: str) -> WaypointMapping | None:
 
 
 def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
-    """Return the mapping for `topic` of `robot`. Raises `NoMappingError`."""
+    """Return the mapping for the `topic` of a `robot`. Raises `NoMappingError`."""
     found = mapping_for(kind)
     if found is None:
         subject = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
@@ -93,7 +94,7 @@ def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
 
 
 def _suggestion(kind: str) -> str:
-    """Return the known type with the most similar name, as the end of a message; empty if there is none."""
+    """Return the known type with the most similar name, as the end of an error message; empty if there is none."""
     import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     near = difflib.get_close_matches(kind, kinds(), 1)
@@ -173,7 +174,7 @@ def _trajectory(waypoint: Waypoint) -> Fields:
 
 
 def _text(waypoint: Waypoint) -> Fields:
-    """Return JSON on one line, for programs without ROS messages."""
+    """Return the waypoint as JSON on one line, for programs without ROS messages."""
     place = dict(zip("xyz", waypoint.at, strict=True))
     return {"data": json.dumps({"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands})}
 
@@ -205,4 +206,4 @@ _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
 _DEFINITIONS: Mapping[str, str] = MappingProxyType(
     {"tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
 )
-"""Definitions of types that rosbags lacks in ROS 1."""
+"""Definitions of ROS 1 types that are missing in rosbags."""

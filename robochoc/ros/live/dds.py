@@ -1,6 +1,6 @@
 """Sinks and sources of ROS 2 topics over DDS. No ROS 2 is required on this machine.
 
-A place is `dds:DOMAIN?OPTION=VALUE&...` (`dds_place.py`). Messages carry the bytes that ROS 2 would send.
+A place is `dds:DOMAIN?OPTION=VALUE&...` (`dds_place.py`). Messages consist of the same bytes as in ROS 2.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ _CDR = (b"\0\0", b"\0\1")
 
 
 class DdsSink(LiveSink):
-    """Publishes in a domain of DDS. Topics are latched, unless an option of the place changes that.
+    """Publishes in a DDS domain. Topics are latched, unless an option in the place changes that.
 
-    The first message is sent when each waypoint's topic has a subscriber, or after the longest wait.
+    The first message is sent when each waypoint topic has a subscriber, or after the longest wait.
     """
 
     def __init__(self, place: str) -> None:
@@ -46,7 +46,7 @@ class DdsSink(LiveSink):
         self._await_subscribers([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
-        """Send a message. Wait while a subscriber is far behind."""
+        """Send a message, after waiting for subscribers that are far behind."""
         try:
             content = types_of(2).encode(kind, fields)
         except (UnknownTypeError, FieldsError) as error:
@@ -87,9 +87,9 @@ class DdsSink(LiveSink):
 
 
 class DdsSource(LiveSource):
-    """Receives in a domain of DDS. Messages that do not match their type are ignored.
+    """Receives messages in a DDS domain. Messages that do not match their type are ignored.
 
-    By default its readers have ROS 2's quality of service for sensors: they accept reliable and best-effort messages.
+    By default, readers have ROS 2's quality of service for sensors, which accepts reliable and best-effort messages.
     """
 
     def __init__(self, place: str) -> None:

@@ -1,6 +1,7 @@
-"""A participant of a DDS domain. Only this module and `dds_types` use Cyclone DDS (cyclonedds).
+"""A participant in a DDS domain. Only this module and `dds_types` use Cyclone DDS (cyclonedds).
 
-A process opens each domain once. A sink and a source of the same domain share it; the last one to leave closes it.
+A process opens each domain once. Sinks and sources in the same domain share it; the last one to leave closes the
+domain.
 """
 
 from __future__ import annotations
@@ -38,16 +39,16 @@ from robochoc.ros.message_types import UnknownTypeError, types_of
 END_S = 5.0
 """The longest wait for the end of a subscription's thread, in seconds."""
 _TAKEN = 100
-"""The number of messages read from a topic at a time."""
+"""The maximum number of messages read from a topic at a time."""
 _WAIT_NS = 1_000_000_000
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
 MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages are neither sent nor received: waypoints and reports are short."""
 BLOCKED_S = 0.2
-"""The longest time that a blocking call lasts, in seconds, so that signals are handled."""
+"""The maximum duration of a blocking call, in seconds, so that signals are handled."""
 REQUESTS_MAX = 256
-"""The number of unread requests, and of unread answers, that DDS stores per service."""
+"""The number of unread requests, and the number of unread answers, that DDS stores per service."""
 _SECOND_NS = 1_000_000_000
 _LIMIT = (
     "<CycloneDDS><Domain><Internal>"
@@ -57,25 +58,25 @@ _LIMIT = (
 
 
 class _Domains:
-    """The open domains of this process, with the number of their users."""
+    """Counts the users of the open domains in this process."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._open: dict[int, tuple[Domain, int]] = {}
 
     def enter(self, number: int) -> None:
-        """Open the domain, or count one more user of it. Raises `DDSException`, `UnicodeEncodeError`."""
+        """Open the domain, or count one more user. Raises `DDSException`, `UnicodeEncodeError`."""
         with self._lock:
             domain, users = self._open.get(number, (None, 0))
             if domain is None:
                 given = os.environ.get(CONFIGURATION_VARIABLE, "")
                 domain = Domain(number, f"{given},{_LIMIT}" if given else _LIMIT)
-                # Otherwise it writes a line on standard error for each invalid message of an unknown participant.
+                # Otherwise DDS writes a line to standard error for each invalid message from an unknown participant.
                 load_cyclonedds().dds_set_log_mask(0)
             self._open[number] = domain, users + 1
 
     def leave(self, number: int) -> None:
-        """Count one user less of the domain; close it after the last."""
+        """Count one user less; close the domain after the last user."""
         with self._lock:
             domain, users = self._open.pop(number)
             if users > 1:
@@ -86,7 +87,7 @@ _domains = _Domains()
 
 
 class Participant:
-    """A participant of the domain of `place`. The constructor and the methods raise `failed`."""
+    """A participant in the domain of `place`. The constructor and the methods raise `failed`."""
 
     def __init__(self, place: DdsPlace, failed: ErrorClass) -> None:
         self.domain, self._quality, self._failed = place.domain, place.quality, failed
@@ -115,7 +116,7 @@ class Participant:
             )
 
     def subscribe(self, topics: Mapping[str, str], receive: Callable[[str, str, bytes], None]) -> Subscription:
-        """Subscribe to `topics`, given with their types. Each message is passed to `receive`, in a thread."""
+        """Subscribe to `topics` (name to type). Each message is passed to `receive`, in a thread."""
         with self._reported("the topics cannot be subscribed to in DDS"):
             subscriber = Subscriber(self._participant, qos=_partitions(self._quality))
             readers = [
@@ -125,8 +126,8 @@ class Participant:
             return Subscription(self._participant, readers, receive)
 
     def serve(self, name: str, kind: str) -> ServiceEnd:
-        """Return the server's end of a service of the type `kind`, such as `std_srvs/Trigger`."""
-        # Clients match the two topics of a service by this common mark.
+        """Return the server's end of a service with the type `kind`, such as `std_srvs/Trigger`."""
+        # Clients match the two topics of a service by this common identifier.
         mark = ".".join(f"{byte:x}" for byte in secrets.token_bytes(16))
         quality = Qos(
             Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS)),
@@ -142,7 +143,7 @@ class Participant:
             told: Any = Topic(self._participant, f"rr{name}Reply", response)
             partitions = _partitions(self._quality)
             writer = DataWriter(Publisher(self._participant, qos=partitions), told, qos=quality)
-            # A later request never displaces an earlier one: its writer waits until there is room.
+            # A later request never replaces an earlier one: its writer waits until there is room.
             others = Qos(
                 Policy.History.KeepAll,
                 Policy.ResourceLimits(REQUESTS_MAX, REQUESTS_MAX, REQUESTS_MAX),
@@ -170,7 +171,7 @@ class Participant:
                 return True
 
     def subscribers(self, topics: Iterable[str]) -> list[int]:
-        """Return the present number of subscribers of each of `topics`."""
+        """Return the present number of subscribers to each of `topics`."""
         with self._reported("the subscribers in DDS cannot be counted"):
             return [int(self._writers[topic].get_publication_matched_status().current_count) for topic in topics]
 
@@ -192,7 +193,7 @@ class Participant:
 
     @contextmanager
     def _reported(self, what: str, hint: str = "") -> Iterator[None]:
-        """Raise errors of DDS as `failed`, and its timeouts as `TimeoutError`."""
+        """Convert errors of DDS to `failed`, and its timeouts to `TimeoutError`."""
         try:
             yield
         except DDSException as error:
@@ -241,7 +242,7 @@ class ServiceEnd:
 
 
 class Subscription:
-    """Reads messages in a thread of its own, so that few wait in DDS, and passes their bytes to `receive`.
+    """Reads messages in a separate thread, so that few messages wait in DDS, and passes their bytes to `receive`.
 
     `readers` are given with their topics and types.
 
@@ -302,7 +303,7 @@ def _partitions(quality: Quality) -> Any:  # noqa: ANN401 - the library's
 
 
 def _of_writer(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the library's
-    """Return the quality of a writer. It stores unacknowledged messages, and `depth` messages for later subscribers."""
+    """Return the quality of service for writers, which store unacknowledged messages, and `depth` for late joiners."""
     return Qos(
         *_common(quality, kind),
         Policy.History.KeepAll,
@@ -312,7 +313,7 @@ def _of_writer(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the librar
 
 
 def _of_reader(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the library's
-    """Return the quality of a reader. Field names are not compared, as some definitions write `x_` for `x`."""
+    """Return the quality of service for readers. Field names are not compared: some definitions write `x_` for `x`."""
     return Qos(
         *_common(quality, kind),
         Policy.History.KeepLast(quality.depth),
@@ -321,7 +322,7 @@ def _of_reader(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the librar
 
 
 def _common(quality: Quality, kind: str) -> Iterator[Any]:
-    """Yield the policies common to readers and writers. The hash of the type is in the user data, as in ROS 2."""
+    """Yield the common policies of readers and writers. The type hash is in the user data, as in ROS 2."""
     blocked = Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS))
     yield blocked if quality.reliable else Policy.Reliability.BestEffort
     yield Policy.Durability.TransientLocal if quality.latched else Policy.Durability.Volatile

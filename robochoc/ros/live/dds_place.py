@@ -1,4 +1,4 @@
-"""Places in DDS: `dds:DOMAIN?OPTION=VALUE&...`. The options are ROS 2's quality of service."""
+"""Places in DDS: `dds:DOMAIN?OPTION=VALUE&...`. Options set the quality of service, as in ROS 2."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ _WORDS = {
 
 @dataclass(frozen=True)
 class Quality:
-    """The part of quality of service that a place can choose."""
+    """The part of the quality of service that a place can set."""
 
     reliable: bool
-    """False: lost messages are not sent again, and subscribers that require reliable ones receive none."""
+    """False: lost messages are not resent, and subscribers that require reliable messages receive none."""
     latched: bool
     """True: transient local. Later subscribers receive the last messages."""
     depth: int
@@ -39,14 +39,14 @@ class Quality:
 
 @dataclass(frozen=True)
 class DdsPlace:
-    """A domain and the quality of service in it."""
+    """A domain, and the quality of service in this domain."""
 
     domain: int
     quality: Quality
 
     @classmethod
     def parse(cls, place: str, default: Quality, options: Collection[str], failed: ErrorClass) -> DdsPlace:
-        """Parse `place`, in which only `options` may be given; the others have their `default`. Raises `failed`.
+        """Parse `place`, in which only `options` may be given; others have their `default`. Raises `failed`.
 
         >>> from robochoc.robots.sink import SinkError
         >>> default = Quality(reliable=True, latched=True, depth=1)

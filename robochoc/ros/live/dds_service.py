@@ -1,8 +1,8 @@
-"""Services of ROS 2 over DDS, in the form of Cyclone DDS's middleware (rmw_cyclonedds_cpp).
+"""ROS 2 services over DDS, in the form used by the middleware for Cyclone DDS (rmw_cyclonedds_cpp).
 
-A request is sent on `rq/NAMERequest`, its answer on `rr/NAMEReply`. Both begin with 16 bytes: the client's id and the
-number of the request. Clients find their answers by them. Requests are untrusted: each one with a valid header is
-answered, even if its fields cannot be read.
+A request is sent on `rq/NAMERequest`, its answer on `rr/NAMEReply`. Both begin with a header of 16 bytes: the client's
+id and the number of the request, by which clients find their answers. Requests are untrusted. Every request with a
+valid header is answered, even if its fields cannot be read.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.ros.live.services import WAITING_MAX, ImmediateServices, Refuse, S
 from robochoc.ros.message_types import FieldsError, types_of
 
 MATCH_S = 1.0
-"""The longest wait for the client's reader of answers, in seconds. It may be discovered after its request."""
+"""The longest wait for the client's reader of answers, in seconds. It may be discovered later than the request."""
 END_S = 2.0
 """The longest wait for clients to acknowledge the last answers, in seconds."""
 _HEADER = 16
@@ -27,7 +27,7 @@ _ORDERS = {b"\0\0": ">", b"\0\1": "<"}
 
 
 class DdsServices(Services):
-    """Offers services in a domain of DDS. A request's `client` is the 16 bytes of its header.
+    """Offers services in a DDS domain. A request's `client` is its 16-byte header.
 
     Args:
         place: As for the sink `dds`; only the domain and partitions may be given.
@@ -69,7 +69,7 @@ class DdsServices(Services):
         self._participant.announce(topic, kind)
 
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
-        """Publish a message, or drop it if a subscriber has no room for it."""
+        """Publish a message; drop it if a subscriber has no room."""
         self._participant.write(topic, kind, types_of(2).encode(kind, fields), 0)
 
     def close(self) -> None:
@@ -85,7 +85,7 @@ class DdsServices(Services):
         self._participant.close()
 
     def _receive(self, name: str, _: str, content: bytes) -> None:
-        """Accept a request, in the subscription's thread."""
+        """Accept a request; called in the subscription's thread."""
         order = _ORDERS.get(content[:2])
         if order is None or not _ENCAPSULATION + _HEADER <= len(content) <= MESSAGE_BYTES_MAX:
             return  # without a client id no answer is possible

@@ -1,8 +1,8 @@
-"""DDS types of ROS types. `message_types.py` encodes the messages: DDS only transports their bytes.
+"""DDS types for ROS types. Messages are encoded by `message_types.py`; DDS only transports their bytes.
 
 ROS 2 publishes `/a/b` on the DDS topic `rt/a/b`, and `geometry_msgs/PoseStamped` as the DDS type
-`geometry_msgs::msg::dds_::PoseStamped_`. Tools such as `cyclonedds subscribe` request the description of a type; its
-fields have their ROS names.
+`geometry_msgs::msg::dds_::PoseStamped_`. Tools such as `cyclonedds subscribe` request the description of a type, in
+which fields have their ROS names.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.ros.message_types import FieldType, types_of
 from robochoc.ros.waypoint_types import short_kind
 
 _idl: Any = idl_types
-"""mypy does not accept its generic types."""
+"""The module, untyped since mypy does not accept its generic types."""
 _SCALARS: dict[str, Any] = {
     "bool": bool,
     "byte": _idl.byte,
@@ -27,11 +27,11 @@ _SCALARS: dict[str, Any] = {
     **{f"{sign}int{bits}": getattr(_idl, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)},
 }
 _BOUND_MAX = 65_535
-"""Sequences with a greater bound are described as unbounded: DDS cannot express it."""
+"""The largest bound of a sequence in DDS. Sequences with larger bounds are described as unbounded."""
 
 
 class RawMessage(Protocol):
-    """A message as sent over DDS: its bytes in CDR, with the header of four bytes."""
+    """A message as sent over DDS: its bytes in CDR, with the four-byte header."""
 
     content: bytes
 
@@ -45,9 +45,9 @@ def topic_name(topic: str) -> str:
 
 @cache
 def raw_type(kind: str) -> type[RawMessage]:
-    """Return the DDS type of `kind`, whose messages stay bytes. Raises `UnknownTypeError`.
+    """Return the DDS type of `kind`, whose messages are left as bytes. Raises `UnknownTypeError`.
 
-    The type is created by the library, and its conversion to and from objects is replaced.
+    The library creates the type; its conversion to and from objects is replaced.
     """
     return _raw(_new_struct(short_kind(kind)))
 
@@ -56,7 +56,7 @@ def raw_type(kind: str) -> type[RawMessage]:
 def raw_service_type(kind: str) -> type[RawMessage]:
     """Return the DDS type of one half of a service, such as `std_srvs/Trigger_Request`. Raises `UnknownTypeError`.
 
-    Its first fields identify the request in Cyclone DDS's middleware.
+    In the middleware for Cyclone DDS, the first fields identify the request.
     """
     name = dds_type_name(kind).replace("::msg::", "::srv::")
     header = {"client_guid": _SCALARS["uint64"], "sequence_number": _SCALARS["int64"]}
@@ -65,7 +65,7 @@ def raw_service_type(kind: str) -> type[RawMessage]:
 
 
 def _raw(made: Any) -> type[RawMessage]:  # noqa: ANN401 - a class created at run time
-    """Replace the conversions of a type, so that its messages stay bytes."""
+    """Replace the conversions of a type, so that its messages are left as bytes."""
 
     def init(self: Any, content: bytes) -> None:  # noqa: ANN401
         self.content = content
@@ -85,7 +85,7 @@ def _raw(made: Any) -> type[RawMessage]:  # noqa: ANN401 - a class created at ru
 
 @cache
 def dds_struct(kind: str) -> Any:  # noqa: ANN401 - a class created at run time
-    """Return the DDS description of `kind`, a class of the library. Raises `UnknownTypeError`."""
+    """Return the DDS description of `kind`, a class from the library. Raises `UnknownTypeError`."""
     return _new_struct(kind)
 
 

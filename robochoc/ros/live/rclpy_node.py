@@ -39,17 +39,17 @@ _NANO = 1_000_000_000
 _TIMES = ("builtin_interfaces/Time", "builtin_interfaces/Duration")
 _FLOATS = ("double", "float")
 _ELEMENT = re.compile(r"(?:sequence<)?([\w/]+(?:<\d+>)?)")
-"""The type of an element: of `sequence<double>`, `sequence<geometry_msgs/Pose, 3>`, `float[36]` or `string<10>`."""
+"""Matches the element type in `sequence<double>`, `sequence<geometry_msgs/Pose, 3>`, `float[36]` or `string<10>`."""
 WAIT_S = 2.0
 """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
 BLOCKED_S = 0.2
-"""The longest time that a blocking call lasts, in seconds, so that signals are handled."""
+"""The maximum duration of a blocking call, in seconds, so that signals are handled."""
 END_S = 5.0
 """The longest wait for the end of the spinning thread, in seconds."""
 MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages are ignored: reports are short."""
 INSTALLED = Path("/opt/ros")
-"""The folder in which packages of ROS 2 install it."""
+"""The folder in which operating-system packages install ROS 2."""
 OLDEST_PYTHON = (3, 11)
 """The oldest Python version on which robochoc runs."""
 _WRONG_FIELDS = (ValueError, TypeError, AttributeError, AssertionError, OverflowError)
@@ -63,7 +63,7 @@ class RclpyNode:
         if place:
             raise failed(f"rclpy has no place, but {shortened(place)!r} was given; set the domain in ROS_DOMAIN_ID")
         self._failed = failed
-        domain_id(failed)  # middlewares give no reason for an invalid one
+        domain_id(failed)  # middlewares give no reason for an invalid domain
         try:
             importlib.import_module("rclpy")
             made = importlib.import_module("rclpy.context").Context()
@@ -86,7 +86,7 @@ class RclpyNode:
             ) from error
 
     def quality(self, *, waypoints: bool) -> Any:  # noqa: ANN401 - rclpy is untyped
-        """Return the quality of service of waypoints (reliable, latched), or ROS 2's quality for sensors."""
+        """Return the quality of service for waypoints (reliable, latched), or that of ROS 2 for sensors."""
         qos = self._qos
         reliable, latched = qos.ReliabilityPolicy, qos.DurabilityPolicy
         return qos.QoSProfile(
@@ -97,7 +97,7 @@ class RclpyNode:
         )
 
     def service_quality(self) -> Any:  # noqa: ANN401 - rclpy is untyped
-        """Return the quality of service of topics beside services: reliable, not latched."""
+        """Return the quality of service for topics announced by services: reliable, not latched."""
         return self._qos.QoSProfile(
             history=self._qos.HistoryPolicy.KEEP_LAST,
             depth=PER_TOPIC_MAX,
@@ -106,7 +106,7 @@ class RclpyNode:
         )
 
     def add_node(self, suffix: str) -> Any:  # noqa: ANN401 - rclpy is untyped
-        """Return another node in the same context, whose name ends with `suffix`. It is closed with the first."""
+        """Return another node in the same context, with a name that ends in `suffix`. `close` closes both nodes."""
         self._others.append(self._create_node(importlib.import_module("rclpy.node").Node, f"{self._name}_{suffix}"))
         return self._others[-1]
 
@@ -135,8 +135,8 @@ class RclpyNode:
 class RclpySink(LiveSink):
     """Publishes as a ROS 2 node. Topics are reliable and latched: later subscribers receive the last message.
 
-    A topic stores one message. The next one is published when all subscribers have acknowledged it, so that none is
-    lost.
+    A topic stores only one message. The next message is published after all subscribers have acknowledged it, so that
+    no message is lost.
     """
 
     def __init__(self, place: str) -> None:
@@ -158,7 +158,7 @@ class RclpySink(LiveSink):
         self._await_subscribers([topic for topic, kind in topics.items() if is_for_waypoints(topic, kind)])
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
-        """Send a message once the previous message on its topic was acknowledged."""
+        """Send a message once the previous message on its topic has been acknowledged."""
         try:
             message = filled(self._kinds[topic](), fields)
         except _WRONG_FIELDS as error:
@@ -211,9 +211,9 @@ class RclpySink(LiveSink):
 
 
 class RclpySource(LiveSource):
-    """Receives as a ROS 2 node. A thread spins it until the source is closed.
+    """Receives messages as a ROS 2 node. A thread spins the node until the source is closed.
 
-    Its subscriptions have ROS 2's quality of service for sensors: they accept reliable and best-effort publishers.
+    Subscriptions have ROS 2's quality of service for sensors, which accepts reliable and best-effort publishers.
     """
 
     def __init__(self, place: str) -> None:
@@ -327,7 +327,7 @@ def _element(kind: str) -> str:
 
 
 def fields_of(message: Any) -> dict[str, Any]:  # noqa: ANN401 - messages are untyped
-    """Return the fields of a message of rclpy."""
+    """Return the fields of an rclpy message."""
     kinds = message.get_fields_and_field_types()
     return {name: _plain(getattr(message, name), _element(kind)) for name, kind in kinds.items()}
 

@@ -1,4 +1,4 @@
-"""Services as a ROS 2 node in this process, for clients of any middleware of the installed ROS 2."""
+"""Services as a ROS 2 node in this process, for clients of any middleware in the installed ROS 2."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ class RclpyServices(Services):
     """Offers services as a ROS 2 node. A request's `client` is a queue for its answer.
 
     A thread spins the node. It reads one request at a time and waits for the answer; further requests wait in the
-    middleware. Immediate services have a node and a thread of their own. A service whose type is not installed is not
-    offered, see `lacking`.
+    middleware. Immediate services have a separate node and thread. Services whose types are not installed are not
+    offered; see `lacking`.
 
     Args:
-        place: Must be empty: `ROS_DOMAIN_ID` gives the domain.
+        place: Must be empty; the domain is set by `ROS_DOMAIN_ID`.
         services: The type of each service, such as `std_srvs/Trigger`.
         refuse: Returns the fields of an answer that refuses a request for a given reason.
         immediate: The services that are answered without a queue.
@@ -63,7 +63,7 @@ class RclpyServices(Services):
         request.client.put(fields)
 
     def announce(self, topic: str, kind: str) -> None:
-        """Announce a topic, reliable and not latched."""
+        """Announce a reliable topic that is not latched."""
         type_ = message_class(kind, SinkError, "rclpy")
         self._publishers[topic] = type_, self._ros.node.create_publisher(type_, topic, self._ros.service_quality())
 
@@ -85,7 +85,7 @@ class RclpyServices(Services):
         self._ros.close()
 
     def _start_executor(self, node: Any) -> tuple[Any, threading.Thread]:  # noqa: ANN401 - rclpy is untyped
-        """Return a new executor of `node`, and the thread that spins it."""
+        """Return a new executor for `node`, and the thread that spins the executor."""
         executor = importlib.import_module("rclpy.executors").SingleThreadedExecutor(context=self._ros.context)
         executor.add_node(node)
         thread = threading.Thread(target=self._spin, args=(executor,), daemon=True, name="rclpy serves")

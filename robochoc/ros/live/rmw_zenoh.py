@@ -1,4 +1,4 @@
-"""Sinks and sources of a ROS 2 whose middleware is zenoh (rmw_zenoh). No ROS is required on this machine."""
+"""Sinks and sources for a ROS 2 with zenoh as middleware (rmw_zenoh). No ROS is required on this machine."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _CHECK_S = 1.0
 
 
 class RmwZenohSink(LiveSink):
-    """Publishes via a zenoh router. Topics are reliable and transient local: late subscribers receive the last message.
+    """Publishes through a zenoh router. Topics are reliable and transient local: late subscribers get the last message.
 
     With `ROS_DISTRO=humble`, keys have the form of ROS 2 Humble, without a hash of the type.
     """
@@ -67,7 +67,7 @@ class RmwZenohSink(LiveSink):
 
 
 class RmwZenohSource(LiveSource):
-    """Receives via a zenoh router. Messages that are malformed or have another definition of their type are ignored."""
+    """Receives through a zenoh router. Messages that are malformed or with another type definition are ignored."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)

@@ -1,9 +1,9 @@
-"""The keys of ROS 2 topics in zenoh, after docs/design.md and the sources of ros2/rmw_zenoh. Pure: texts and bytes.
+"""The keys of ROS 2 topics in zenoh, after docs/design.md and the sources of ros2/rmw_zenoh, without using zenoh.
 
-A topic's messages are sent on `DOMAIN/TOPIC/TYPE/HASH`. Publishers and subscribers declare themselves by liveliness
-tokens, `@ros2_lv/DOMAIN/SESSION/NODE/ENTITY/KIND/...`, which `ros2 topic list` and `ros2 node list` read. Each message
-has an attachment. A service is a queryable with such a key, and its requests are queries with a payload and an
-attachment.
+Messages on a topic are sent with the key `DOMAIN/TOPIC/TYPE/HASH`. Publishers and subscribers are declared by
+liveliness tokens, `@ros2_lv/DOMAIN/SESSION/NODE/ENTITY/KIND/...`, which `ros2 topic list` and `ros2 node list` read.
+Each message has an attachment. A service is a queryable with such a key, and its requests are queries with a payload
+and an attachment.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from typing import Literal, NamedTuple
 from robochoc.ros.live.ros2_names import dds_type_name
 
 NO_HASH = "TypeHashNotSupported"
-"""The hash in the keys of ROS 2 Humble, whose types have no hash."""
+"""The hash in keys of ROS 2 Humble, whose types have no hashes."""
 LATCHED = "1:1:1,1:,:,:,,"
-"""Quality of service in a token: reliable, transient local, keep the last 1; no time limits.
+"""The quality of service in a token: reliable, transient local, keep the last 1; no time limits.
 
 Default values could be omitted, but versions of rmw_zenoh have different defaults.
 """
 
 SERVICES_QOS = "1:2:1,10:,:,:,,"
-"""Quality of service of services: reliable, volatile, keep the last 10."""
+"""The quality of service of services: reliable, volatile, keep the last 10."""
 
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_SIZE = 16
@@ -33,7 +33,7 @@ EntityKind = Literal["MP", "MS", "SS"]
 
 
 class RosNode(NamedTuple):
-    """A robochoc node: its domain and its session."""
+    """A node of robochoc: its domain and its session."""
 
     domain: int
     session: str
@@ -54,12 +54,12 @@ class RosNode(NamedTuple):
         return f"{self._token(number, kind)}/{topic.name.replace('/', '%')}/{topic.type}/{topic.hash}/{quality}"
 
     def _token(self, number: int, kind: str) -> str:
-        # The first % is the enclave, the second the namespace: "/" for both.
+        # The first % is the enclave, the second the namespace; both are "/".
         return f"@ros2_lv/{self.domain}/{self.session}/0/{number}/{kind}/%/%/{self.name}"
 
 
 class ZenohTopic(NamedTuple):
-    """A topic: its name in ROS, its type's name in DDS, and the hash of that type."""
+    """A topic: its name in ROS, the name of its type in DDS, and the hash of this type."""
 
     name: str
     type: str
@@ -76,26 +76,26 @@ class ZenohTopic(NamedTuple):
         return cls(name, dds_type_name(kind).replace("::msg::", "::srv::"), type_hash)
 
     def key(self, domain: int) -> str:
-        """Return the key of the topic's messages."""
+        """Return the key for messages on the topic."""
         return f"{domain}/{self.name.strip('/')}/{self.type}/{self.hash}"
 
     def any_key(self, domain: int) -> str:
-        """Return the key expression of the topic's messages with any hash."""
+        """Return the key expression for messages on the topic with any type hash."""
         return f"{domain}/{self.name.strip('/')}/{self.type}/*"
 
 
 def gid_of(token: str) -> bytes:
-    """Return the 16 bytes that identify the publisher with this token in its messages."""
+    """Return the 16 bytes that identify the publisher with `token` in its messages."""
     return hashlib.blake2b(token.encode(), digest_size=_GID_SIZE).digest()
 
 
 def attachment(number: int, at_ns: int, gid: bytes) -> bytes:
-    """Return the attachment of a message: its number, from 1, the time in nanoseconds and the publisher's id."""
+    """Return the attachment of a message: its number (from 1), the time in nanoseconds, and the publisher's id."""
     return _ATTACHMENT.pack(number, at_ns, _GID_SIZE, gid)
 
 
 def sender(attached: bytes) -> tuple[int, bytes] | None:
-    """Return the number of a request and the 16 bytes of its client's id; None if `attached` is malformed."""
+    """Return the number of a request and its client's id (16 bytes); None if `attached` is malformed."""
     if len(attached) != _ATTACHMENT.size:
         return None
     number, _, size, gid = _ATTACHMENT.unpack(attached)

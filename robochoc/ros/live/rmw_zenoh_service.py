@@ -1,6 +1,6 @@
-"""Services of a ROS 2 whose middleware is zenoh, and the hash of their types (RIHS01).
+"""Services in a ROS 2 network with zenoh as middleware, and the hashes of their types (RIHS01).
 
-A request is a zenoh query. Its attachment, and that of the answer, contain the client's id.
+A request is a zenoh query. The attachments of request and answer contain the client's id.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _NUMBERS: Mapping[str, int] = MappingProxyType(
 """The numbers of types in `type_description_interfaces/msg/FieldType`."""
 _NESTED, _BOUNDED_STRING = 1, 21
 _ARRAY, _BOUNDED, _UNBOUNDED = 48, 96, 144
-"""Added to a type's number for an array, a bounded sequence and an unbounded sequence."""
+"""The offsets added to a type's number for an array, a bounded sequence and an unbounded sequence."""
 _TIME, _INFO = "builtin_interfaces/msg/Time", "service_msgs/msg/ServiceEventInfo"
 _INFO_FIELDS = (
     ("event_type", FieldType("uint8")),
@@ -55,7 +55,7 @@ _TIME_FIELDS = (("sec", FieldType("int32")), ("nanosec", FieldType("uint32")))
 
 
 class RmwZenohServices(Services):
-    """Offers services via a zenoh router, as a node visible to `ros2 service list`. Clients wait for each answer.
+    """Offers services through a zenoh router, as a node visible to `ros2 service list`. Clients wait for each answer.
 
     With `ROS_DISTRO=humble`, keys have the form of ROS 2 Humble, without a hash of the type.
 
@@ -83,7 +83,7 @@ class RmwZenohServices(Services):
             raise
 
     def check(self) -> None:
-        """Raise `SinkError` if the router has been out of reach for long."""
+        """Raise `SinkError` if the router has been out of reach for a long time."""
         self._session.check()
 
     def reply(self, request: ServiceRequest, fields: Fields) -> None:
@@ -105,7 +105,7 @@ class RmwZenohServices(Services):
         self._session.close()
 
     def _receive(self, name: str, kind: str, content: bytes, query: RosQuery) -> None:
-        """Accept a request, in a thread of zenoh."""
+        """Accept a request; called in a thread of zenoh."""
         if len(content) > MESSAGE_BYTES_MAX:
             why = f"the request has {len(content):,} bytes; at most {MESSAGE_BYTES_MAX:,} are accepted"
             _reply(query, kind, self._refuse(why))
@@ -126,9 +126,9 @@ def _reply(query: RosQuery, kind: str, fields: Fields) -> None:
 def service_hash(kind: str) -> str:
     """Return the hash of the service type `kind`, such as `std_srvs/Trigger`, whose fields must all be primitive.
 
-    ROS 2 compares the definitions of services by it (REP 2016, the packages rosidl_generator_type_description and
-    service_msgs). A service is a type with three fields: its request, its response, and the event of service
-    introspection. The hash is the SHA-256 of their descriptions in canonical JSON.
+    ROS 2 compares the definitions of services by this hash (REP 2016, the packages rosidl_generator_type_description
+    and service_msgs). A service is a type with three fields: its request, its response, and its event for service
+    introspection. The hash is the SHA-256 of the descriptions of these types in canonical JSON.
 
     Raises:
         UnknownTypeError: The type of the request or of the response is unknown.

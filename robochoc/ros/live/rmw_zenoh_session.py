@@ -1,8 +1,8 @@
-"""A session with the zenoh router of a ROS 2: it publishes bytes on topics, and receives them.
+"""A session with the zenoh router of a ROS 2 network, which publishes and receives bytes on topics.
 
 Only this module and `communication/network` use zenoh. The session is a client of the router, which forwards all
-messages; so it listens on no port. zenoh's calls may block for long and ignore signals: sessions are opened and closed
-in a separate thread. zenoh restores a broken link in the background, with all declarations.
+messages, so it listens on no port. zenoh's calls may block for a long time and ignore signals; so sessions are opened
+and closed in a separate thread. zenoh restores a broken link in the background, with all declarations.
 """
 
 from __future__ import annotations
@@ -29,23 +29,23 @@ from robochoc.ros.live.transport import ErrorClass, succeeds_in_time
 PORT = 7447
 """The default port of a zenoh router."""
 OPEN_S = 5.0
-"""The longest wait for the router's answer, in seconds."""
+"""The longest wait for an answer from the router, in seconds."""
 LATE_S = 1.0
-"""Additional seconds until zenoh itself must have given up."""
+"""The time after `OPEN_S` by which zenoh itself must have given up, in seconds."""
 GONE_S = 5.0
 """The longest time for which the link may be broken, in seconds."""
 CLOSE_S = 10.0
 """The longest time for closing a session, in seconds."""
 CONFIG_FILE = "ZENOH_SESSION_CONFIG_URI"
-"""The environment variable that names a zenoh configuration file, as for ROS 2 itself: certificates, an endpoint."""
+"""The environment variable with the path of a zenoh configuration (certificates, an endpoint), as in ROS 2 itself."""
 _HEARTBEAT_S = 0.5
-"""Seconds after which a subscriber detects that it has missed the last message."""
+"""The time after which a subscriber detects that it has missed the last message, in seconds."""
 _START = "start one: `ros2 run rmw_zenoh_cpp rmw_zenohd`"
 
 Receive = Callable[[str, bytes], None]
-"""Called by zenoh's threads with the key of a message and its bytes."""
+"""Called with the key and the bytes of a message, in zenoh's threads."""
 ReceiveQuery = Callable[[bytes, "RosQuery"], None]
-"""Called by zenoh's threads with the bytes of a request, and the query to answer."""
+"""Called with the bytes of a request and the query to answer, in zenoh's threads."""
 
 
 class RouterAddress(NamedTuple):
@@ -74,7 +74,7 @@ class RouterAddress(NamedTuple):
 
 
 class RosPublisher:
-    """A publisher on one topic. Late subscribers receive its last message."""
+    """Publishes on one topic. Late subscribers receive the last message."""
 
     def __init__(self, session: zenoh.Session, node: RosNode, topic: ZenohTopic, number: int) -> None:
         token = node.entity_token(number, "MP", topic)
@@ -98,13 +98,13 @@ class RosPublisher:
 
 
 class RosQuery:
-    """A request of a service's client, which is answered once. It is not an error if the client has left."""
+    """A request from a client of a service, which is answered once. It is not an error if the client has left."""
 
     def __init__(self, query: zenoh.Query, key: str, number: int, gid: bytes) -> None:
         self._query, self._key, self._number, self._gid = query, key, number, gid
 
     def reply(self, content: bytes) -> None:
-        """Send the answer. Its attachment contains the number of the request and the client's id."""
+        """Send the answer, whose attachment contains the number of the request and the client's id."""
         attached = attachment(self._number, time.time_ns(), self._gid)
         with suppress(zenoh.ZError):
             self._query.reply(self._key, content, attachment=attached)
@@ -137,7 +137,7 @@ class RosSession:
         return RosPublisher(self._session, self._node, topic, self._entities)
 
     def subscribe(self, topic: ZenohTopic, receive: Receive) -> None:
-        """Pass messages on `topic`, of any type hash, to `receive`. It gets the publishers' last messages at once."""
+        """Pass messages on `topic`, with any type hash, to `receive`, beginning with the publishers' last messages."""
         self._entities += 1
 
         def on_sample(sample: zenoh.Sample) -> None:
@@ -155,7 +155,7 @@ class RosSession:
         self._declared += [subscriber, token]
 
     def serve(self, service: ZenohTopic, receive: ReceiveQuery) -> None:
-        """Offer `service`, and pass its requests to `receive`. A request without a client's id gets an error."""
+        """Offer `service`, and pass its requests to `receive`. Requests without a client's id get an error."""
         self._entities += 1
         key = service.key(self._node.domain)
 
@@ -227,7 +227,7 @@ class RosSession:
 
 
 class _Opening:
-    """A session that is being opened in a thread. The thread closes it again if it is opened too late."""
+    """A session that is being opened in a thread, which closes the session again if it is opened too late."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -235,7 +235,7 @@ class _Opening:
         self._is_late = False
 
     def set_session(self, session: zenoh.Session) -> None:
-        """Store the session, in the thread that has opened it."""
+        """Store the session; called in the thread that has opened it."""
         with self._lock:
             self._session = session
             is_late = self._is_late
@@ -243,7 +243,7 @@ class _Opening:
             session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
     def session_in_time(self) -> zenoh.Session | None:
-        """Return the session; None if it is not open yet, and from now on counts as late."""
+        """Return the session; None if it is not open yet. From then on it counts as late."""
         with self._lock:
             self._is_late = True
             return self._session

@@ -1,4 +1,4 @@
-"""Names in ROS 2 that DDS and zenoh share: the domain, and the DDS name of a type."""
+"""ROS 2 names for both DDS and zenoh: the domain, and the DDS name of a type."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from robochoc.ros.live.transport import ErrorClass
 from robochoc.ros.waypoint_types import short_kind
 
 DOMAIN_MAX = 232
-"""The largest domain for which DDS has ports."""
+"""The largest domain number with DDS ports."""
 _DOMAIN = re.compile(r"\d{1,9}", re.ASCII)
 
 

@@ -1,4 +1,4 @@
-"""Sinks and sources of a ROS 1 or ROS 2 over a WebSocket (rosbridge). No ROS is required on this machine."""
+"""Sinks and sources for ROS 1 or ROS 2 over a WebSocket (rosbridge). No ROS is required on this machine."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _CHECK_EVERY = 100
 
 
 class RosbridgeSink(LiveSink):
-    """Publishes through a rosbridge. Topics are latched: later subscribers receive the last message of each."""
+    """Publishes through a rosbridge. Topics are latched: later subscribers receive the last message of each topic."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -25,7 +25,7 @@ class RosbridgeSink(LiveSink):
         self._published = 0
 
     def advertise(self, topics: Mapping[str, str]) -> None:
-        """Announce new topics to the server. Raises `SinkError` for errors that it has reported."""
+        """Announce new topics to the server. Raises `SinkError` for errors reported by the server."""
         self._check()
         super().advertise(topics)
 
@@ -69,7 +69,7 @@ class RosbridgeSink(LiveSink):
 
 
 class RosbridgeSource(LiveSource):
-    """Receives through a rosbridge. Malformed messages, and those of other topics, are ignored."""
+    """Receives messages through a rosbridge. Malformed messages, and messages on other topics, are ignored."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)

@@ -2,9 +2,9 @@
 
 Only this module uses roslibpy. A place is `//HOST:PORT`, or `wss://HOST:PORT` for TLS.
 
-In JSON, times are sent as `secs` and `nsecs`, which the bridges of both versions of ROS accept; that of ROS 2 sends
-`sec` and `nanosec`. So the version need not be known. JSON has no NaN: it is received as null, and sent as `NaN`, which
-the bridges' parsers (Python's) accept.
+The version of ROS need not be known. Times are sent in JSON as `secs` and `nsecs`, which the bridges of both versions
+accept, and may be received as `sec` and `nanosec` from ROS 2. JSON has no NaN: it is received as null, and sent as
+`NaN`, which the bridges' parsers (Python's) accept.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from robochoc.robots.sink import Fields
 from robochoc.system.errors import RobochocError
 
 _DEPTH_MAX = 10
-"""The deepest nesting of fields."""
+"""The maximum nesting depth of fields."""
 _BILLION = 1_000_000_000
 _SECONDS = range(-(2**31), 2**32)
 PORT = 9090
@@ -34,7 +34,7 @@ PORT = 9090
 CONNECT_S = 5.0
 """The longest wait for a server's answer, in seconds."""
 DRAIN_S = 10.0
-"""The longest time for which the server may leave sent messages unread, in seconds."""
+"""The longest time in which the server may leave messages unread, in seconds."""
 LOOP_S = 10.0
 """The longest wait for the connection's thread, in seconds."""
 CONFIRM_S = 3.0
@@ -44,7 +44,7 @@ CLOSE_S = 4.0
 MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages from the server end the connection: reports are short."""
 _BUFFERED = 1_000_000
-"""The number of unsent bytes above which the sink waits for the server."""
+"""The number of unsent bytes beyond which the sink waits for the server."""
 _START = "start it there: `roslaunch rosbridge_server rosbridge_websocket.launch`, or `ros2 launch` the .xml in ROS 2"
 
 
@@ -122,15 +122,15 @@ class Connection:
         return self.roslibpy.Topic(self.ros, name, kind.replace("/msg/", "/"), latch=True, reconnect_on_close=False)
 
     def serve(self, name: str, kind: str, receive: Callable[[object], None]) -> None:
-        """Offer the service `name` of the type `kind`; `receive` gets each call, in the connection's thread.
+        """Offer the service `name` of the type `kind`; pass each call to `receive`, in the connection's thread.
 
-        roslibpy's services must answer before they return; ours are answered later, when a team has decided.
+        Services of roslibpy must answer before they return; ours answer later, when a team has decided.
         """
         self.ros.on(name, receive)
         self._send_operation(op="advertise_service", type=kind, service=name)
 
     def respond(self, name: str, number: str | int, values: Mapping[str, object]) -> None:
-        """Answer the call with this number of the service `name`. Without a connection, the answer is dropped."""
+        """Answer the call `number` of the service `name`. Without a connection, the answer is dropped."""
         self._send_operation(op="service_response", service=name, id=number, values=dict(values), result=True)
 
     def stop_serving(self, names: Iterable[str]) -> None:
@@ -179,10 +179,10 @@ class Connection:
             raise self._failed(f"the connection to the rosbridge at {self.url} does not respond; start again") from None
 
     def confirm(self) -> bool:
-        """Wait until the server has handled all messages. Return whether it confirms this.
+        """Wait until the server has handled all messages. Return whether the server confirms this.
 
-        A closing server drops messages that it has read but not handled. It handles requests in order, and answers
-        any service call, even to a service that does not exist.
+        A server that closes a connection drops messages that it has read but not handled. So a service is called: the
+        server handles requests in order, and answers calls of any service, even if the service does not exist.
         """
         answered = threading.Event()
         service = self.roslibpy.Service(self.ros, "/rosapi/get_time", "rosapi/GetTime")
@@ -194,7 +194,7 @@ class Connection:
         return answered.is_set()
 
     def close(self) -> bool:
-        """End the connection and wait; return whether the server agreed, and thus has read all messages."""
+        """End the connection and wait; return whether the server agreed, which means that it has read all messages."""
         if not self.ended.is_set():
             self._protocol.send_close()
             if not self.ended.wait(CLOSE_S):
@@ -204,7 +204,7 @@ class Connection:
     def abort(self) -> None:
         """End the connection at once."""
         factory = self.ros.factory
-        factory._stop = True  # noqa: SLF001 - otherwise it would retry
+        factory._stop = True  # noqa: SLF001 - otherwise the factory would retry
         if self._transport is not None:
             factory.manager.loop.call_soon_threadsafe(self._transport.abort)
             self.ended.wait(CLOSE_S)
@@ -222,7 +222,7 @@ def _check_listening(address: RosbridgeAddress, failed: type[Exception]) -> None
 
 
 def _roslibpy(failed: type[Exception]) -> Any:  # noqa: ANN401 - it is untyped
-    """Return the module roslibpy, which is an extra, with its log switched off: errors are raised here."""
+    """Return the optional module roslibpy, with its log switched off, since errors are raised here."""
     try:
         roslibpy = importlib.import_module("roslibpy")
         importlib.import_module("roslibpy.comm").select_factory("asyncio")
@@ -238,7 +238,7 @@ def _roslibpy(failed: type[Exception]) -> Any:  # noqa: ANN401 - it is untyped
 
 
 def _is_worth_logging(record: logging.LogRecord) -> bool:
-    """Return False for the records that asyncio writes for each message to a lost server."""
+    """Return False for the log records that asyncio writes for each message to a lost server."""
     return record.msg != "socket.send() raised exception."
 
 
@@ -246,7 +246,7 @@ def _connect(roslibpy: Any, url: str) -> Any:  # noqa: ANN401 - roslibpy is unty
     """Return a new connection, which does not reconnect."""
 
     class Once(roslibpy.Ros):  # type: ignore[misc]  # untyped
-        """Accepts only short, uncompressed messages: compressed ones may become long. It does not reconnect."""
+        """Does not reconnect, and accepts only short, uncompressed messages: compressed messages may become long."""
 
         def connect(self) -> None:
             if not self.is_connecting:
@@ -259,8 +259,8 @@ def _connect(roslibpy: Any, url: str) -> Any:  # noqa: ANN401 - roslibpy is unty
                 )
             super().connect()
 
-    # The loop's thread is a daemon, which later connections of this process reuse. asyncio is used because Twisted
-    # would add thread pools, signal handlers and a log.
+    # The loop's thread is a daemon that later connections in this process reuse. asyncio is used because Twisted would
+    # add thread pools, signal handlers and a log.
     connection = Once(url, transport="asyncio")
     connection.factory.manager.loop.set_exception_handler(lambda *_: None)
     return connection
@@ -289,7 +289,7 @@ def _encoded(name: str, value: object) -> object:
 
 
 def incoming(message: object) -> tuple[dict[str, Any], int]:
-    """Return the fields of a `message` from rosbridge, and their weight: its number of characters and fields.
+    """Return the fields of a `message` from rosbridge, and its weight: the number of characters and fields.
 
     Raises:
         MalformedMessageError: `message` is not an object, is nested too deeply, or has an invalid time.

@@ -1,4 +1,4 @@
-"""Services of a ROS 1 or ROS 2 through a rosbridge, which forwards the requests of its clients."""
+"""Services in ROS 1 or ROS 2 through a rosbridge, which forwards the requests of its clients."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.ros.live.services import ImmediateServices, Refuse, ServiceRequest
 
 
 class RosbridgeServices(Services):
-    """Offers services through a rosbridge. A request's `client` is the number that the bridge has assigned.
+    """Offers services through a rosbridge. A request's `client` is the number assigned by the bridge.
 
     Args:
         place: As for the sink `rosbridge`.
@@ -65,7 +65,7 @@ class RosbridgeServices(Services):
             self._connection.close()
 
     def _receive(self, name: str, message: object) -> None:
-        """Accept a request, in the connection's thread. Requests without an `id` cannot be answered and are ignored."""
+        """Accept a request, in the connection's thread. Requests without an `id` cannot be answered: ignore them."""
         if not isinstance(message, Mapping) or not isinstance(client := message.get("id"), str | int):
             return
         request = ServiceRequest(name, {}, client)

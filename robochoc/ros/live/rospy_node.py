@@ -1,7 +1,7 @@
 """Sinks and sources as a ROS 1 node in this process, if rospy can be imported. No package index has rospy.
 
-rospy is untyped; only this module uses it. A process has one node until it ends: rospy cannot create another. rospy
-waits forever without a master, so sinks and sources ask the master for an answer first.
+rospy is untyped; only this module uses it. A process has a single node until it ends, since rospy cannot create
+another. Without a master, rospy waits forever, so sinks and sources first check that the master answers.
 """
 
 from __future__ import annotations
@@ -36,20 +36,20 @@ from robochoc.ros.live.transport import (
 
 _NANO = 1_000_000_000
 MASTER_S = 3.0
-"""The longest wait for an answer of the master, in seconds."""
+"""The longest wait for an answer from the master, in seconds."""
 _DEFAULT_MASTER = "http://localhost:11311"
 _CALLER = "/robochoc"
 NODE_S = 15.0
 """The longest wait for the registration of our node or its topics, in seconds."""
 GATHER_S = 5.0
-"""The longest wait for subscribers that the master lists, in seconds. It may list some that no longer exist."""
+"""The longest wait for subscribers listed by the master, in seconds. Some of these may no longer exist."""
 _WAITING = 10_000
 """The size of the queue of messages; `publish` waits while it is full."""
 _lock = threading.Lock()
 
 
 def _node(place: str, failed: ErrorClass) -> Any:  # noqa: ANN401 - rospy is untyped
-    """Return rospy, with this process's node registered. Raises `failed`."""
+    """Return rospy, after registering this process's node. Raises `failed`."""
     if place:
         raise failed(f"rospy has no place, but {shortened(place)!r} was given; set the master in ROS_MASTER_URI")
     try:
@@ -69,7 +69,7 @@ def _node(place: str, failed: ErrorClass) -> Any:  # noqa: ANN401 - rospy is unt
 
 
 def _register(rospy: Any, failed: ErrorClass) -> None:  # noqa: ANN401 - rospy is untyped
-    """Create the node, without rospy's signal handlers and without its log, which would reconfigure all logging."""
+    """Create the node without rospy's signal handlers, and without its log, which would reconfigure all logging."""
     for name in ("rospy", "rosout", "rosgraph", "xmlrpc"):
         logging.getLogger(name).addHandler(logging.NullHandler())
         logging.getLogger(name).propagate = False
@@ -83,7 +83,7 @@ def _register(rospy: Any, failed: ErrorClass) -> None:  # noqa: ANN401 - rospy i
 
 
 class RospySink(LiveSink):
-    """Publishes as a ROS 1 node. Topics are latched: later subscribers receive the last message of each.
+    """Publishes as a ROS 1 node. Topics are latched: later subscribers receive the last message of each topic.
 
     The first message is sent when all subscribers are connected, so that they receive all messages.
     """
@@ -116,7 +116,7 @@ class RospySink(LiveSink):
             self._kinds[topic] = kind
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002
-        """Queue a message for the thread that sends."""
+        """Put a message into the queue of the sending thread."""
         try:
             message = filled(self._kinds[topic](), fields)
         except (ValueError, TypeError, AttributeError) as error:
@@ -178,7 +178,7 @@ class RospySink(LiveSink):
         return f"a subscriber has read nothing for {STUCK_S:g} s; find it by `rostopic info`, and end it"
 
     def _await_subscribers(self, topics: Collection[str]) -> None:
-        """Wait until all subscribers listed by the master are connected; only once for those that do not connect."""
+        """Wait until the subscribers listed by the master are connected; only once for those that never connect."""
         until = time.monotonic() + GATHER_S
         pause = 0.01
         while True:
@@ -200,7 +200,7 @@ class RospySink(LiveSink):
 
 
 class RospySource(LiveSource):
-    """Receives as a ROS 1 node."""
+    """Receives messages as a ROS 1 node."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -224,7 +224,7 @@ class RospySource(LiveSource):
             self._subscribers.append(self._rospy.Subscriber(topic, type_, received, queue_size=100))
 
     def _check(self) -> None:
-        """Ask the master, once a second at most."""
+        """Check that the master answers, at most once a second."""
         if time.monotonic() - self._asked > 1:
             self._master.check()
             self._asked = time.monotonic()
@@ -238,7 +238,7 @@ class RospySource(LiveSource):
 
 
 class RosMaster:
-    """The ROS master at `ROS_MASTER_URI`. Methods raise `failed` if it does not answer."""
+    """Queries the ROS master at `ROS_MASTER_URI`. Methods raise `failed` if it does not answer."""
 
     def __init__(self, failed: ErrorClass) -> None:
         self._failed = failed
@@ -249,7 +249,7 @@ class RosMaster:
         self._ask("getPid")
 
     def subscribers(self) -> dict[str, set[str]]:
-        """Return the nodes that have subscribed to each topic."""
+        """Return the names of the subscribed nodes, by topic."""
         match self._ask("getSystemState"):
             case [_, list(subscribed), _]:
                 return {topic: set(nodes) for topic, nodes in subscribed}
@@ -307,7 +307,7 @@ def _element(message: Any, name: str) -> Any:  # noqa: ANN401 - messages are unt
 
 
 def fields_of(message: Any) -> dict[str, Any]:  # noqa: ANN401 - messages are untyped
-    """Return the fields of a rospy message, without `seq`: ROS 1 sets it, and ROS 2 does not have it."""
+    """Return the fields of a rospy message, without `seq`, which ROS 1 sets and ROS 2 does not have."""
     return {name: _plain(getattr(message, name)) for name in message.__slots__ if name != "seq"}
 
 

@@ -1,6 +1,6 @@
-"""The base of services over any middleware: requests wait in a queue, or are answered at once.
+"""The base class of services over any middleware. Requests wait in a queue, or are answered at once.
 
-Requests are untrusted: each one whose client is known is answered, even if it cannot be read.
+Requests are untrusted. Every request from a known client is answered, even if the request cannot be read.
 """
 
 from __future__ import annotations
@@ -32,10 +32,10 @@ class ServiceRequest(NamedTuple):
 
 
 class Services(ABC):
-    """The services that this program offers, by their names. A context manager. All methods raise `SinkError`.
+    """Offers services; a context manager. All methods raise `SinkError`.
 
     Args:
-        kinds: The type of each service, such as `std_srvs/Trigger`.
+        kinds: The type of each service, such as `std_srvs/Trigger`, by service name.
         refuse: Returns the fields of an answer that refuses a request.
         immediate: The services that are answered without a queue.
     """
@@ -52,7 +52,7 @@ class Services(ABC):
         self._waiting: queue.Queue[ServiceRequest] = queue.Queue(WAITING_MAX)
 
     def next(self, wait_s: float) -> ServiceRequest | None:
-        """Return the oldest waiting request, or the first that arrives within `wait_s`; None if none arrives."""
+        """Return the oldest waiting request, or the first to arrive within `wait_s`; None if none arrives."""
         self.check()
         try:
             return self._waiting.get(timeout=wait_s)
@@ -73,7 +73,7 @@ class Services(ABC):
 
     @abstractmethod
     def publish(self, topic: str, kind: str, fields: Fields) -> None:
-        """Publish a message on an announced topic without a long wait. It may be lost."""
+        """Publish a message on an announced topic without a long wait. The message may be lost."""
 
     @abstractmethod
     def close(self) -> None:
@@ -100,7 +100,7 @@ class Services(ABC):
             self._refuse_now(request, ENDED)
 
     def _refuse_now(self, request: ServiceRequest, why: str) -> None:
-        """Refuse `request` without a wait."""
+        """Refuse `request` without waiting."""
         self.reply(request, self._refuse(why))
 
     def __enter__(self) -> Self:
@@ -111,6 +111,6 @@ class Services(ABC):
 
 
 def known_fields(kind: str, fields: Fields) -> dict[str, Any]:
-    """Return the `fields` that belong to an answer of the service type `kind`."""
+    """Return the `fields` that answers of the service type `kind` have."""
     known = {field for field, _ in types_of(2).layout(f"{kind}_Response")}
     return {name: value for name, value in fields.items() if name in known}

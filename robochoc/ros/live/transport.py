@@ -1,4 +1,4 @@
-"""The base of the live connections to ROS: topics are announced once, and received messages wait in an inbox."""
+"""The base classes of live connections to ROS: topics are announced once, and received messages wait in an inbox."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from robochoc.robots.sink import Fields, Sink, SinkError
 from robochoc.robots.source import ReceivedMessage, Source, SourceError
 
 STUCK_S = 10.0
-"""The longest time for which a subscriber may leave messages unread or unacknowledged, in seconds."""
+"""The longest time in which a subscriber may leave messages unread or unacknowledged, in seconds."""
 LINGER_S = 0.3
-"""The time for which topics remain after the last message, in seconds. Some subscribers drop unread messages then."""
+"""The time that topics remain after the last message, in seconds: then some subscribers drop unread messages."""
 SETTLE_S = 0.3
 """The time without a new subscriber after which all are assumed to be connected, in seconds."""
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/([A-Za-z][A-Za-z0-9_]*)")
@@ -28,14 +28,14 @@ ErrorClass = type[SinkError] | type[SourceError]
 
 
 class LiveSink(Sink):
-    """A sink that announces each topic before its first message. Methods raise `SinkError`."""
+    """Announces each topic before its first message. Methods raise `SinkError`."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._announced: dict[str, str] = {}
 
     def advertise(self, topics: Mapping[str, str]) -> None:
-        """Announce those of `topics` that are new."""
+        """Announce the new ones among `topics`."""
         new = {topic: kind for topic, kind in topics.items() if topic not in self._announced}
         if new:
             self._announce(new)
@@ -66,7 +66,7 @@ class LiveSource(Source):
         self._inbox = MessageInbox()
 
     def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest message, or the first that arrives within `wait_s`."""
+        """Return the oldest message, or the first to arrive within `wait_s`; None if none arrives."""
         received = self._inbox.get(wait_s, stopped=self._ended)
         if received is None:
             self._check()
@@ -82,10 +82,10 @@ class LiveSource(Source):
 
 
 def await_subscribers(counts: Callable[[], Sequence[int]], wait_s: float) -> None:
-    """Wait until each topic has a subscriber and no more join. Messages published earlier would be lost to them.
+    """Wait until each topic has a subscriber and no more join, since these would miss messages published earlier.
 
     Args:
-        counts: Returns the number of subscribers of each topic.
+        counts: Returns the number of subscribers to each topic.
         wait_s: The longest wait, in seconds.
     """
     until = time.monotonic() + wait_s
@@ -104,7 +104,7 @@ def await_subscribers(counts: Callable[[], Sequence[int]], wait_s: float) -> Non
 def succeeds_in_time(work: Callable[[], object], limit_s: float) -> bool:
     """Return whether `work`, a library call that may never return, succeeds within `limit_s` seconds.
 
-    It runs in a thread, which may remain after a timeout. Signals are handled meanwhile.
+    The call runs in a thread, which may remain after a timeout. Signals are handled during the wait.
     """
     errors: list[Exception] = []
 
@@ -121,7 +121,7 @@ def succeeds_in_time(work: Callable[[], object], limit_s: float) -> bool:
 
 
 def message_class(kind: str, failed: ErrorClass, library: str = "rospy") -> Any:  # noqa: ANN401 - messages are untyped
-    """Return `library`'s class of the ROS type `kind`, also in ROS 2's spelling with `/msg/`. Raises `failed`."""
+    """Return the class in `library` for the ROS type `kind`, in either spelling. Raises `failed`."""
     found = _TYPE.fullmatch(kind.replace("/msg/", "/"))
     try:
         package: ModuleType = importlib.import_module(f"{found[1]}.msg" if found else "")

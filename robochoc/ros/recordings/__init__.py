@@ -1,1 +1,1 @@
-"""Recordings of ROS messages: MCAP files and ROS 1 bags are written and read, ROS 2 bags in SQLite are read."""
+"""Recordings of ROS messages: writes and reads MCAP files and ROS 1 bags, and reads ROS 2 bags in SQLite."""

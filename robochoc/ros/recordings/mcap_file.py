@@ -37,7 +37,7 @@ from robochoc.ros.recordings.recording import (
 from robochoc.ros.waypoint_types import short_kind
 
 NAMES = "robochoc:names"
-"""The metadata record with the topics' names in the team's files."""
+"""The metadata record with the original names of the topics, from the team's files."""
 
 _CHUNK_BYTES = 1 << 20
 _RECORD = struct.Struct("<BQ")
@@ -47,7 +47,7 @@ _SIZE = struct.Struct("<Q")
 _FOOTER_SIZE = 20
 _CHANNELS_AT_MOST = 0xFFFF
 _DEFINITIONS_MAX = 64
-"""The most definitions of the used types. A normal recording defines each type once."""
+"""The maximum number of definitions of the used types. A normal recording defines each type once."""
 _ENCODINGS: dict[tuple[str, str], Version] = {("ros2msg", "cdr"): 2, ("ros1msg", "ros1"): 1}
 """The encodings of definitions and messages."""
 
@@ -56,7 +56,7 @@ T = TypeVar("T")
 
 
 class McapSink(RecordingSink):
-    """Writes an MCAP file. The same messages result in the same bytes."""
+    """Writes an MCAP file. The same messages always give the same bytes."""
 
     example = "mcap:run.mcap"
     version = 2
@@ -71,7 +71,7 @@ class McapSink(RecordingSink):
             self._writer.start("ros2")
 
     def explain(self, original: Mapping[str, str]) -> None:
-        """Store the original names in the file's metadata and in that of each topic."""
+        """Store the original names in the metadata of the file and of each topic."""
         super().explain(original)
         with self.as_sink_errors():
             self._writer.add_metadata(NAMES, dict(original))
@@ -102,7 +102,7 @@ class McapSink(RecordingSink):
 
 
 class _WantedSchema(NamedTuple):
-    """A schema of a used type, its encoding, and the reason why its messages cannot be read, if they cannot."""
+    """A schema of a used type, its encoding, and the reason if its messages cannot be read."""
 
     kind: str
     encoding: str
@@ -115,7 +115,7 @@ def _decompress_zstd(packed: bytes, most: int) -> bytes:
 
 
 class McapSource(ChunkedRecordingSource):
-    """Reads an MCAP file of ROS 2 or ROS 1, or the one in a folder recorded by ROS 2."""
+    """Reads an MCAP file from ROS 2 or ROS 1, or the MCAP file in a folder recorded by ROS 2."""
 
     packings = MappingProxyType({"": uncompressed, "lz4": decompress_lz4, "zstd": _decompress_zstd})
 
@@ -192,7 +192,7 @@ class McapSource(ChunkedRecordingSource):
             at += size
 
     def _describe(self, opcode: int, content: bytes) -> None:
-        """Store the used parts of a schema or a channel."""
+        """Store the required data of a schema or channel record."""
         stream = ReadDataStream(BytesIO(content))
         try:
             if opcode == Opcode.SCHEMA:
@@ -228,7 +228,7 @@ class McapSource(ChunkedRecordingSource):
 
 
 def _fault(kind: str, encoding: str, text: bytes) -> str:
-    """Return the reason why messages of a definition cannot be read; empty if they can."""
+    """Return the reason why messages with a definition cannot be read; empty if they can be read."""
     versions = [version for (known, _), version in _ENCODINGS.items() if known == encoding]
     if not versions:
         return f"its definition has the encoding {encoding[:40]!r}: only ros2msg and ros1msg can be read"

@@ -1,7 +1,7 @@
-"""The base of recordings as sources (MCAP files, ROS 1 bags, ROS 2 bags) and as sinks.
+"""The base classes of recordings (MCAP files, ROS 1 bags, ROS 2 bags) as sources and sinks.
 
-A recording is untrusted. It is read twice: first completely, so that no message of a damaged file has an effect; then
-block by block, in order of time. Sizes are checked before memory is allocated or data decompressed.
+Recordings are untrusted. A recording is read twice: first completely, so that messages in a damaged file have no
+effect; then block by block, in chronological order. Sizes are checked before memory is allocated or data decompressed.
 """
 
 from __future__ import annotations
@@ -28,23 +28,23 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.files import PendingFile
 
 _END_OF_TIME = (1 << 32) * 10**9
-"""The first time that ROS 1 cannot represent, in nanoseconds since the epoch."""
+"""The first time after the range of ROS 1, in nanoseconds since the epoch."""
 BLOCK_BYTES_MAX = 1 << 26
 """The largest record or decompressed chunk, in bytes. Recorders write chunks of some megabytes."""
 WAITING_BYTES_MAX = 1 << 28
-"""The most bytes of messages waiting to be sorted by time. Many wait only if blocks overlap in time."""
+"""The maximum size of messages waiting to be sorted by time, in bytes. Many wait only if blocks overlap in time."""
 UNPACKED_BYTES_MAX = 1 << 28
-"""The largest decompressed file, in bytes; files may also have `_RATIO` times their compressed size."""
+"""The maximum decompressed size of a file, in bytes; or `_RATIO` times its compressed size, if that is larger."""
 _RATIO = 100
 _MESSAGE_OVERHEAD = 200
 """The approximate memory of a message besides its content, in bytes."""
 _STEP = 1 << 20
 _OTHERS_MAX = 1_000
-"""The most unused topics whose names are stored."""
+"""The maximum number of unused topics whose names are stored."""
 
 
 Unpack = Callable[[bytes, int], bytes]
-"""Decompresses its input, up to a number of bytes. May raise any exception."""
+"""Decompresses its input, up to the given number of bytes. May raise any exception."""
 
 
 class RecordingDamagedError(RobochocError):
@@ -52,7 +52,7 @@ class RecordingDamagedError(RobochocError):
 
 
 class RecordedChannel(NamedTuple):
-    """A used topic in a recording. `fault` is the reason why its messages cannot be read, if they cannot."""
+    """A used topic in a recording. `fault` is the reason if its messages cannot be read."""
 
     topic: str
     version: Version
@@ -60,7 +60,7 @@ class RecordedChannel(NamedTuple):
 
 
 class MessageBlock(NamedTuple):
-    """A part of a file with messages: the time of its first used message, its offset, sizes and compression."""
+    """A part of a file that contains messages: time of the first used message, offset, sizes and compression."""
 
     starts: int
     at: int
@@ -70,7 +70,7 @@ class MessageBlock(NamedTuple):
 
 
 class RecordedMessage(NamedTuple):
-    """A message with its sort key: time, block, number."""
+    """A message with its sort key (time, block, number)."""
 
     at_ns: int
     block: int
@@ -96,7 +96,7 @@ class InputFile:
         self.at = self.sum = self._stream.seek(0)
 
     def read(self, size: int, what: str) -> bytes:
-        """Read the next `size` bytes. `what` names them in errors."""
+        """Read the next `size` bytes. `what` describes these bytes in errors."""
         self._check(size, what)
         if size > BLOCK_BYTES_MAX:
             raise RecordingDamagedError(
@@ -114,7 +114,7 @@ class InputFile:
             self.read(min(_STEP, size - begin), what)
 
     def part(self, at: int, size: int) -> bytes:
-        """Return any part of the file. The position of `read` does not change."""
+        """Return a part of the file, without changing the position for `read`."""
         self._stream.seek(at)
         content = self._stream.read(size)
         self._stream.seek(self.at)
@@ -130,7 +130,7 @@ class InputFile:
 
 
 class RecordingSource(Source):
-    """A file whose messages are returned in the order in which they were received."""
+    """Reads a file, and returns its messages in the order in which they were received."""
 
     live = False
 
@@ -193,10 +193,10 @@ class RecordingSource(Source):
 
 
 class ChunkedRecordingSource(RecordingSource):
-    """A recording that stores its messages in chunks, usually compressed."""
+    """Reads a recording whose messages are stored in chunks, usually compressed."""
 
     packings: ClassVar[Mapping[str, Unpack]]
-    """The functions that decompress chunks, by the compression's name in the format."""
+    """The functions that decompress chunks, by the name of the compression in the format."""
 
     _decompressed_bytes = 0
 
@@ -218,7 +218,7 @@ class ChunkedRecordingSource(RecordingSource):
         """
 
     def _body(self, packed: bytes, packing: str, size: int) -> bytes:
-        """Return the content of a chunk, which must be `size` bytes."""
+        """Return the content of a chunk, which must have `size` bytes."""
         self._decompressed_bytes += size
         if self._decompressed_bytes > max(UNPACKED_BYTES_MAX, _RATIO * self._input.size):
             raise RecordingDamagedError(
@@ -253,7 +253,7 @@ def decompress(packed: bytes, packing: str, size: int, packings: Mapping[str, Un
     """Return the `size` decompressed bytes of `packed`. At most one more byte is decompressed.
 
     Raises:
-        RecordingDamagedError: The size is not `size`, or the bytes are not compressed by `packing`.
+        RecordingDamagedError: The decompressed size is not `size`, or the bytes are not compressed by `packing`.
     """
     if size > BLOCK_BYTES_MAX:
         raise RecordingDamagedError(f"a chunk decompresses to {size:,} bytes: at most {BLOCK_BYTES_MAX:,} are read")
@@ -271,7 +271,7 @@ def decompress(packed: bytes, packing: str, size: int, packings: Mapping[str, Un
 
 
 def uncompressed(packed: bytes, _most: int) -> bytes:
-    """Return the bytes of a chunk that is not compressed."""
+    """Return the unchanged bytes of an uncompressed chunk."""
     return packed
 
 
@@ -284,9 +284,9 @@ def recording_in_folder(place: str, name: str, ending: str, instead: str) -> str
     """Return the recording in the folder `place`, or `place` itself if it is not a folder.
 
     Args:
-        place: The place in the source's argument on the command line, after the name.
-        name: The source's name on the command line.
-        ending: The ending of its files.
+        place: The part of the source's command-line argument after its name.
+        name: The name of the source on the command line.
+        ending: The file name extension of its files.
         instead: A hint for folders without such a file.
 
     Raises:
@@ -303,7 +303,7 @@ def recording_in_folder(place: str, name: str, ending: str, instead: str) -> str
 
 
 class RecordingSink(Sink):
-    """Writes a file. It appears, complete, when the sink is closed; after an error, no file appears."""
+    """Writes a file. The complete file appears when the sink is closed; after an error, no file appears."""
 
     example: ClassVar[str]
     """An example of such a sink on the command line."""
@@ -330,7 +330,7 @@ class RecordingSink(Sink):
         """Write the end of the file. Raises `OSError`."""
 
     def explain(self, original: Mapping[str, str]) -> None:
-        """Store the topics' names in the team's files."""
+        """Store the original names of the topics, from the team's files."""
         self.original = original
 
     def advertise(self, topics: Mapping[str, str]) -> None:
@@ -340,14 +340,14 @@ class RecordingSink(Sink):
                 types_of(self.version).definition(kind)
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Append a message. The times of publication and reception are the same."""
+        """Append a message, with `at_ns` as the time of its publication and reception."""
         if not 0 <= at_ns < _END_OF_TIME:
             raise SinkError(on_one_line(f"{self.place}: {topic}: the time {at_ns} ns cannot be recorded"))
         with self.as_sink_errors(topic):
             self.write(topic, kind, fields, at_ns)
 
     def close(self) -> None:
-        """Complete the file. If that fails, it is deleted."""
+        """Complete the file; delete it if that fails."""
         if self._open:
             self._open = False
             try:

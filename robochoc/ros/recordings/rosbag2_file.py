@@ -1,7 +1,7 @@
-"""ROS 2 bags in SQLite (`.db3`), the default of `ros2 bag record` before MCAP files.
+"""ROS 2 bags in SQLite (`.db3`), the default format of `ros2 bag record` before MCAP.
 
-The table `topics` has names and types, the table `messages` has times of reception and messages in CDR. Since ROS 2
-Iron, recorders also write the definitions of types into the table `message_definitions`.
+The table `topics` has names and types, the table `messages` reception times and messages in CDR. Since ROS 2 Iron,
+recorders also write the definitions of types into the table `message_definitions`.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _ZSTD = b"\x28\xb5\x2f\xfd"
 _COLUMNS = {"topics": ("id", "name", "type", "serialization_format"), "messages": ("topic_id", "timestamp", "data")}
 _TOPICS_MAX = 1 << 16
 _MESSAGES_MAX = 1 << 24
-"""The most messages on the used topics."""
+"""The maximum number of messages on the used topics."""
 _FIRST, _LAST = 0, 1 << 63
 _LIMITS = {
     sqlite3.SQLITE_LIMIT_LENGTH: BLOCK_BYTES_MAX,
@@ -40,7 +40,7 @@ _LIMITS = {
 
 
 class Rosbag2Source(RecordingSource):
-    """Reads a ROS 2 bag in SQLite, or the one in a folder recorded by ROS 2."""
+    """Reads a ROS 2 bag in SQLite, or the bag in a folder recorded by ROS 2."""
 
     def __init__(self, place: str) -> None:
         super().__init__(recording_in_folder(place, "rosbag2", ".db3", "mcap:FOLDER reads the .mcap of ROS 2"))
@@ -71,7 +71,7 @@ class Rosbag2Source(RecordingSource):
         return self._messages_of(rows, channels, order)
 
     def _channels(self, rows: sqlite3.Connection) -> dict[int, RecordedChannel]:
-        """Return the used topics by their numbers in the bag."""
+        """Return the used topics, by their numbers in the bag."""
         defined = _definitions(rows)
         found = {}
         for number, topic, kind, encoding in rows.execute(
@@ -99,7 +99,7 @@ class Rosbag2Source(RecordingSource):
 
 
 def _open(path: Path) -> sqlite3.Connection:
-    """Open the file read-only and immutable: SQLite then writes no file beside it."""
+    """Open the file as read-only and immutable, so that SQLite writes no other file in its folder."""
     rows = sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro&immutable=1", uri=True, check_same_thread=False)
     for limit, most in _LIMITS.items():
         rows.setlimit(limit, most)
@@ -109,13 +109,13 @@ def _open(path: Path) -> sqlite3.Connection:
 
 
 def _check(rows: sqlite3.Connection) -> None:
-    """Check the file's integrity, and that it has no views or triggers, which could run any computation."""
+    """Check the file's integrity, and that it has no views or triggers, which could run arbitrary computations."""
     parts = rows.execute("SELECT name, type, coalesce(sql, '') FROM sqlite_master LIMIT 1000").fetchall()
     if any(kind in {"view", "trigger"} or str(sql).casefold().startswith("create virtual") for _, kind, sql in parts):
         raise RecordingDamagedError("it has views, triggers or virtual tables, which are not allowed in a bag")
     tables = {name for name, kind, _ in parts if kind == "table"}
     for table, columns in _COLUMNS.items():
-        # Computed columns are hidden: their last number is not 0.
+        # Computed columns are hidden: their last value in the table's description is not 0.
         plain = {row[1] for row in rows.execute(f"PRAGMA table_xinfo({table})") if row[6] == 0}
         if table not in tables or not {*columns} <= plain:
             raise RecordingDamagedError(f"is not a ROS 2 bag: it has no table {table!r} with {', '.join(columns)}")
@@ -125,7 +125,7 @@ def _check(rows: sqlite3.Connection) -> None:
 
 
 def _definitions(rows: sqlite3.Connection) -> dict[str, str]:
-    """Return the definitions in the bag, by type; none in bags from before ROS 2 Iron."""
+    """Return the definitions in the bag, by type; empty for bags from before ROS 2 Iron."""
     columns = {row[1] for row in rows.execute("PRAGMA table_xinfo(message_definitions)") if row[6] == 0}
     if not {"topic_type", "encoding", "encoded_message_definition"} <= columns:
         return {}
@@ -134,7 +134,7 @@ def _definitions(rows: sqlite3.Connection) -> dict[str, str]:
 
 
 def _fault(kind: str, encoding: object, text: str | None) -> str:
-    """Return the reason why messages of a type cannot be read; empty if they can."""
+    """Return the reason why messages of a type cannot be read; empty if they can be read."""
     if encoding != "cdr":
         return f"its messages have the encoding {str(encoding)[:40]!r}"
     if text is not None and not types_of(2).has_same_fields(kind, text):
@@ -143,7 +143,7 @@ def _fault(kind: str, encoding: object, text: str | None) -> str:
 
 
 def _in_order(rows: sqlite3.Connection, channels: dict[int, RecordedChannel]) -> list[tuple[int, int]]:
-    """Return the time and the row of each used message, in order of time."""
+    """Return the time and the row of each used message, sorted by time."""
     found: list[tuple[int, int]] = []
     for row, number, at_ns in rows.execute("SELECT rowid, topic_id, timestamp FROM messages"):
         if number not in channels:
@@ -157,7 +157,7 @@ def _in_order(rows: sqlite3.Connection, channels: dict[int, RecordedChannel]) ->
 
 
 def _decompressed(content: bytes) -> bytes:
-    """Return the decompressed content of a message. Recorders may compress messages one by one."""
+    """Return the decompressed content of a message. Recorders may compress each message separately."""
     if not content.startswith(_ZSTD):
         return content
     try:
@@ -172,7 +172,7 @@ def _decompressed(content: bytes) -> bytes:
 
 @contextmanager
 def _as_damage() -> Iterator[None]:
-    """Raise errors of SQLite and of UTF-8 as `RecordingDamagedError`."""
+    """Convert errors of SQLite and UTF-8 decoding to `RecordingDamagedError`."""
     try:
         yield
     except (sqlite3.Error, UnicodeDecodeError) as error:

@@ -1,6 +1,6 @@
 """ROS 1 bags, version 2.0 (wiki.ros.org/Bags/Format/2.0), for `rosbag play`.
 
-They are written without compression, like those of `rosbag record`.
+Bags are written without compression, as by `rosbag record`.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ _LAYOUTS |= {b"conn_count": "<I", b"chunk_count": "<I"}
 
 
 class RosbagSink(RecordingSink):
-    """Writes a ROS 1 bag. The same messages result in the same bytes."""
+    """Writes a ROS 1 bag. The same messages always give the same bytes."""
 
     example = "rosbag:run.bag"
     version = 1
@@ -82,7 +82,7 @@ class RosbagSink(RecordingSink):
 
 
 class _OpenFile(NamedTuple):
-    """A path whose file is already open: the library opens it, and gets a duplicate of that file."""
+    """A path of an open file. When the library opens the path, it gets a duplicate of the open file."""
 
     stream: BinaryIO
 
@@ -104,7 +104,7 @@ class _Record(NamedTuple):
         return self.number(b"op") if b"op" in self.header else 0
 
     def number(self, name: bytes) -> int:
-        """Return the number in a field; times are in nanoseconds."""
+        """Return the number in the field `name`; times are in nanoseconds."""
         content = self.header.get(name, b"")
         layout = _LAYOUTS[name]
         if len(content) != struct.calcsize(layout):
@@ -113,7 +113,7 @@ class _Record(NamedTuple):
         return int(first) * 10**9 + int(more[0]) if more else int(first)
 
     def text(self, name: bytes) -> str:
-        """Return the text in a field; empty if the field is missing."""
+        """Return the text in the field `name`; empty if the field is missing."""
         return self.header.get(name, b"").decode("utf-8", "replace")
 
 
@@ -147,7 +147,7 @@ class RosbagSource(ChunkedRecordingSource):
             raise RecordingDamagedError("its index is incomplete: the recording is incomplete")
 
     def _first(self) -> dict[int, int]:
-        """Return the declared numbers of chunks, chunk infos and connections."""
+        """Read the bag header; return the declared numbers of chunks, chunk infos and connections."""
         record, size = self._header()
         if record.kind != _BAG:
             raise RecordingDamagedError("it does not begin with the header of a bag")
@@ -162,7 +162,7 @@ class RosbagSource(ChunkedRecordingSource):
         return {_CHUNK: chunks, _CHUNK_INFO: chunks, _CONNECTION: record.number(b"conn_count")}
 
     def _header(self) -> tuple[_Record, int]:
-        """Read the next record's header; return it and the size of the data after it."""
+        """Read the next record's header; return the header and the size of the following data."""
         source = self._input
         size = self._size()
         if size > _HEADER_AT_MOST:
@@ -222,7 +222,7 @@ def _records(body: bytes) -> Iterator[_Record]:
 
 
 def _span(body: bytes, at: int) -> tuple[int, int]:
-    """Return the beginning and the end of content that is preceded by its size."""
+    """Return the start and the end of the content at `at`, which is preceded by its size."""
     begin = at + _SIZE.size
     end = begin + int.from_bytes(body[at:begin], "little")
     if end > len(body) or begin > len(body):
@@ -231,7 +231,7 @@ def _span(body: bytes, at: int) -> tuple[int, int]:
 
 
 def _fields(content: bytes) -> dict[bytes, bytes]:
-    """Parse the fields of a header: each is a size and `name=value`."""
+    """Parse the fields of a header, each of which is a size and `name=value`."""
     found, at = {}, 0
     while at < len(content):
         begin, at = _span(content, at)
