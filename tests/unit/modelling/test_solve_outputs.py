@@ -19,6 +19,11 @@ from tests.support.cases import looped
 from tests.support.limits import HANG_S
 
 
+@pytest.fixture(autouse=True)
+def _no_protocols_registered(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.run.registry._REGISTERED", {})
+
+
 class SlowMGM(MGM):
     """A protocol of a notebook."""
 
@@ -89,14 +94,14 @@ def test_an_event_ends_the_search_with_the_best_answer(runtime: str) -> None:
     stop = threading.Event()
 
     def stop_later(progress: Progress) -> None:
-        if progress.messages > 3000:
+        if progress.messages > 300:
             stop.set()
 
-    outcome = hard().solve("mgm", runtime, settings={"cycles": 10**8}, stop=stop, timeout=HANG_S, progress=stop_later)
+    outcome = slots().solve("mgm", runtime, settings={"cycles": 10**8}, stop=stop, timeout=HANG_S, progress=stop_later)
     assert stop.is_set()
     assert outcome.metrics.wall_s < HANG_S
     assert outcome.assignment
-    assert not hard().solve("mgm", settings={"cycles": 2}).reason  # the next run is not stopped
+    assert not slots().solve("mgm", settings={"cycles": 2}).reason  # the next run is not stopped
 
 
 def test_a_cancelled_task_ends_its_search() -> None:
