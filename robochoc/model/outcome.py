@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, field, fields
+from dataclasses import KW_ONLY, dataclass, field, fields, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
@@ -263,6 +263,16 @@ class Outcome(Answer):
     symbolic: tuple[str, ...] = ()
     chosen: dict[str, str] = field(default_factory=dict)
 
+    def __hash__(self) -> int:
+        return hash((self.team, self.protocol, self.seed, self.verdict, frozenset(self.assignment.items())))
+
+    def same_answer(self, other: Outcome) -> bool:
+        """Return whether `other` is equal except for measurements: times, and memory of processes.
+
+        Runs of the same problem with the same options and seed have the same answer in the simulator.
+        """
+        return _without_measurements(self, Outcome) == _without_measurements(other, Outcome)
+
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""
         named = set(self.symbolic)
@@ -297,3 +307,19 @@ class Outcome(Answer):
     def withdrawn_alive(self) -> tuple[str, ...]:
         """The withdrawn robots that are not lost: there was no place for them."""
         return tuple(name for name in self.withdrawn if name not in self.lost)
+
+
+def _without_measurements(answer: Answer, kind: type[Answer]) -> dict[str, object]:
+    """Return the fields of `kind` by name, with 0 for measured times and memory."""
+    parts = answer.parts(kind)
+    parts["metrics"] = _counts(answer.metrics)
+    parts["improvements"] = [one._replace(at_s=0.0) for one in answer.improvements]
+    if answer.preprocessing is not None:
+        parts["preprocessing"] = replace(answer.preprocessing, metrics=_counts(answer.preprocessing.metrics))
+    if isinstance(answer, Outcome):
+        parts["epochs"] = [_without_measurements(epoch, EpochOutcome) for epoch in answer.epochs]
+    return parts
+
+
+def _counts(metrics: Metrics) -> Metrics:
+    return replace(metrics, wall_s=0.0, compile_s=0.0, memory=0)

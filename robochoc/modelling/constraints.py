@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robochoc.model.constraint import WhenAbsent
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
-from robochoc.modelling.numbers import Exact, exact, is_truth, shown
+from robochoc.modelling.numbers import Exact, exact, is_infinite, is_truth, shown
 from robochoc.modelling.terms import ModelVariable, Term, condition
 
 if TYPE_CHECKING:
@@ -78,8 +79,8 @@ def check_owned(term: Term, known: Mapping[str, ModelVariable], place: SourceLin
 
 
 def exact_or_none(cost: object) -> Exact | None:
-    """Return the exact cost of a constraint, or None for a hard constraint."""
-    return None if cost is None else exact(cost)
+    """Return the exact cost of a constraint, or None for a hard constraint, whose cost is None or infinite."""
+    return None if cost is None or (is_infinite(cost) and cost == math.inf) else exact(cost)
 
 
 def absence_or_none(when_absent: WhenAbsent | str | None, place: SourceLine) -> WhenAbsent | None:

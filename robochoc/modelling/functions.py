@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 from robochoc.modelling.codes import NUMBER, kind_of
@@ -105,17 +105,22 @@ def forbidden(terms: object, rows: Iterable[object]) -> Term:
     return TableTerm(scope, dict.fromkeys(_rows(scope, rows), False), default=True)
 
 
-def costs(terms: object, table: Mapping[Any, object], default: object = 0) -> Term:
+def costs(terms: object, table: Mapping[Any, object] | Iterable[Any], default: object = 0) -> Term:
     """Return the entry of a table for the values of `terms`.
 
     Args:
         terms: The terms, or a single term.
-        table: Numbers by tuples of values; for a single term, by values. `math.inf` forbids the values.
+        table: Numbers by tuples of values; for a single term, by values. `math.inf` forbids the values. Or a
+            list of numbers for all values of a variable, in the order of its domain; for two variables a matrix with a
+            row for each value of the first one; and so on. Arrays of numpy are lists, too.
         default: The number for all other values; `math.inf` forbids them.
     """
     scope = _scope(terms)
     single = isinstance(terms, Term)
-    rows = {(key,) if single else tuple(_row(key)): value for key, value in table.items()}
+    if isinstance(table, Mapping) or hasattr(table, "items"):
+        rows = {(key,) if single else tuple(_row(key)): value for key, value in table.items()}
+    else:
+        rows = dict(_entries(scope, table))
     for value in (*rows.values(), default):
         if not _is_cost(value):
             raise ModelTypeError(f"invalid cost {value!r}", "expected a number, or math.inf to forbid")
@@ -155,6 +160,24 @@ def _scope(terms: object) -> tuple[Term, ...]:
     if not found:
         raise ModelError("a table without terms")
     return tuple(found)
+
+
+def _entries(scope: Sequence[Term], table: object) -> Iterator[tuple[tuple[object, ...], object]]:
+    """Yield the entries of a nested list, with the values of the variables in `scope`, in the order of the domains."""
+    if not scope:
+        yield (), table
+        return
+    first, *others = scope
+    if not isinstance(first, ModelVariable):
+        raise ModelTypeError(f"{first!r} is not a variable, so a list does not determine its values", "use a dict")
+    if not isinstance(table, Iterable) or isinstance(table, str):
+        raise ModelTypeError(f"{table!r} is not a list of costs", f"expected one for each value of {first!r}")
+    costs = list(table)
+    if len(costs) != len(first.domain):
+        raise ModelError(f"a list has {len(costs)} costs, but {first!r} has {len(first.domain)} values")
+    for value, part in zip(first.domain, costs, strict=True):
+        for values, cost in _entries(others, part):
+            yield (value, *values), cost
 
 
 def _row(row: object) -> Sequence[object]:

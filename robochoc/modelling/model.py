@@ -154,6 +154,9 @@ class Model(Solvable):
             raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
         return self.variables[name]
 
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self.variables]
+
     def add(
         self,
         *constraints: object,
@@ -165,8 +168,8 @@ class Model(Solvable):
 
         Args:
             *constraints: Conditions, or lists of them.
-            cost: The cost if the constraints do not all hold. It is subtracted from a sum that is maximised. None: the
-                constraints are hard.
+            cost: The cost if the constraints do not all hold. It is subtracted from a sum that is maximised. None, or
+                `math.inf`: the constraints are hard.
             name: A name by which an event can remove the constraints.
             when_absent: The meaning of the constraints when a robot in their scopes withdraws, is lost or leaves:
                 `restate` them for the other robots, `drop` them, or `fail`. None: the default for their form

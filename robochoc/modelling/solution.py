@@ -131,6 +131,11 @@ class Solution(Outcome, Mapping[str, object]):
         except UnknownNameError:
             return False
 
+    __hash__ = Outcome.__hash__
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return [*self]
+
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the variables that have values."""
         return iter(self.assignment)

@@ -349,14 +349,20 @@ _FACTORS: dict[Exact, str] = {1: "", -1: "-"}
 _OPPOSITES = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
 
 
-def any_of(conditions: Iterable[object]) -> Term:
-    """Return the condition that at least one of `conditions` holds."""
-    return _flat("or", tuple(conditions)) if (conditions := list(conditions)) else ConstantTerm(given=False)
+def any_of(*conditions: object) -> Term:
+    """Return the condition that at least one of `conditions`, given one by one or as one list, holds."""
+    return _flat("or", listed) if (listed := in_one_list(conditions)) else ConstantTerm(given=False)
 
 
-def all_of(conditions: Iterable[object]) -> Term:
-    """Return the condition that all of `conditions` hold."""
-    return _flat("and", tuple(conditions)) if (conditions := list(conditions)) else ConstantTerm(given=True)
+def all_of(*conditions: object) -> Term:
+    """Return the condition that all of `conditions`, given one by one or as one list, hold."""
+    return _flat("and", listed) if (listed := in_one_list(conditions)) else ConstantTerm(given=True)
+
+
+def in_one_list(arguments: tuple[object, ...]) -> list[object]:
+    """Return the elements of the only argument if it is a list or another iterable, otherwise the arguments."""
+    only = arguments[0] if len(arguments) == 1 else arguments
+    return list(only) if isinstance(only, Iterable) and not isinstance(only, (Term, str)) else list(arguments)
 
 
 def term_of(value: object) -> Term:

@@ -7,6 +7,7 @@ import json
 import pickle
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from decimal import Decimal
 from enum import Enum
 from fractions import Fraction
@@ -17,6 +18,7 @@ import pytest
 
 import robochoc
 from robochoc.formats.result import read_result, result_json
+from robochoc.model.outcome import Improvement, Verdict
 from robochoc.modelling.errors import ModelTypeError, UnknownNameError
 from robochoc.modelling.solution import Solution
 
@@ -149,3 +151,39 @@ def test_values_as_a_data_frame() -> None:
     assert frame["withdrawn"].sum() == 1
     assert {*frame.loc[~frame["withdrawn"], "value"]} == {"red", "green"}
     assert pd.isna(frame.loc[frame["withdrawn"], "value"]).all()
+
+
+def test_equal_runs_have_the_same_answer_and_equal_outcomes_the_same_hash() -> None:
+    model, _ = coloured()
+    first, second = solved(model), solved(model)
+    slower = replace(second, metrics=replace(second.metrics, wall_s=9.0, compile_s=8.0, memory=7))
+    assert first.same_answer(slower)
+    assert slower.same_answer(first)
+    assert first != slower
+    assert not first.same_answer(replace(second, metrics=replace(second.metrics, checks=10**6)))
+    assert not first.same_answer(replace(second, assignment={}))
+    copied = copy.deepcopy(first)
+    assert (copied, hash(copied)) == (first, hash(first))
+    assert {first: 1}[copied] == 1
+    outcome = read_result(result_json(first))
+    assert isinstance(hash(outcome), int)
+
+
+def test_epochs_and_improvements_are_compared_without_times() -> None:
+    model, (x, y) = coloured()
+    model.after_solution().add(x == y)
+    first = solved(model)
+    late = [replace(one, metrics=replace(one.metrics, wall_s=5.0)) for one in first.epochs]
+    improvement = Improvement(0.5, Verdict.SOLUTION, None)
+    known = replace(first, improvements=(improvement,))
+    assert len(late) > 1
+    assert first.same_answer(replace(first, epochs=tuple(late)))
+    assert not first.same_answer(replace(first, epochs=tuple(late[:1])))
+    assert known.same_answer(replace(first, improvements=(improvement._replace(at_s=0.7),)))
+    assert not known.same_answer(first)
+
+
+def test_keys_are_completed() -> None:
+    model, _ = coloured()
+    assert model._ipython_key_completions_() == ["r0.x", "r1.x"]
+    assert solved(model)._ipython_key_completions_() == ["r0.x", "r1.x"]
