@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 import hashlib
 import itertools
+import json
 import os
 import shutil
 import subprocess
@@ -133,6 +134,10 @@ def tried(python: Path, wheel: Path) -> str:
         said = run(bin_ / "python", "example.py", folder=folder)
         if printed.kind != "text" or said.strip() != printed.text.strip():
             raise ReleaseError(f"{python}: the example of README.md prints {said!r}")
+        notebook = json.loads((ROOT / "docs" / "tutorials" / "model.ipynb").read_text(encoding="utf-8"))
+        cells = ["".join(cell["source"]) for cell in notebook["cells"] if cell["cell_type"] == "code"]
+        (folder / "notebook.py").write_text("\n".join(cells))
+        run(bin_ / "python", "notebook.py", folder=folder)
         run(bin_ / "robochoc", "demo", "--no-open", folder=folder)
         if not (folder / "robochoc-demo.html").stat().st_size:
             raise ReleaseError(f"{python}: robochoc demo wrote an empty page")
@@ -140,7 +145,7 @@ def tried(python: Path, wheel: Path) -> str:
         packages = run(bin_ / "pip", "list", "--disable-pip-version-check", "--format=freeze").splitlines()
     return (
         f"{version}, Python {python.name.removeprefix('python')}: installed in {seconds:.0f} s ({len(packages)}"
-        f" packages, {size / 1e6:.0f} MB); README's example and robochoc demo work"
+        f" packages, {size / 1e6:.0f} MB); README's example, the notebook and robochoc demo work"
     )
 
 
