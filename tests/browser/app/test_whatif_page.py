@@ -36,7 +36,7 @@ def test_one_fails_and_the_team_decides_again(browser: Browser, application: App
         assert page.locator(".whatif-bar").count() == 2
         page.reload()
         page.wait_for_selector(".fate-left:has-text('East')")
-        page.click("text=Keep the changes")
+        page.click("button:has-text('Keep the changes')")
         wait_until(lambda: _names(teams, team) == ["North", "South", "West"], lambda: str(_names(teams, team)))
         page.wait_for_selector("text=Nothing yet.")
         page.click("[aria-label^='Undo']")
