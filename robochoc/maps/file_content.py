@@ -25,8 +25,8 @@ def read_content(path: Path, most: int) -> bytes:
     """Return the content of a file.
 
     Raises:
-        OSError: It cannot be read.
-        MistakeError: It is not a regular file, or has more than `most` bytes.
+        OSError: The file cannot be read.
+        MistakeError: The path is not a regular file, or the file has more than `most` bytes.
     """
     content = read_beginning(path, most + 1)
     if len(content) > most:
@@ -35,7 +35,12 @@ def read_content(path: Path, most: int) -> bytes:
 
 
 def read_beginning(path: Path, most: int) -> bytes:
-    """Return at most the first `most` bytes of a file, which may be longer. Raises as `read_content`."""
+    """Return the first `most` bytes of a file, or the whole file if it is shorter.
+
+    Raises:
+        OSError: The file cannot be read.
+        MistakeError: The path is not a regular file.
+    """
     if path.exists() and not stat.S_ISREG(path.stat().st_mode):
         raise MistakeError("is not a file", "name a file")
     with path.open("rb") as file:

@@ -1,6 +1,7 @@
-"""The map of the ground below a mission: places of robots, blocked cells, and walls.
+"""The map below a mission: places of robots, blocked cells, and walls.
 
-It is not in robots' files, but in a separate file: `map.json` in the team's folder, or given by `robochoc fly --map`.
+The map is in a separate file, not in the robots' files: `map.json` in the team's folder, or given by `robochoc fly
+--map`.
 """
 
 from __future__ import annotations
@@ -13,9 +14,9 @@ from robochoc.system.decode_errors import describe_decode_error
 
 MAX_BYTES = 8 << 20
 MAX_BLOCKED = 10_000
-"""The maximum number of blocked cells: each is drawn as a block, and avoided by routes as a point."""
+"""The maximum number of blocked cells, each of which is drawn as a block, and avoided by routes as a point."""
 ALL_SIDES = 0b111111
-"""All sides of a cube, as visible sides."""
+"""The value of visible sides for all sides of a cube."""
 MAX_PIXELS = 4_000_000
 """The maximum number of pixels, as for images of maps (`occupancy/pgm.py`)."""
 MAX_VOXELS = 16_000_000
@@ -39,16 +40,15 @@ class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class WallVoxels(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The voxels of a three-dimensional map, and the radius and speed of robots for which travel times were computed.
 
-    Voxels are flags in bytes (`occupancy/packed.py`): by z, then y, then x, each from the lowest on. Lengths are in
-    metres.
+    Voxels are flags in bytes (`occupancy/packed.py`), sorted by z, then y, then x. Lengths are in metres.
 
     Attributes:
         columns: The number of voxels along x.
         rows: The number of voxels along y.
         levels: The number of voxels along z.
-        resolution: The side of a voxel.
+        resolution: The side length of a voxel.
         corner: The x, y and z of the lowest corner of the first voxel.
-        radius: The robots' radius, which their centres keep from voxels that are not free, and from the outside.
+        radius: The robots' radius: their centres keep this distance from voxels that are not free, and the outside.
         speed: The speed of the travel times, in m/s.
         free: Which voxels are free.
         occupied: Which voxels are occupied. A voxel that is neither free nor occupied is unknown.
@@ -71,12 +71,12 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
     Attributes:
         levels: The number of levels.
         first: The z of topics in the first level.
-        starts: The levels of robots in the beginning, by their names. All others stand on the ground.
+        starts: The initial levels of robots, by name. All other robots are on the ground.
         blocked: The blocked cells: column, row and level.
-        sides: The visible sides of each blocked cell, as a sum: 1 for visible from a lower x, 2 from a higher x, 4 and
-            8 for y, 16 and 32 for z. Empty: all sides.
+        sides: The visible sides of each blocked cell, as a sum: 1 if visible from a lower x, 2 from a higher x, 4 and 8
+            for y, 16 and 32 for z. Empty: all sides.
         walls: Walls that drones fly around; None: drones fly straight. A map with walls has a scale.
-        heights: The exact z of robots, in metres, by their names.
+        heights: The exact z of robots in metres, by name.
     """
 
     levels: _Coordinate
@@ -99,18 +99,18 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defau
 class WallPixels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The pixels of a map of a building, and the radius and speed of robots for which travel times were computed.
 
-    Pixels are flags in bytes (`occupancy/packed.py`): rows from the lowest y on. Lengths are in metres.
+    Pixels are flags in bytes (`occupancy/packed.py`), sorted by y, then x. Lengths are in metres.
 
     Attributes:
         columns: The number of pixels in a row.
         rows: The number of rows.
-        resolution: The side of a pixel.
-        corner: The x and the y of the lower left corner of the lower left pixel.
-        radius: The robots' radius, which their centres keep from pixels that are not free, and from the outside.
+        resolution: The side length of a pixel.
+        corner: The x and y of the lower left corner of the lower left pixel.
+        radius: The robots' radius: their centres keep this distance from pixels that are not free, and the outside.
         speed: The speed of the travel times, in m/s.
         free: Which pixels are free.
         occupied: Which pixels are occupied. A pixel that is neither free nor occupied is unknown.
-        yaw: The counterclockwise angle, in radians, by which the pixels are turned around `corner`.
+        yaw: The counterclockwise angle, in radians, by which the pixels are rotated around `corner`.
     """
 
     columns: Annotated[int, msgspec.Meta(ge=1, le=MAX_PIXELS)]
@@ -130,13 +130,13 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
     Attributes:
         columns: The number of columns.
         rows: The number of rows.
-        starts: The cells of robots in the beginning, by their names: column and row.
+        starts: The initial cells (column and row) of robots, by name.
         blocked: The blocked cells.
         first: The x and y of topics in the first column and row.
         scale: The length of a unit of topics, in metres; None: not known.
         volume: The third dimension, if the map has one.
         walls: Walls that drones fly around; None: no walls. A map with walls has a scale.
-        places: The exact places of robots, in metres, by their names.
+        places: The exact places of robots in metres, by name.
     """
 
     columns: _Coordinate

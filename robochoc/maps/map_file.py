@@ -1,4 +1,4 @@
-"""Reads maps in any format: occupancy grids of ROS's map_server, and octrees of OctoMap."""
+"""Reads maps in all supported formats: occupancy grids of ROS's map_server, and octrees of OctoMap."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read_map(path: Path) -> Map:
     """Return the map in a file: an OctoMap, recognised by its first bytes, or the YAML file of an occupancy grid.
 
     Raises:
-        InvalidInputError: The file, or its image, cannot be read, is not valid, or is too large.
+        InvalidInputError: The file or its image cannot be read, is not valid, or is too large.
     """
     with as_input_errors(path):
         begin = read_beginning(path, _BEGINNING)

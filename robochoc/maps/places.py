@@ -1,8 +1,8 @@
-"""The places on a map that the values of a team represent, in metres of the map's frame.
+"""The places on a map that are represented by values of variables, in metres in the map's frame.
 
-A robot's file has its waypoint as a formula over its variables, in cells of the map (`topics`); the map has the length
-of a cell. A robot that plans several visits has a waypoint only for the first one. The formula also applies to its
-other variables if all their values are places of some robot's waypoint.
+A robot's file has the robot's waypoint as a formula over its variables, in cells of the map (`topics`); the map has the
+length of a cell. A robot that plans several visits has a waypoint only for the first visit. The formula also applies to
+the robot's other variables if all their values are places of some robot's waypoint.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from robochoc.model.expression import Expression, UndefinedValueError, evaluate,
 from robochoc.model.problem import Robot, Team
 
 Place = tuple[float, ...]
-"""An x and a y in metres; on a three-dimensional map a z, too."""
+"""The x and y of a place, and the z on a three-dimensional map, in metres."""
 _Formulas = tuple[Expression, ...]
 _VALUES_MAX = 1_000_000
-"""In teams with more values of all variables together, only variables of waypoints have places."""
+"""In teams whose variables have more values in total, only variables of waypoints have places."""
 _PLACES = 6
-"""Decimal places of coordinates: further ones are rounding errors."""
+"""The decimal places of coordinates; further decimals are rounding errors."""
 
 
 class MapPlaces:
@@ -27,7 +27,7 @@ class MapPlaces:
 
     Args:
         team: The team.
-        ground: Its map. Without a map, or with a map without scale, values have no places.
+        ground: The map of the team. Without a map, or with a map without a scale, values have no places.
     """
 
     def __init__(self, team: Team, ground: GroundMap | None) -> None:
@@ -40,7 +40,7 @@ class MapPlaces:
         self._formulas |= dict(self._later_visits(team))
 
     def places_of(self, assignment: Mapping[str, int]) -> dict[str, Place]:
-        """Return the place of each variable whose value represents one, in the order of `assignment`."""
+        """Return the place of each variable whose value represents a place, in the order of `assignment`."""
         found = {}
         for name, value in assignment.items():
             if name in self._formulas and self._scale is not None:
@@ -53,7 +53,7 @@ class MapPlaces:
         return found
 
     def _later_visits(self, team: Team) -> Iterator[tuple[str, tuple[str, _Formulas]]]:
-        """Yield the other variables of robots with one waypoint, with its formulas, if their values are places."""
+        """Yield other variables of robots with one waypoint, and its formulas, if the variables' values are places."""
         domains = {name: variable.domain for name, variable in team.variables.items()}
         if sum(map(len, domains.values())) > _VALUES_MAX:
             return

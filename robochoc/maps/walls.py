@@ -1,4 +1,4 @@
-"""The walls of a mission's map, as data, and the place of its pixels or voxels in the map's frame."""
+"""The walls on a mission's map, and the place of the map's pixels or voxels in its frame."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ class Walls:
     """Walls, and the robots that fly around them. Lengths are in metres.
 
     Attributes:
-        solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first. On a map in three
-            dimensions the voxels, by z, then y, then x.
-        occupied: The occupied ones among them. The others are unknown.
-        frame: Their place in the map's frame.
+        solid: Which pixels are not free, sorted by y, then x; on a three-dimensional map which voxels, sorted by z,
+            then y, then x.
+        occupied: Which of these pixels or voxels are occupied. The others are unknown.
+        frame: The place of the pixels or voxels in the map's frame.
         radius: The robots' radius.
         speed: The mean speed of the team's travel times, in m/s.
     """
@@ -38,7 +38,7 @@ class Walls:
     speed: float
 
     def moved(self, by: Sequence[float] | npt.NDArray[np.float64], factor: float = 1.0) -> Walls:
-        """Return the walls with all lengths multiplied by `factor`, and then moved by an x, a y and a z."""
+        """Return the walls with all lengths multiplied by `factor`, then moved by the vector `by` (x, y, z)."""
         frame = self.frame.moved(by, factor)
         return Walls(self.solid, self.occupied, frame, factor * self.radius, factor * self.speed)
 
@@ -49,7 +49,7 @@ class Walls:
 
 
 def walls_of(ground: GroundMap | None) -> Walls | None:
-    """Return the walls on a map; None without walls."""
+    """Return the walls on a map; None for a map without walls."""
     found = (ground.volume.walls if ground.volume else ground.walls) if ground else None
     if found is None:
         return None
@@ -68,9 +68,9 @@ class PixelFrame:
     """The place of a map's pixels. Lengths are in metres.
 
     Attributes:
-        size: The side of a pixel.
-        corner: The x and the y of the lower left corner of the lower left pixel.
-        yaw: The counterclockwise angle, in radians, by which the pixels are turned around `corner`.
+        size: The side length of a pixel.
+        corner: The x and y of the lower left corner of the lower left pixel.
+        yaw: The counterclockwise angle, in radians, by which the pixels are rotated around `corner`.
     """
 
     size: float
@@ -78,18 +78,18 @@ class PixelFrame:
     yaw: float = 0.0
 
     def moved(self, by: Sequence[float] | _Array, factor: float = 1.0) -> PixelFrame:
-        """Return the frame with all lengths multiplied by `factor`, and then moved by an x and a y."""
+        """Return the frame with all lengths multiplied by `factor`, then moved by the vector `by` (x, y)."""
         x, y = self.corner
         return PixelFrame(factor * self.size, (factor * x + float(by[0]), factor * y + float(by[1])), self.yaw)
 
     def in_pixels(self, points: _Array) -> _Array:
-        """Return points (K, 2), or (K, 3), in pixels (K, 2) from the lower left corner on."""
+        """Convert points (K, 2), or (K, 3), to pixels (K, 2) from the lower left corner."""
         x, y = points[:, 0] - self.corner[0], points[:, 1] - self.corner[1]
         cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
         return np.column_stack((cosine * x + sine * y, cosine * y - sine * x)) / self.size
 
     def in_metres(self, places: _Array) -> _Array:
-        """Return points (K, 2) given in pixels, in metres."""
+        """Convert points (K, 2) from pixels to metres."""
         x, y = self.size * places[:, 0], self.size * places[:, 1]
         cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
         return np.column_stack((cosine * x - sine * y + self.corner[0], sine * x + cosine * y + self.corner[1]))
@@ -100,7 +100,7 @@ class VoxelFrame:
     """The place of a map's voxels. Lengths are in metres.
 
     Attributes:
-        size: The side of a voxel.
+        size: The side length of a voxel.
         corner: The x, y and z of the lowest corner of the first voxel.
     """
 
@@ -108,14 +108,14 @@ class VoxelFrame:
     corner: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def moved(self, by: Sequence[float] | _Array, factor: float = 1.0) -> VoxelFrame:
-        """Return the frame with all lengths multiplied by `factor`, and then moved by an x, a y and a z."""
+        """Return the frame with all lengths multiplied by `factor`, then moved by the vector `by` (x, y, z)."""
         x, y, z = (factor * own + float(part) for own, part in zip(self.corner, by, strict=True))
         return VoxelFrame(factor * self.size, (x, y, z))
 
     def in_voxels(self, points: _Array) -> _Array:
-        """Return points (K, 3) in voxels from the lowest corner on."""
+        """Convert points (K, 3) to voxels from the lowest corner."""
         return np.asarray((points - np.array(self.corner)) / self.size)
 
     def in_metres(self, places: _Array) -> _Array:
-        """Return points (K, 3) given in voxels, in metres."""
+        """Convert points (K, 3) from voxels to metres."""
         return np.asarray(places * self.size + np.array(self.corner))

@@ -1,1 +1,1 @@
-"""Vehicles with autopilots of their own, by MAVLink or cflib: decisions are flown, and telemetry becomes reports."""
+"""Vehicles with their own autopilots, by MAVLink or cflib: flies decisions, and converts telemetry to reports."""

@@ -1,4 +1,4 @@
-"""The interface of an autopilot: its telemetry, and the commands that it accepts. Places are in the team's frame."""
+"""The interface of an autopilot: its telemetry and commands. Places are in the team's frame."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ OFFBOARD = "OFFBOARD"
 MANUAL = frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"})
 """Modes in which a person flies, by remote control."""
 AWAY = frozenset({"RETURN_TO_LAUNCH", "MISSION", "FOLLOW_ME"})
-"""Modes in which an autopilot flies by itself, requested by a person or its failsafe, never by us."""
+"""Modes in which an autopilot flies by itself at the request of a person or its failsafe, never at ours."""
 
 
 class RefusedError(RobochocError):
-    """The autopilot has denied a command, or has not answered. The message has the command and the reason."""
+    """The autopilot has denied or not answered a command. The message has the command and the reason."""
 
 
 @dataclass(frozen=True)
@@ -32,15 +32,15 @@ class Telemetry:
     in_air: bool = False
     healthy: bool = False
     problem: str = ""
-    """The reason why the autopilot is not healthy, if it reports one."""
+    """The reason why the autopilot is not healthy, if reported."""
     alarm: str = ""
-    """The reason to land at once, where its autopilot does not land by itself."""
+    """The reason to land at once, if the autopilot does not land by itself."""
     connecting: bool = False
-    """True from its first message until everything that it needs to fly has been reported."""
+    """True from the first message until all data required for flying have been reported."""
     silent_s: float = 0.0
     """The time since the last heartbeat, in seconds."""
     place_age_s: float = 0.0
-    """The time since its last position report, in seconds: a connected vehicle may have lost its position."""
+    """The time since the last position report, in seconds: a connected vehicle may have lost its position."""
 
     @property
     def has_heartbeat(self) -> bool:
@@ -49,17 +49,17 @@ class Telemetry:
 
     @property
     def not_ready(self) -> str:
-        """The reason why its autopilot refuses to arm; empty if it does not."""
+        """The reason why the autopilot refuses to arm; empty if it would arm."""
         return "" if self.healthy else self.problem or "its autopilot is not ready to arm"
 
     @property
     def is_flown_by_others(self) -> bool:
-        """Whether a person flies the vehicle, or its autopilot does without us."""
+        """Whether a person flies the vehicle, or its autopilot flies without our commands."""
         return self.armed and self.mode in MANUAL | AWAY
 
     @property
     def mode_and_pilot(self) -> str:
-        """The mode of a vehicle that is not flown by us, and who may fly it, in words."""
+        """The mode of a vehicle that is not flown by us, and the possible pilot, in words."""
         who = "a person flies it" if self.mode in MANUAL else "a person flies it, or its own failsafe"
         return f"{self.mode_in_words} ({who})"
 
@@ -70,7 +70,7 @@ class Telemetry:
 
 
 class Autopilot(ABC):
-    """A vehicle's autopilot. Commands wait for the answer, a few seconds at most, and raise `RefusedError`."""
+    """A vehicle's autopilot. Commands wait at most a few seconds for the answer, and raise `RefusedError`."""
 
     url: str
     """The link, for messages."""
@@ -89,15 +89,15 @@ class Autopilot(ABC):
 
     @abstractmethod
     def disarm(self) -> None:
-        """Disarm the motors: refused in the air."""
+        """Disarm the motors, which is refused in the air."""
 
     @abstractmethod
     def take_off(self, height_m: float) -> None:
-        """Rise to a height above its present place, and hold there."""
+        """Rise to a height above the present place, and hold there."""
 
     @abstractmethod
     def go_to(self, place: Point) -> None:
-        """Fly straight to `place`, by set points that are repeated until another command comes.
+        """Fly straight to `place`, by set points that are repeated until the next command.
 
         Called repeatedly on the way; waits for an answer only after another command.
         """
@@ -112,4 +112,4 @@ class Autopilot(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Close the link without a command."""
+        """Close the link without sending a command."""

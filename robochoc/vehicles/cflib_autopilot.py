@@ -1,9 +1,9 @@
-"""Crazyflies, by Bitcraze's library. Only this module uses cflib (0.1), and CRTP, the protocol of Crazyflies.
+"""The autopilot of Crazyflies. Only this module uses Bitcraze's library cflib (0.1), and CRTP, the Crazyflie protocol.
 
-The firmware's high-level commander flies: it plans a path to its target, flies it by itself, and hovers there. It
-answers each command by accepting or rejecting it; cflib ignores these answers, so they are read here. The firmware
-reports its state in one block of its log, ten times a second. Cflib's method for closing a link is not used: it first
-sends a set point without thrust, which makes a Crazyflie in the air fall.
+The firmware's high-level commander plans a path to a target, flies along the path, and hovers at the target. It answers
+each command by accepting or rejecting it; cflib ignores these answers, so they are read here. The firmware reports its
+state in one log block, ten times a second. The method of cflib for closing a link is not used, because it first sends a
+set point without thrust, which makes a Crazyflie in the air fall.
 
 Source: the firmware's crtp_commander_high_level.c, crtp_supervisor.c, supervisor.c and planner.c, protocol version 12.
 """
@@ -31,9 +31,9 @@ from robochoc.vehicles.supervisor import Supervisor
 PROTOCOL = 12
 """The oldest version of the protocol in which the supervisor answers arming requests."""
 PEAK = 35 / 16
-"""The ratio of the highest to the mean speed, on a polynomial path of degree seven from rest to rest."""
+"""The ratio of the highest to the mean speed on a polynomial path of degree seven from rest to rest."""
 LAND_MS = 0.5
-"""The highest speed of a landing, in metres a second."""
+"""The highest landing speed, in m/s."""
 _SHORTEST_S = 0.5
 _PERIOD_MS = 100
 _TRIES, _ANSWER_S = 3, 0.5
@@ -43,11 +43,11 @@ SPIN_UP_S = 4.0
 SETTLED_S = 0.3
 """The longest time until telemetry shows the effect of a command, in seconds."""
 STALE_S = 1.0
-"""No command is sent on the basis of older telemetry, in seconds."""
+"""The maximum age of telemetry on which commands are based, in seconds."""
 _ATTEMPT_S = 2.0
-"""An attempt to open a link ends after this time without a message, in seconds."""
+"""The time without a message after which an attempt to open a link ends, in seconds."""
 _REOPEN_S = 5.0
-"""A link is opened again after this time without telemetry, in seconds."""
+"""The time without telemetry after which a link is opened again, in seconds."""
 _NO_DRIVER = "Couldn't load link driver:"
 """The beginning of cflib's error for a missing dongle or host."""
 _TAKE_OFF, _LAND, _GO_TO = 7, 8, 12
@@ -56,7 +56,7 @@ _BUSY = 16
 _LOG_DATA = 2
 """The channel of log blocks."""
 _LOW_POWER = 3
-"""In this state of the power management (pm.h) and above, the battery has had a low voltage for some seconds."""
+"""From this state of the power management (pm.h) on, the battery has had a low voltage for some seconds."""
 _VARIABLES = (
     *("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimate.yaw"),
     *("supervisor.info", "pm.batteryLevel", "pm.state"),
@@ -66,7 +66,7 @@ cflib.crtp.init_drivers()
 
 
 class CflibAutopilot(Autopilot):
-    """The Crazyflie at the other end of `link`, which flies at `speed_ms` m/s at most."""
+    """Controls the Crazyflie at the other end of `link`, which flies at up to `speed_ms` m/s."""
 
     def __init__(self, link: VehicleLink, speed_ms: float) -> None:
         self.url = link.url
@@ -125,7 +125,7 @@ class CflibAutopilot(Autopilot):
     # Commands
 
     def arm(self) -> None:
-        """Arm the motors, and wait until they spin; brushed motors are always armed."""
+        """Arm the motors, and wait until they spin. Brushed motors are always armed."""
         supervisor = self._current_supervisor("arm")
         if not supervisor.arms_itself:
             self._arming("arm", on=True)
@@ -134,7 +134,7 @@ class CflibAutopilot(Autopilot):
                 raise RefusedError("it did not arm (its motors do not spin)")
 
     def disarm(self) -> None:
-        """Disarm the motors: refused in the air, where the firmware would obey, and the vehicle would fall."""
+        """Disarm the motors. Refused in the air, where the firmware would obey and the vehicle would fall."""
         supervisor = self._current_supervisor("disarm")
         if not self._is_on_ground(supervisor):
             raise RefusedError("it did not disarm (it may be in the air)")
@@ -142,7 +142,7 @@ class CflibAutopilot(Autopilot):
             self._arming("disarm", on=False)
 
     def take_off(self, height_m: float) -> None:
-        """Rise, and hover there."""
+        """Rise to a height above the present place, and hover there."""
         self._current_supervisor("take off")
         self._ground_m = self._values["stateEstimate.z"]
         height, duration_s = self._ground_m + height_m, self._duration(height_m, self._speed_ms)
@@ -156,8 +156,8 @@ class CflibAutopilot(Autopilot):
     def go_to(self, place: Point) -> None:
         """Fly to `place`, and hover there.
 
-        From a hover the path is smooth. On the way, the firmware would bend a smooth path by its present speed, so
-        the path is then straight, with constant speed.
+        From a hover, the path is smooth. During a flight, the firmware would bend a smooth path because of the present
+        speed; the path is then straight, with constant speed.
         """
         supervisor = self._current_supervisor("fly to its place")
         if self._climbs and not supervisor.finished:
@@ -176,7 +176,7 @@ class CflibAutopilot(Autopilot):
         self._climbs = False
 
     def hold(self) -> None:
-        """Hover where it is."""
+        """Hover in place."""
         self._current_supervisor("hold")
         self._send_command(
             "hold",
@@ -185,7 +185,7 @@ class CflibAutopilot(Autopilot):
         )
 
     def land(self) -> None:
-        """Land in place, to the height from which it took off; the firmware stops the motors there."""
+        """Land in place, at the height of the take-off, where the firmware stops the motors."""
         supervisor = self._current_supervisor("land")
         if self._is_on_ground(supervisor):
             raise RefusedError("it did not land (it is on the ground)")
@@ -200,7 +200,7 @@ class CflibAutopilot(Autopilot):
         )
 
     def close(self) -> None:
-        """Close the link; the Crazyflie continues its last command."""
+        """Close the link; the Crazyflie continues to execute its last command."""
         crazyflie, self._crazyflie = self._crazyflie, None
         if crazyflie is None:
             return
@@ -221,11 +221,11 @@ class CflibAutopilot(Autopilot):
     # The link
 
     def _keep_link(self) -> None:
-        """Open the link, or open it again if it was lost."""
+        """Open the link if it is not open yet, or was lost."""
         now = time.monotonic()
         if self._crazyflie is None:
             broken = True
-        elif self._block is not None:  # an error may pass by itself
+        elif self._block is not None:  # the error may be temporary
             broken = now - max(self._values_at, self._opened_at) > _REOPEN_S
         else:
             broken = self._is_lost or now - max(self._received_at, self._opened_at) > _ATTEMPT_S
@@ -241,8 +241,8 @@ class CflibAutopilot(Autopilot):
         crazyflie.packet_received.add_callback(self._packet_received)
         crazyflie.connected.add_callback(self._connected)
         crazyflie.connection_failed.add_callback(self._lost)
-        # Cflib's error handler waits for threads, in a thread that may hold the lock that these need for sending: no
-        # command could be sent any more. Here the error is recorded, and the pilot's thread opens the link again.
+        # Cflib's error handler waits for threads in a thread that may hold the lock which these need for sending, after
+        # which no command could be sent. Here the error is recorded, and the pilot's thread opens the link again.
         crazyflie._link_error_cb = self._broken  # noqa: SLF001
         crazyflie.add_port_callback(CRTPPort.SETPOINT_HL, self._answered)
         crazyflie.add_port_callback(CRTPPort.SUPERVISOR, self._arming_answered)
@@ -304,20 +304,20 @@ class CflibAutopilot(Autopilot):
         return Supervisor(int(self._values.get("supervisor.info", 0)))
 
     def _current_supervisor(self, what: str) -> Supervisor:
-        """Return the state of the supervisor. Raises `RefusedError` if it is outdated."""
+        """Return the state of the supervisor. Raises `RefusedError` if the state is outdated."""
         if not self._values or time.monotonic() - self._values_at > STALE_S or self._crazyflie is None:
             raise RefusedError(f"it cannot {what}: no recent message from it")
         return self._supervisor()
 
     def _is_on_ground(self, supervisor: Supervisor) -> bool:
-        """Return whether it is certainly on the ground: not reported in the air, nor sent there a moment ago."""
+        """Return whether the vehicle is on the ground: not reported in the air, and not just commanded to rise."""
         return not supervisor.flies and not supervisor.commands and self._values_at - self._commanded_at > SETTLED_S
 
     def _arming(self, what: str, *, on: bool) -> None:
         self._send_command(what, _ARMED, lambda: self._crazyflie.supervisor.send_arming_request(on))
 
     def _send_command(self, what: str, number: int, command: Callable[[], object], *, already: int = 0) -> None:
-        """Send a command until it is answered. The result `already` counts as success, as 0: it was done before."""
+        """Send a command until it is answered. The result `already` (it was done before) is a success, like 0."""
         before = self._commanded_at
         for attempt in range(_TRIES):
             with self._changed:

@@ -1,4 +1,4 @@
-"""`crazyflie:FILE` as a sink and as a source: Crazyflies, by radio, or simulated ones by UDP."""
+"""The sink and the source `crazyflie:FILE`, for Crazyflies by radio, or simulated Crazyflies by UDP."""
 
 from __future__ import annotations
 
@@ -16,6 +16,6 @@ class CrazyflieSink(FleetSink):
 
 
 class CrazyflieSource(FleetSource):
-    """Reports of Crazyflies."""
+    """Reads reports of Crazyflies."""
 
     kind = VehicleKind.CRAZYFLIE

@@ -1,7 +1,7 @@
-"""The fleet file: the vehicle of each drone, its link, and the limits of its flight.
+"""The fleet file: the vehicle of each drone, the vehicle's link, and the limits for flights.
 
-`mavlink:FILE` and `crazyflie:FILE` name such a file, in YAML (docs/guides/autopilots.md). It is checked completely when
-it is read.
+`mavlink:FILE` and `crazyflie:FILE` refer to such a file, in YAML (docs/guides/autopilots.md). The whole file is checked
+when it is read.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _LARGE = 10**9
 
 
 class FleetError(RobochocError):
-    """The fleet file is invalid. The message has the file, the line, and the expected content."""
+    """The fleet file is invalid. The message has the file name, the line, and the expected content."""
 
 
 class AtEnd(StrEnum):
@@ -40,18 +40,18 @@ class AtEnd(StrEnum):
 
 
 class Fence(msgspec.Struct, frozen=True):
-    """A box that no vehicle may leave: its lowest and its highest corner, in metres."""
+    """A box that vehicles must not leave, given by its lowest and its highest corner, in metres."""
 
     low: Point
     high: Point
 
     def contains(self, place: Point, margin_m: float = 0.0) -> bool:
-        """Return whether `place` is in the box, or at most `margin_m` outside along each axis."""
+        """Return whether `place` is in the box, or outside by at most `margin_m` along each axis."""
         sides = zip(self.low, place, self.high, strict=True)
         return all(low - margin_m <= at <= high + margin_m for low, at, high in sides)
 
     def covers(self, place: Point, margin_m: float = 0.0) -> bool:
-        """Return whether `place` is in the box or directly below it, as a place on the ground may be."""
+        """Return whether `place` is in the box or, like some places on the ground, directly below the box."""
         x, y, z = place
         return self.contains((x, y, max(z, self.low[2])), margin_m)
 
@@ -60,7 +60,7 @@ class Fence(msgspec.Struct, frozen=True):
 
 
 class VehicleLink(msgspec.Struct, frozen=True):
-    """The link to a vehicle, as its library names it, and the place of the vehicle's origin in the team's frame."""
+    """The link to a vehicle, in its library's syntax, and the place of the vehicle's origin in the team's frame."""
 
     url: str
     at: Point = (0.0, 0.0, 0.0)
@@ -70,22 +70,22 @@ class Fleet(msgspec.Struct, frozen=True):
     """The content of a fleet file."""
 
     vehicles: Mapping[str, VehicleLink]
-    """By the drones' names."""
+    """The links, by drone name."""
     fence: Fence
     origin: GpsPlace | None = None
-    """The place of the team's origin on the earth. None: places are in the vehicles' own frames."""
+    """The place of the team's origin on the earth. None: places are relative to the vehicles' own origins."""
     takeoff_m: float = 2.5
-    """The height of a take-off, above the place of the vehicle."""
+    """The height of a take-off above the vehicle's place."""
     near_m: float = 0.5
-    """A place is reached within this distance."""
+    """A vehicle within this distance of a place has reached it."""
     end: AtEnd = AtEnd.LAND
     patience_s: float = 10.0
-    """A vehicle whose link is silent for a longer time counts as lost."""
+    """The time without messages after which a vehicle counts as lost."""
     time_s: float = 120.0
     """The longest time for flying a decision."""
     kind: VehicleKind = VehicleKind.MAVLINK
     speed_ms: float = 1.0
-    """The highest speed, in m/s, for kinds of vehicles that need it."""
+    """The highest speed, in m/s, for kinds of vehicles that need a limit."""
     distance_m: float = 1.0
     """The distance that vehicles keep from each other, between their centres."""
     downwash: float = 1.0
@@ -93,12 +93,12 @@ class Fleet(msgspec.Struct, frozen=True):
 
     @property
     def connect_s(self) -> float:
-        """The longest time from the first message of a vehicle until it has reported everything, in seconds."""
+        """The longest time from a vehicle's first message until it has reported everything, in seconds."""
         return max(self.patience_s, self.kind.rules.connect_s)
 
     @property
     def tolerance_m(self) -> float:
-        """The largest deviation of a vehicle from its line at which it still counts as on it."""
+        """The largest deviation with which a vehicle still counts as on its line, in metres."""
         return min(self.near_m, self.distance_m / 4)
 
 
@@ -108,7 +108,7 @@ def read_fleet(path: Path, kind: VehicleKind = VehicleKind.MAVLINK) -> Fleet:
     if path == Path():  # --ros mavlink, without a place
         raise FleetError(f"{kind}: the fleet file is missing; {hint}")
     try:
-        if path.is_fifo():  # opening it would wait for a writer
+        if path.is_fifo():  # opening a pipe would wait for a writer
             content = None
         else:
             with path.open("rb") as file:

@@ -1,6 +1,6 @@
-"""The sinks `mavlink:FILE` and `crazyflie:FILE`: decisions are flown by the vehicles of a fleet file.
+"""The base of the sinks `mavlink:FILE` and `crazyflie:FILE`, which fly decisions with the vehicles in a fleet file.
 
-Without permission to arm, a sink only observes: it checks links, vehicles and the fence, and sends no command.
+Without permission to arm, a sink checks links, vehicles and the fence, but sends no commands.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from robochoc.vehicles.route_planner import spacing
 
 
 class FleetSink(Sink):
-    """Flies decisions. After each it waits until the vehicles have arrived, unless a source receives their reports."""
+    """Flies decisions, and waits until vehicles have arrived, unless a source receives their reports."""
 
     kind: ClassVar[VehicleKind]
-    """The kind of vehicles of a subclass."""
+    """The kind of vehicles, set by subclasses."""
     arms = True
 
     def __init__(self, place: str) -> None:
@@ -47,7 +47,7 @@ class FleetSink(Sink):
         self._may_arm = True
 
     def assign(self, drones: Sequence[Drone]) -> None:
-        """Check that drones and vehicles match, and wait until each vehicle is connected."""
+        """Check that drones and vehicles match, and wait until all vehicles are connected."""
         self._names = {number: drone.name for number, drone in enumerate(drones)}
         doubled = [name for name, count in Counter(self._names.values()).items() if count > 1]
         missing = [
@@ -65,9 +65,9 @@ class FleetSink(Sink):
         self._await_vehicles()
 
     def decide(self, waypoints: Sequence[Waypoint]) -> None:
-        """Fly a decision. Nothing is armed if one of its places is outside of the fence, or two are too near.
+        """Fly a decision. No vehicle is armed if a place is outside the fence, or two places are too near.
 
-        Landing points may be outside: pilots then land elsewhere.
+        Landing points may be outside; pilots then land elsewhere.
         """
         fence = self._fleet.fence
         for one in waypoints:
@@ -95,7 +95,7 @@ class FleetSink(Sink):
                 raise self._error(problem, f"'distance' is {least:g} m; the decision is not flown")
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Do nothing: `decide` flies waypoints, and vehicles send their own reports."""
+        """Do nothing, since `decide` flies waypoints, and vehicles send their own reports."""
 
     def close(self) -> None:
         """Wait until all vehicles have arrived; then make them land, or hold."""
@@ -188,7 +188,7 @@ class FleetSink(Sink):
 
 @contextmanager
 def _as_sink_errors() -> Iterator[None]:
-    """Convert errors of the fleet file and the guard to `SinkError`."""
+    """Convert errors in the fleet file and errors of the guard to `SinkError`."""
     try:
         yield
     except (FleetError, GuardError) as error:

@@ -1,4 +1,4 @@
-"""The sources `mavlink:FILE` and `crazyflie:FILE`: the telemetry of a fleet becomes reports of the drones.
+"""The base of the sources `mavlink:FILE` and `crazyflie:FILE`, which convert telemetry to reports of drones.
 
 Poses and battery charges are reported as they arrive. A vehicle that is out of order, for any reason, is reported once.
 """
@@ -21,14 +21,14 @@ from robochoc.vehicles.messages import FlightPhase, VehicleState
 
 _SLICE_S = 0.2
 _CHARGE = 0.01
-"""Smaller changes of a charge since its last report are not reported."""
+"""Smaller changes of the charge since the last report are not reported."""
 
 
 class FleetSource(Source):
-    """Reports of the vehicles in a fleet file. With a sink of the same file it shares their links."""
+    """Reads reports of the vehicles in a fleet file. A source and a sink with the same file share the links."""
 
     kind: ClassVar[VehicleKind]
-    """The kind of vehicles of a subclass."""
+    """The kind of vehicles, set by subclasses."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
@@ -51,7 +51,7 @@ class FleetSource(Source):
         return self._guard.is_flying
 
     def assign(self, namespaces: Mapping[str, str]) -> None:
-        """Store the drones' namespaces. Each vehicle needs one."""
+        """Store the drones' namespaces. Each vehicle needs a namespace."""
         strange = [name for name in self._fleet.vehicles if name not in namespaces]
         if strange:
             known = ", ".join(namespaces)
@@ -79,7 +79,7 @@ class FleetSource(Source):
                 raise SourceError(str(error)) from error
 
     def close(self) -> None:
-        """Release the vehicles: the last user ends their flights."""
+        """Release the vehicles; the last user ends their flights."""
         if not self._is_closed:
             self._is_closed = True
             if self._report_state in self._guard.observers:
@@ -87,7 +87,7 @@ class FleetSource(Source):
             shared.leave(self._path)
 
     def _report_state(self, state: VehicleState) -> None:
-        """Report a state. Called in the thread that reads from the guard."""
+        """Report a state; called in the thread that reads from the guard."""
         name = state.vehicle
         if state.place is not None:
             x, y, z = state.place

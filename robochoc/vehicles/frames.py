@@ -1,7 +1,7 @@
-"""Frames: ours is east, north, up (ENU); an autopilot's is north, east, down (NED), or latitude and longitude.
+"""Converts frames: ours is east, north, up (ENU), autopilots use north, east, down (NED) or latitude and longitude.
 
-A place on the earth is expanded around the origin to the second order, on the ellipsoid WGS 84. M and N are its radii
-of curvature along the meridian and across it:
+A place on the earth is expanded around the origin to the second order, on the WGS 84 ellipsoid. M and N are the
+ellipsoid's radii of curvature along the meridian and across it:
 
     north = (M + h) dlat + east^2 tan(lat0) / (2 (N + h))
     east = (N + h) cos(lat) dlon
@@ -23,16 +23,16 @@ import msgspec
 from robochoc.flight.layout import Point
 
 LATITUDE_MAX = 75.0
-"""The largest latitude of an origin, in degrees: nearer to a pole the error is larger."""
+"""The largest latitude of an origin, in degrees, since the error is larger nearer to the poles."""
 FAR_M = 5_000.0
-"""No place is farther from the origin along one axis, in metres."""
+"""The largest distance of a place from the origin along an axis, in metres."""
 _SEMI_MAJOR_M = 6_378_137.0
 _FLATTENING = 1 / 298.257223563
 _ECCENTRICITY_2 = _FLATTENING * (2 - _FLATTENING)
 
 
 class GpsPlace(msgspec.Struct, frozen=True):
-    """A place on the earth: degrees, and metres above mean sea level."""
+    """A place on the earth, in degrees and in metres above mean sea level."""
 
     latitude: float
     longitude: float
@@ -55,7 +55,7 @@ def enu_of(ned: Point) -> Point:
 
 
 def gps_of(enu: Point, origin: GpsPlace) -> GpsPlace:
-    """Convert east, north, up of a place near `origin` to a place on the earth."""
+    """Convert east, north, up, relative to `origin`, to a place on the earth."""
     east, north, up = enu
     latitude = radians(origin.latitude)
     meridian_m, normal_m = _radii(origin)
@@ -66,7 +66,7 @@ def gps_of(enu: Point, origin: GpsPlace) -> GpsPlace:
 
 
 def enu_from_gps(place: GpsPlace, origin: GpsPlace) -> Point:
-    """Convert a place on the earth near `origin` to east, north, up."""
+    """Convert a place on the earth to east, north, up, relative to `origin`."""
     latitude = radians(origin.latitude)
     meridian_m, normal_m = _radii(origin)
     east = normal_m * cos(radians(place.latitude)) * radians(_in_turn(place.longitude - origin.longitude))
@@ -83,5 +83,5 @@ def _radii(origin: GpsPlace) -> tuple[float, float]:
 
 
 def _in_turn(degrees_east: float) -> float:
-    """Return an angle between -180 and 180 degrees."""
+    """Return an equal angle between -180 and 180 degrees."""
     return (degrees_east + 180) % 360 - 180

@@ -1,8 +1,8 @@
-"""The guard: a separate process that owns all links, and ends all flights when its parent is gone.
+"""The guard: a separate process that owns all links, and ends all flights when its parent process is gone.
 
-It reads orders from standard input, and writes states to standard output (`messages.py`). When the input ends, the
-parent has died, or SIGTERM arrives, vehicles that were commanded land, or hold, as set in the fleet file; then the
-guard ends. Ctrl-C is left to the parent.
+The guard reads orders from standard input, and writes states to standard output (`messages.py`). When the input ends,
+the parent has died, or SIGTERM arrives, commanded vehicles land or hold, as set in the fleet file, and the guard ends.
+Only the parent handles Ctrl-C.
 
     python -m robochoc.vehicles.guard
 """
@@ -52,12 +52,12 @@ REPORT_S = 0.25
 """The time between two reports of an unchanged state, in seconds."""
 _ORDERS_MAX = 1 << 20
 _SPARE_S = 20.0
-"""The final commands may wait some seconds for their answers."""
+"""Additional time for ending all flights, in seconds: the final commands may wait some seconds for answers."""
 Send = Callable[[FromGuard], None]
 
 
 class _Flight(threading.Thread):
-    """The thread of one pilot."""
+    """Runs one pilot in a thread."""
 
     def __init__(self, name: str, autopilot: Autopilot, fleet: Fleet, traffic: Traffic, send: Send) -> None:
         super().__init__(name=f"pilot of {name}", daemon=True)
@@ -86,7 +86,7 @@ class _Flight(threading.Thread):
 
 
 class VehicleGuard:
-    """Owns the vehicles' links. `send` sends a message to the parent; `open_autopilot` opens a link by vehicle name."""
+    """Owns the vehicles' links. `send` sends a message to the parent; `open_autopilot` opens the link of a vehicle."""
 
     def __init__(self, fleet: Fleet, open_autopilot: Callable[[str], Autopilot], send: Send) -> None:
         self.at_end = fleet.end
@@ -105,7 +105,7 @@ class VehicleGuard:
         """Obey an order. If that fails, end all flights."""
         try:
             self._obey(order)
-        except Exception as error:  # noqa: BLE001 - the parent reports it; no vehicle may be left in the air
+        except Exception as error:  # noqa: BLE001 - the parent reports the error; no vehicle may be left in the air
             self.fail(error)
 
     def fail(self, error: Exception) -> None:
@@ -141,7 +141,7 @@ class VehicleGuard:
     def end(self, how: AtEnd, *, waits: bool) -> None:
         """End all flights."""
         if how == AtEnd.LAND:
-            with suppress(Exception):  # without a plan each vehicle lands where it is, after some time
+            with suppress(Exception):  # without a plan each vehicle lands in place, after some time
                 self._traffic.bring_down()
         for flight in self._flights.values():
             flight.pilot.end(how, waits=waits)
@@ -158,7 +158,7 @@ class VehicleGuard:
 
 
 class Orders:
-    """Orders from standard input."""
+    """Reads orders from standard input."""
 
     def __init__(self) -> None:
         self._parent = os.getppid()
@@ -168,7 +168,7 @@ class Orders:
 
     @property
     def ended(self) -> bool:
-        """Whether the input has ended, or the parent has died: robots' processes, too, may keep the pipe open."""
+        """Whether the input has ended or the parent has died; robots' processes may keep the pipe open after that."""
         return self._is_closed or os.getppid() != self._parent
 
     def next(self, wait_s: float) -> ToGuard | None:
@@ -184,9 +184,9 @@ class Orders:
 
 
 class _LineWriter:
-    """Writes lines to the original standard output. The new one discards the log of MAVSDK and the warnings of cflib.
+    """Writes lines to the original standard output, while a new one discards MAVSDK's log and cflib's warnings.
 
-    Writing never waits for a parent that does not read: states are dropped instead.
+    Writing never waits for a parent that does not read; states are dropped instead.
     """
 
     def __init__(self) -> None:
@@ -224,7 +224,7 @@ def main() -> None:
 
 
 def _wait_for_setup(orders: Orders, send: Send) -> VehicleGuard | None:
-    """Return the guard of the fleet in the first `GuardSetup`; None if the parent ends before."""
+    """Return a guard for the fleet in the first `GuardSetup`; None if the parent ends before."""
     while not orders.ended:
         order = orders.next(STEP_S)
         if isinstance(order, GuardSetup):
@@ -233,7 +233,7 @@ def _wait_for_setup(orders: Orders, send: Send) -> VehicleGuard | None:
 
 
 def _guard_of(fleet: Fleet, send: Send) -> VehicleGuard:
-    # Imported here: a broken library is reported by the parent.
+    # Imported here, so that the parent reports a broken library.
     match fleet.kind:
         case VehicleKind.MAVLINK:
             from robochoc.vehicles.mavsdk_autopilot import MavsdkAutopilot  # noqa: PLC0415
@@ -248,7 +248,7 @@ def _guard_of(fleet: Fleet, send: Send) -> VehicleGuard:
 def serve_orders(guard: VehicleGuard, orders: Orders, terminated: threading.Event) -> None:
     """Obey orders until all flights have ended, or end them if the parent is gone.
 
-    When the parent dies, landings are not waited for.
+    If the parent has died, there is no wait for landings.
 
     Raises:
         TimeoutError: A pilot hangs.

@@ -1,6 +1,6 @@
 """The client of the guard process: sends orders to it, and receives the vehicles' states.
 
-A sink and a source with the same fleet file share one guard; the last user ends it.
+A sink and a source with the same fleet file share one guard process; the last user ends it.
 """
 
 from __future__ import annotations
@@ -41,9 +41,9 @@ from robochoc.vehicles.messages import (
 )
 
 SILENT_S = 20.0
-"""A guard that sends nothing for a longer time counts as hanging: pilots may wait some seconds for an answer."""
+"""The time without messages after which a guard counts as hanging: pilots may wait some seconds for an answer."""
 START_S = 60.0
-"""The longest time until its first message: on a busy machine, starting the guard and its links is slow."""
+"""The longest time until the guard's first message: on a busy machine, starting the guard and its links is slow."""
 _SPARE_S = 5.0
 _UNWRITABLE = "/proc"
 """A folder in which not even root can create files."""
@@ -52,11 +52,11 @@ _DONE = (FlightPhase.ARRIVED, FlightPhase.LANDED, FlightPhase.OUT)
 
 
 class GuardError(RobochocError):
-    """The guard process has ended or failed. The message states the behaviour of the vehicles."""
+    """The guard process has ended or failed. The message describes what the vehicles will do."""
 
 
 class GuardClient:
-    """A guard process for `fleet`, which is ended by `close`. It and its methods raise `GuardError`."""
+    """Starts a guard process for `fleet`, and ends it by `close`. The constructor and methods raise `GuardError`."""
 
     def __init__(self, fleet: Fleet) -> None:
         self.fleet = fleet
@@ -93,7 +93,7 @@ class GuardClient:
         self._send(Permit())
 
     def fly(self, targets: Mapping[str, VehicleTarget]) -> None:
-        """Send vehicles to their targets, which replace earlier ones."""
+        """Send vehicles to their targets, which replace earlier targets."""
         self._order += 1
         self._orders |= dict.fromkeys(targets, self._order)
         self._sent_s = time.monotonic()
@@ -102,10 +102,10 @@ class GuardClient:
     def end(self, how: AtEnd, *, waits: bool) -> None:
         """End all flights, and wait until each vehicle has obeyed; with `waits`, until landing vehicles are down.
 
-        Vehicles that have to land one after the other, since one is above another's place, are waited for.
+        Vehicles that must land one after another, since one is above another's place, are waited for in any case.
 
         Raises:
-            GuardError: The guard was lost before: vehicles then follow their own failsafe.
+            GuardError: The guard was lost; vehicles then follow their own failsafe.
         """
         self._ends = True
         with suppress(GuardError):
@@ -120,7 +120,7 @@ class GuardClient:
             self.check()
 
     def wait_for(self, condition: Callable[[], bool], within_s: float) -> bool:
-        """Wait for `condition` on the states; return whether it was met in time."""
+        """Wait until the states meet `condition`; return whether they did in time."""
         until = time.monotonic() + within_s
         with self._changed:
             while not condition():
@@ -149,19 +149,19 @@ class GuardClient:
 
     @property
     def is_flying(self) -> bool:
-        """Whether vehicles are on the way to their targets, within the time limit."""
+        """Whether vehicles are on their way to their targets, within the time limit."""
         in_time = time.monotonic() - self._sent_s < self.fleet.time_s
         return in_time and not all(map(self.is_done, self._orders))
 
     def is_done(self, name: str) -> bool:
-        """Return whether a vehicle has completed its newest order: it has arrived, landed, or is out of order."""
+        """Return whether a vehicle has completed its newest order: it has arrived or landed, or is out of order."""
         state = self.states.get(name)
         return state is not None and state.phase in _DONE and state.order == self._orders.get(name)
 
     def close(self) -> None:
-        """End the process. When its input ends, the guard ends all flights.
+        """End the guard process, which ends all flights when its input ends.
 
-        If the guard was lost, another guard ends them.
+        If the guard was lost, another guard ends the flights.
         """
         self._shut()
         if self._orders and not self._has_ended:
@@ -170,7 +170,7 @@ class GuardClient:
                 _recover(msgspec.structs.replace(self.fleet, vehicles=flown))
 
     def recover(self) -> None:
-        """End the flights of vehicles that another guard has left armed, and wait until they have ended."""
+        """End the flights of vehicles left armed by another guard, and wait until these flights have ended."""
         self._ends = True
         self._send(Recover(self.fleet.end))
         until = time.monotonic() + self.fleet.connect_s + END_S + _SPARE_S
@@ -203,7 +203,7 @@ class GuardClient:
                 raise BrokenPipeError
             os.write(self._process.stdin.fileno(), content)
         except (OSError, ValueError):
-            self.check()  # a message of the guard may state the reason
+            self.check()  # a message from the guard may state the reason
             raise self._lost("the guard process has ended") from None  # the reader has not noticed it yet
 
     def _read(self) -> None:
@@ -242,10 +242,10 @@ def _recover(fleet: Fleet) -> None:
 
 
 def _environment(kind: VehicleKind) -> dict[str, str]:
-    """Return the environment of the guard, in which MAVSDK writes no files that it would leave behind when killed.
+    """Return environment variables for the guard with which MAVSDK writes no files, which would remain if killed.
 
-    These files are descriptions of cameras and the like. MAVSDK 4.1 continues without them if no folder can be created,
-    but ends if the temporary folder does not exist.
+    Such files are descriptions of cameras, for example. MAVSDK 4.1 continues without these files if no folder can be
+    created, but ends if the temporary folder does not exist.
     """
     leaves_files = kind == VehicleKind.MAVLINK and Path(_UNWRITABLE).is_dir()
     nowhere = {"TMPDIR": _UNWRITABLE, "XDG_CACHE_HOME": _UNWRITABLE} if leaves_files else {}
@@ -253,13 +253,13 @@ def _environment(kind: VehicleKind) -> dict[str, str]:
 
 
 class _Shared:
-    """The guards of this process, by fleet file, with the number of users of each."""
+    """Shares the guards of this process by fleet file, and counts the users of each guard."""
 
     def __init__(self) -> None:
         self._open: dict[Path, tuple[GuardClient, int]] = {}
 
     def enter(self, path: Path, fleet: Fleet) -> GuardClient:
-        """Return the guard for a fleet file; start it for the first user."""
+        """Return the guard for a fleet file; start the guard for the first user."""
         key = resolved(path)
         guard, users = self._open.get(key, (None, 0))
         guard = guard or GuardClient(fleet)
@@ -267,7 +267,7 @@ class _Shared:
         return guard
 
     def leave(self, path: Path) -> None:
-        """Release the guard, and end it after its last user."""
+        """Release the guard for a fleet file, and end it after its last user."""
         key = resolved(path)
         guard, users = self._open.pop(key)
         if users > 1:

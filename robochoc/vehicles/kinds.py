@@ -1,4 +1,4 @@
-"""The kinds of vehicles in a fleet: the syntax of their links, and defaults that fit their size."""
+"""The kinds of vehicles in a fleet: the syntax of their links, and defaults for their size."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ _HOST = r"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
 
 @dataclass(frozen=True)
 class VehicleRules:
-    """The fields of a fleet file of one kind, and their default values."""
+    """The rules for fleet files with one kind of vehicles, and the default values of fields."""
 
     link: re.Pattern[str]
     links: str
     """The syntax of a link, for error messages."""
     example: str
     entries: tuple[str, ...]
-    """Names of entries that other kinds do not have."""
+    """The names of entries that other kinds do not have."""
     takeoff_m: float
     least_takeoff_m: float
     near_m: float
     distance_m: float
     renews_m: float
-    """A vehicle gets the next set point on its line when it is within this distance of the last one."""
+    """The distance to the last set point at which a vehicle gets the next one on its line, in metres."""
     connect_s: float
-    """The longest time from the first message of a vehicle until it has reported everything. 0: as a silent one."""
+    """The longest time from a vehicle's first message until it has reported everything. 0: as for a silent vehicle."""
     alone: str
-    """The behaviour of vehicles without a guard, for error messages."""
+    """The behaviour of vehicles after the loss of the guard, for error messages."""
 
 
 class VehicleKind(StrEnum):
-    """A kind of vehicle, by the name of its sink."""
+    """A kind of vehicle; its value is the name of the sink."""
 
     MAVLINK = "mavlink"
     CRAZYFLIE = "crazyflie"
@@ -57,7 +57,7 @@ _RULES = {
         least_takeoff_m=0.5,
         near_m=0.5,
         distance_m=1.0,
-        renews_m=2.0,  # ArduCopter brakes for each new one
+        renews_m=2.0,  # ArduCopter brakes for each new set point
         connect_s=0.0,
         alone="vehicles follow their own failsafe",
     ),
@@ -75,7 +75,7 @@ _RULES = {
         least_takeoff_m=0.2,
         near_m=0.1,
         distance_m=0.4,
-        renews_m=0.3,  # each is a command by radio, and a new trajectory
+        renews_m=0.3,  # each set point is a radio command and a new trajectory
         connect_s=60.0,
         alone="vehicles fly to their targets, and hover there",
     ),
@@ -88,7 +88,7 @@ _OWN_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
 
 
 def shared_port(url: str, other: str) -> str:
-    """Return the port at which two links would both receive on this machine; empty if there is none.
+    """Return the port on which two links would both receive on this machine; empty if there is none.
 
     >>> shared_port("udpin://0.0.0.0:14540", "udpin://127.0.0.1:14540")
     '14540'
@@ -103,7 +103,7 @@ def shared_port(url: str, other: str) -> str:
 
 
 def address_of(url: str) -> str:
-    """Return the part of a link that identifies the vehicle: without the dongle of a Crazyflie.
+    """Return the part of a link that identifies the vehicle, without the dongle of a Crazyflie.
 
     >>> address_of("radio://1/80/2M/e7e7e7e701")
     'radio 80 2M E7E7E7E701'

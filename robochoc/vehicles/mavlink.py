@@ -1,4 +1,4 @@
-"""`mavlink:FILE` as a sink and as a source: vehicles whose autopilots speak MAVLink, such as PX4."""
+"""The sink and the source `mavlink:FILE`, for vehicles with MAVLink autopilots such as PX4."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ require_library("mavsdk")
 
 
 class MavlinkSink(FleetSink):
-    """Flies decisions with vehicles that speak MAVLink."""
+    """Flies decisions with MAVLink vehicles."""
 
     kind = VehicleKind.MAVLINK
 
 
 class MavlinkSource(FleetSource):
-    """Reports of vehicles that speak MAVLink."""
+    """Reads reports of MAVLink vehicles."""
 
     kind = VehicleKind.MAVLINK

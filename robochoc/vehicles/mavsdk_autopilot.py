@@ -1,12 +1,12 @@
-"""Autopilots that speak MAVLink. Only this module uses MAVSDK (mavsdk 4): a library in this process, without a server.
+"""Autopilots with MAVLink. Only this module uses MAVSDK (mavsdk 4), a library in this process without a server.
 
 Each vehicle has its own instance of MAVSDK, so that two vehicles may have the same MAVLink system number. MAVSDK
 repeats set points 20 times a second; PX4 requires at least 2.
 
-ArduCopter differs from PX4. Its GUIDED mode corresponds to PX4's offboard mode (MAVSDK uses that name). It arms in few
-modes only: it is switched to GUIDED before arming, and takes off some time later. It has no separate mode for a
-take-off. PX4 keeps its heading if a set point has none; ArduCopter needs one, and gets the heading that the vehicle had
-at the first set point.
+ArduCopter differs from PX4. Its GUIDED mode corresponds to PX4's offboard mode, which is also its name in MAVSDK.
+ArduCopter arms only in a few modes: it is switched to GUIDED before arming, and takes off some time later. It has no
+separate mode for the take-off. PX4 keeps its heading if a set point has no heading; ArduCopter requires a heading, and
+gets the heading that the vehicle had at the first set point.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from robochoc.vehicles.frames import GpsPlace, enu_from_gps, enu_of, gps_of, ned
 
 _IN_AIR = {LandedState.IN_AIR, LandedState.TAKING_OFF, LandedState.LANDING}
 _ANY_YAW = math.nan
-"""PX4 keeps its heading if a set point has none."""
+"""A set point without a heading, for which PX4 keeps its heading."""
 _DO_SET_MODE, _CUSTOM_MODE, _GUIDED = 176, 1, 4
 _AUTOPILOT = 1
 """The component number of an autopilot (MAV_COMP_ID_AUTOPILOT1)."""
@@ -41,7 +41,7 @@ _ANSWER_S, _POLL_S, _RISE_S = 5.0, 0.1, 0.5
 
 
 class MavsdkAutopilot(Autopilot):
-    """The autopilot at the other end of `link`. With an `origin`, it works with places on the earth."""
+    """Controls the autopilot at the other end of `link`. With an `origin`, places are sent as places on the earth."""
 
     def __init__(self, link: VehicleLink, origin: GpsPlace | None) -> None:
         self.url = link.url
@@ -149,12 +149,12 @@ class MavsdkAutopilot(Autopilot):
             self._follows = True
 
     def hold(self) -> None:
-        """Stay where it is."""
+        """Stay in place."""
         self._command("hold", self._action.hold)
         self._follows = False
 
     def land(self) -> None:
-        """Land where it is."""
+        """Land in place."""
         self._command("land", self._action.land)
         self._follows = False
 
@@ -169,12 +169,12 @@ class MavsdkAutopilot(Autopilot):
             self._heartbeat_at = time.monotonic()
 
     def _place_received(self, message: Any, _data: object) -> None:  # noqa: ANN401 - MAVSDK's, in its own thread
-        """Record the time of a place: MAVSDK keeps the last place, however old it is."""
+        """Record the time of a position report: MAVSDK returns the last position, regardless of its age."""
         if self._is_from_autopilot(message):
             self._place_at = time.monotonic()
 
     def _is_from_autopilot(self, message: Any) -> bool:  # noqa: ANN401 - MAVSDK's
-        """Return whether a message is from the autopilot: cameras and on-board computers send heartbeats, too."""
+        """Return whether a message is from the autopilot; cameras and on-board computers send heartbeats, too."""
         return bool(message.system_id == self._system_number and message.component_id == _AUTOPILOT)
 
     def _place(self) -> Point | None:
@@ -191,7 +191,7 @@ class MavsdkAutopilot(Autopilot):
         return x + own_x, y + own_y, z + own_z
 
     def _enter_guided_mode(self) -> None:
-        """Switch ArduCopter to its mode GUIDED, and wait for it. MAVSDK itself does so only with a set point."""
+        """Switch ArduCopter to its GUIDED mode, and wait for the mode. MAVSDK itself does so only with a set point."""
         fields: dict[str, float] = {f"param{number}": 0.0 for number in range(1, 8)}
         fields |= {"param1": _CUSTOM_MODE, "param2": _GUIDED, "command": _DO_SET_MODE, "confirmation": 0}
         fields |= {"target_system": self._system_number, "target_component": _AUTOPILOT}

@@ -1,4 +1,4 @@
-"""Messages between robochoc and the guard process: one a line, in JSON."""
+"""Messages between robochoc and the guard process: JSON, one message per line."""
 
 from __future__ import annotations
 
@@ -22,24 +22,24 @@ class FlightPhase(StrEnum):
     LANDING = "landing"
     LANDED = "landed"
     OUT = "out"
-    """Out of order, for the reason in `why`. The vehicle is brought to the ground if that is possible."""
+    """Out of order, for the reason in `why`. The vehicle is landed if possible."""
 
 
 class VehicleTarget(msgspec.Struct, frozen=True):
-    """The target of a vehicle, in the team's frame; it `lands` there, or stays in the air."""
+    """The target of a vehicle in the team's frame, where it `lands` or stays in the air."""
 
     at: Point
     lands: bool = False
 
 
 class GuardSetup(msgspec.Struct, frozen=True, tag=True):
-    """To the guard, as the first message."""
+    """To the guard, as the first message: the fleet."""
 
     fleet: Fleet
 
 
 class Permit(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: vehicles may be armed. Before this message no vehicle is commanded."""
+    """To the guard: vehicles may be armed. No vehicle is commanded before this message."""
 
 
 class Fly(msgspec.Struct, frozen=True, tag=True):
@@ -50,14 +50,14 @@ class Fly(msgspec.Struct, frozen=True, tag=True):
 
 
 class End(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: end all flights. With `waits` it continues until landing vehicles are on the ground."""
+    """To the guard: end all flights. With `waits`, the guard continues until landing vehicles are on the ground."""
 
     how: AtEnd
     waits: bool
 
 
 class Recover(msgspec.Struct, frozen=True, tag=True):
-    """To the guard: end the flights of vehicles that a lost guard has left armed."""
+    """To the guard: end the flights of vehicles left armed by a lost guard."""
 
     how: AtEnd
 
@@ -68,19 +68,19 @@ class VehicleState(msgspec.Struct, frozen=True, tag=True):
     vehicle: str
     phase: FlightPhase
     order: int = 0
-    """The newest order that it has accepted."""
+    """The number of the newest order accepted by the vehicle."""
     place: Point | None = None
-    """In the team's frame; None: not reported yet."""
+    """The place in the team's frame; None: not reported yet."""
     battery: float | None = None
-    """1 is full; None: not measured."""
+    """The charge of the battery; 1 is full. None: not measured."""
     healthy: bool = False
     """Whether the autopilot would allow arming."""
     in_air: bool = False
     commanded: bool = False
-    """Whether it was ever commanded."""
+    """Whether the vehicle was ever commanded."""
     why: str = ""
     waits_for: str = ""
-    """Another vehicle, which has to move out of the way first."""
+    """The name of another vehicle that has to move out of the way first."""
 
 
 class GuardEnded(msgspec.Struct, frozen=True, tag=True):
@@ -88,13 +88,13 @@ class GuardEnded(msgspec.Struct, frozen=True, tag=True):
 
 
 class NoRoutes(msgspec.Struct, frozen=True, tag=True):
-    """From the guard: an order is not flown, since no routes were found that keep vehicles apart."""
+    """From the guard: an order is not flown, since no routes keep the vehicles apart."""
 
     why: str
 
 
 class GuardFailed(msgspec.Struct, frozen=True, tag=True):
-    """From the guard: it has failed."""
+    """From the guard: the guard has failed."""
 
     why: str
 
@@ -102,7 +102,7 @@ class GuardFailed(msgspec.Struct, frozen=True, tag=True):
 ToGuard = GuardSetup | Permit | Fly | End | Recover
 FromGuard = VehicleState | NoRoutes | GuardEnded | GuardFailed
 LINE_MAX = 4096
-"""The guard sends no longer lines: a pipe accepts shorter ones completely, or not at all (PIPE_BUF)."""
+"""The maximum length of a line from the guard: a pipe accepts lines up to this length atomically (PIPE_BUF)."""
 
 
 def line_of(message: ToGuard | FromGuard) -> bytes:

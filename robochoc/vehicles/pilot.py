@@ -1,13 +1,13 @@
-"""A pilot flies one vehicle: it follows orders, watches the vehicle, and ends its flight.
+"""A pilot flies one vehicle: it follows orders, monitors the vehicle, and ends its flight.
 
-`step` is called several times a second. It executes the first row of a table whose state, event and guard hold:
-`FLIGHT` while the vehicle follows orders, `END` once the flight has to end, `RECOVERY` after another guard was lost.
-The tables are at the end of the class, to be reviewed beside the firmware's documentation.
+`step` is called several times a second. It executes the first row of a transition table whose state, event and guard
+hold. The tables are `FLIGHT` while the vehicle follows orders, `END` once the flight has to end, and `RECOVERY` after
+another guard process was lost. They are at the end of the class, for reviews beside the firmware's documentation.
 
-The only input besides the `Autopilot` is a clock. A vehicle that does not obey is `OUT` for good: it lands where it is,
+The only input besides the `Autopilot` is a clock. A vehicle that does not obey is permanently `OUT`: it lands in place,
 and follows no further order. A vehicle that a person or its own failsafe has taken over gets no further command, not
-even at the end. `Traffic` decides when the vehicle may take off, its set points, and when it may land, so that vehicles
-keep their distance.
+even at the end. To keep vehicles apart, `Traffic` decides when the vehicle may take off, its set points, and when it
+may land.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ from robochoc.vehicles.traffic import Clearance, Traffic
 _NOT_OURS = "it no longer follows set points: its mode is"
 
 Condition = Callable[["Pilot", Telemetry], object]
-"""An event or a guard: it holds if its result is true. A text is the reason for which a vehicle is `OUT`."""
+"""An event or a guard, which holds if its result is true. If the result is a text, it is the reason for `OUT`."""
 Action = Callable[["Pilot", Telemetry, str], object]
-"""An action; its last argument is the reason. The state changes unless it returns False."""
+"""An action, called with the reason as the last argument. The state changes unless the action returns False."""
 
 
 def _always(_pilot: Pilot, _telemetry: Telemetry) -> bool:
@@ -53,7 +53,7 @@ def _nothing(_pilot: Pilot, _telemetry: Telemetry, _reason: str) -> None:
 
 
 class Transition(NamedTuple):
-    """A row of a table."""
+    """A row in a transition table."""
 
     name: str
     states: frozenset[FlightPhase]
@@ -61,9 +61,9 @@ class Transition(NamedTuple):
     guard: Condition = _always
     action: Action = _nothing
     next: FlightPhase | None = None
-    """The next state; None: the same."""
+    """The next state; None: the state does not change."""
     ends: bool = False
-    """True if the flight has ended."""
+    """True if this transition ends the flight."""
 
 
 _ALL = frozenset(FlightPhase)
@@ -80,9 +80,9 @@ _AIR = _CLIMBING | _WAY
 
 
 class Pilot:
-    """Flies the vehicle `name` by `autopilot`, within the limits of `fleet`.
+    """Flies the vehicle `name` with `autopilot`, within the limits in `fleet`.
 
-    Methods other than `step` only store a request, and may be called by another thread.
+    Methods other than `step` only store a request, and may be called from another thread.
     """
 
     ended: bool = False
@@ -123,11 +123,11 @@ class Pilot:
         self._requested = order, target
 
     def end(self, how: AtEnd, *, waits: bool) -> None:
-        """Request the end of the flight. A second call may drop the wait."""
+        """Request the end of the flight. A second call can cancel the wait."""
         self._ending = how, waits
 
     def recover(self, how: AtEnd) -> None:
-        """Request the end of a flight that a lost guard has begun, if the vehicle is armed."""
+        """Request the end of a flight that was begun by a lost guard process, if the vehicle is armed."""
         self._recovers = True
         self._ending = how, False
 
@@ -136,7 +136,7 @@ class Pilot:
         try:
             self._telemetry = self._autopilot.telemetry()
             self._react(self._telemetry)
-        except Exception as error:  # noqa: BLE001 - for any error: no vehicle may be left in the air
+        except Exception as error:  # noqa: BLE001 - no error may leave a vehicle in the air
             self._fail(f"its pilot failed: {type(error).__name__}: {shortened(on_one_line(str(error)))}")
         if self._commanded:
             self._takeover.command()
@@ -166,7 +166,7 @@ class Pilot:
             self._drop_out(telemetry, str(refused))
 
     def _run(self, table: tuple[Transition, ...], telemetry: Telemetry) -> None:
-        """Execute the first row of `table` that applies. The event of adjacent rows is evaluated once."""
+        """Execute the first applicable row in `table`. An event in adjacent rows is evaluated once."""
         event, found = None, None
         for row in table:
             if self._phase not in row.states:
@@ -187,7 +187,7 @@ class Pilot:
         self._phase, self._since_s = phase, self._clock()
 
     def _fail(self, why: str) -> None:
-        """Land a vehicle whose step has failed, using its last telemetry. `Traffic` may be the cause of the failure."""
+        """Land a vehicle whose step has failed, possibly in `Traffic`, using its last telemetry."""
         with suppress(Exception):
             if self._phase != FlightPhase.OUT:
                 self._drop_out(self._telemetry, why)
@@ -235,7 +235,7 @@ class Pilot:
         return f"{_NOT_OURS} {telemetry.mode_and_pilot}" if self._takeover.detect(telemetry) else ""
 
     def _takeover_lasts(self, telemetry: Telemetry) -> str:
-        """A landing vehicle may report another mode for a moment."""
+        """Check the duration, since a landing vehicle may report another mode for a moment."""
         return self._is_taken_over(telemetry) if self._takeover.lasts else ""
 
     def _alarm(self, telemetry: Telemetry) -> str:
@@ -247,7 +247,7 @@ class Pilot:
         return ""
 
     def _motors_stop(self, telemetry: Telemetry) -> str:
-        """Without telemetry, MAVSDK reports that motors have stopped."""
+        """Check that telemetry arrives: without telemetry, MAVSDK reports that motors have stopped."""
         stopped = self._elapsed_s > MODE_S and not telemetry.armed and telemetry.has_heartbeat
         return "its motors have stopped" if stopped else ""
 
@@ -268,7 +268,7 @@ class Pilot:
         return f"it has not reached the height of its take-off within {CLIMB_S:g} s" if late else ""
 
     def _touches_down(self, telemetry: Telemetry) -> bool:
-        """A vehicle that was armed a moment ago may not have reported it yet."""
+        """Allow some time, since a vehicle that was armed a moment ago may not have reported it yet."""
         known = self._was_armed or self._elapsed_s > MODE_S
         return known and telemetry.has_heartbeat and not telemetry.armed and not telemetry.in_air
 
@@ -300,7 +300,7 @@ class Pilot:
         return f"its mode is {telemetry.mode_and_pilot}" if telemetry.is_flown_by_others else ""
 
     def _may_land(self, telemetry: Telemetry) -> bool:
-        """A clearance to land is also given outside of the fence, where the vehicle is."""
+        """Return whether the vehicle may land, which is also possible in place outside the fence."""
         if not telemetry.in_air and self._phase in _GROUND:
             return False
         self._clearance = self._traffic.clearance(self.name)
@@ -333,7 +333,7 @@ class Pilot:
         return math.dist(self._target.at, telemetry.place) <= self._fleet.near_m
 
     def _may_fall(self, _telemetry: Telemetry) -> bool:
-        """No vehicle is directly below, or this vehicle has waited long enough."""
+        """Return whether no vehicle is directly below, or this vehicle has waited long enough."""
         return self._elapsed_s > GIVE_WAY_S or self._traffic.is_clear_below(self.name)
 
     # Actions
@@ -359,7 +359,7 @@ class Pilot:
             self._sent = self._clearance
 
     def _leave_climb(self, telemetry: Telemetry, reason: str) -> bool:
-        """Some autopilots refuse commands until the take-off is complete."""
+        """Land or fly on; repeated, since some autopilots refuse commands until the take-off is complete."""
         try:
             (self._land if self._clearance.lands else self._send_set_point)(telemetry, reason)
         except RefusedError:
@@ -425,7 +425,7 @@ class Pilot:
         return self._how == AtEnd.LAND and not self._is_my_turn(telemetry)
 
     def _obeys(self, telemetry: Telemetry) -> bool:
-        """The command is sent here: a refused command is repeated."""
+        """Send the command, and return whether it was accepted; a refused command is repeated."""
         self._obeyed = self._is_brought_down(telemetry, self._how)
         return self._obeyed
 
@@ -446,7 +446,7 @@ class Pilot:
         self._why = self._why or reason
 
     def _is_my_turn(self, telemetry: Telemetry) -> bool:
-        """Return whether a vehicle may land now at the end; if not, send it to its landing place."""
+        """Return whether the vehicle may land now at the end; if not, send it to its landing place."""
         if not telemetry.in_air or self._phase == FlightPhase.LANDING or self._clock() - self._turn_s > TURN_S:
             return True
         if self._phase == FlightPhase.OUT:
@@ -461,7 +461,7 @@ class Pilot:
         return False
 
     def _is_brought_down(self, telemetry: Telemetry, how: AtEnd) -> bool:
-        """Send the final command again until it is accepted; return whether the vehicle lands, holds or is disarmed."""
+        """Repeat the final command until it is accepted; return whether the vehicle lands, holds or is disarmed."""
         now = self._clock()
         if self._takeover.detect(telemetry):
             return True
@@ -478,7 +478,7 @@ class Pilot:
         return True
 
     def _is_disarmed(self, telemetry: Telemetry) -> bool:
-        """Return whether a vehicle on the ground was disarmed; a vehicle in the air refuses."""
+        """Disarm the vehicle, which is refused in the air; return whether the vehicle is disarmed."""
         if telemetry.in_air:
             return False
         try:

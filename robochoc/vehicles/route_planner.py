@@ -1,11 +1,11 @@
-"""Plans routes of vehicles to their targets that keep the fleet's distance.
+"""Plans routes on which vehicles fly to their targets and keep the fleet's distance.
 
-The planner is that of the simulated flight (`robochoc.flight.coordination`). It gives moves that are safe one after the
-other; only their order is used here. `traffic.py` decides by telemetry when each move may begin: a plan contains no
-times, so vehicles may be late.
+The planner is that of the simulated flight (`robochoc.flight.coordination`). It returns moves that are safe one after
+the other, of which only the paths and their order are used. A plan contains no times, so vehicles may be late:
+`traffic.py` decides by telemetry when each move may begin.
 
-Vehicles on the ground first rise straight up, as their autopilots do. If the place above one is not free, vehicles in
-the air fly to their targets before that.
+Vehicles on the ground first rise straight up, as their autopilots do. If the place above one of these is not free,
+vehicles in the air fly to their targets first.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from robochoc.system.errors import RobochocError
 from robochoc.vehicles.fleet import Fleet, point_text
 
 _ORDERS = 6
-"""The number of orders of the vehicles that are tried until all routes are within the fence."""
+"""The maximum number of vehicle orders that are tried until all routes are within the fence."""
 _ROUNDING_M = 1e-6
 _SPOTS = 2_000
 _RING = 8
 
 
 class RouteError(RobochocError):
-    """There are no routes that keep vehicles apart. The message names the vehicles, or the obstacle."""
+    """No routes keep the vehicles apart. The message names the vehicles or the obstacle."""
 
 
 @dataclass(frozen=True)
 class PlannedLeg:
-    """A vehicle's path (K + 1, 3) from rest to rest, in metres."""
+    """The path (K + 1, 3) of a vehicle from rest to rest, in metres."""
 
     name: str
     path: Array
@@ -50,7 +50,7 @@ class RoutePlanner:
     Args:
         fleet: The fleet.
         standing: The places of vehicles that stay, by name.
-        distance_m: The distance between vehicles, which may differ from that of the fleet file.
+        distance_m: The distance between vehicles, which may differ from the value in the fleet file.
     """
 
     def __init__(self, fleet: Fleet, standing: Mapping[str, Point], distance_m: float) -> None:
@@ -64,7 +64,7 @@ class RoutePlanner:
     def legs(
         self, starts: Mapping[str, Point], goals: Mapping[str, Point], climbing: Mapping[str, float]
     ) -> list[PlannedLeg]:
-        """Return the legs of all vehicles from `starts` to `goals`, in an order in which each is safe.
+        """Return the legs of all vehicles from `starts` to `goals`, in an order in which each leg is safe.
 
         `climbing` has the take-off heights of vehicles on the ground, by name. Raises `RouteError`.
         """
@@ -95,11 +95,11 @@ class RoutePlanner:
     def descents(self, rests: Mapping[str, Point], grounds: Mapping[str, float]) -> list[PlannedLeg]:
         """Return the legs for landing all vehicles in place, the lowest first. Raises `RouteError`.
 
-        A vehicle above the landing place of another lands beside it.
+        A vehicle above the landing place of another vehicle lands beside this place.
 
         Args:
             rests: The places of the vehicles, by name.
-            grounds: The heights of the ground below them.
+            grounds: The heights of the ground below the vehicles, by name.
         """
         taken, goals = [*self._standing.values()], dict[str, Point]()
         rests = dict(sorted(rests.items(), key=lambda one: one[1][2]))
@@ -129,7 +129,7 @@ class RoutePlanner:
         return self._space([*map(tuple, path.tolist()), *others]).is_clear(self._flat(path), self._flat(others))
 
     def free_spot(self, at: Point, taken: Sequence[Point]) -> Point | None:
-        """Return the point in the fence nearest to `at` with the fleet's distance, seen from above, from `taken`."""
+        """Return the point in the fence nearest to `at` that, seen from above, keeps the distance from `taken`."""
         low, high, distance_m = self._fence.low, self._fence.high, self._fleet.distance_m
         for x, y in _rings(at[0], at[1], distance_m):
             if (x, y) != at[:2] and not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
@@ -175,7 +175,7 @@ class RoutePlanner:
         return legs
 
     def _moves(self, rests: dict[str, Point], goals: Mapping[str, Point], names: Sequence[str]) -> list[PlannedLeg]:
-        """Return the legs of `names` to their goals, and update the places in `rests`."""
+        """Return the legs of the vehicles `names` to their goals, and update the places in `rests`."""
         if not names:
             return []
         standing = {other: at for other, at in (rests | self._standing).items() if other not in names}
@@ -204,7 +204,7 @@ class RoutePlanner:
         return f"{apart}: less than 'distance', {self._distance_m:g} m"
 
     def _outside(self, legs: Sequence[PlannedLeg]) -> Iterator[str]:
-        """Yield an error text for each route that leaves the fence. Routes may begin outside, and rise there."""
+        """Yield an error text for each route that leaves the fence. Routes may begin, and rise, outside the fence."""
         for leg in legs:
             for x, y, z in leg.path[1:].tolist():
                 rises = [x, y] == leg.path[0, :2].tolist() and z <= self._fence.high[2]
@@ -226,7 +226,7 @@ _BY = "the only route found passes"
 
 
 def _rings(x: float, y: float, distance_m: float) -> Iterator[tuple[float, float]]:
-    """Yield points of the plane in rings around a point, half a distance apart, the nearest first."""
+    """Yield points in rings around a point in the plane, half a distance apart, the nearest first."""
     yield x, y
     for number in range(_RING, _SPOTS):
         ring, step = divmod(number, _RING)
@@ -236,7 +236,7 @@ def _rings(x: float, y: float, distance_m: float) -> Iterator[tuple[float, float
 
 
 def spacing(points: Sequence[Point], downwash: float) -> float:
-    """Return the smallest distance between two of `points`, heights divided by `downwash`."""
+    """Return the smallest distance between two of `points`, with heights divided by `downwash`."""
     rows = squashed(np.array(points, dtype=float).reshape(-1, 3), downwash)
     apart = norms(rows[:, None] - rows[None])
     apart[np.diag_indices(len(rows))] = np.inf

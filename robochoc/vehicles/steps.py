@@ -1,10 +1,10 @@
-"""Routes cut into steps, and the dependencies of each step on steps of other vehicles.
+"""Routes cut into steps, and the dependencies of each step on the steps of other vehicles.
 
-The legs of `route_planner.py` are safe one after the other. So a step may begin as soon as all steps of earlier legs
-that are nearer to it than the distance have been flown. Steps wait for earlier legs only: there is no cycle of waiting,
-and the distance is kept even if a vehicle is late. This is the dependency graph of plans that are executed with delays
+The legs from `route_planner.py` are safe one after the other. So a step may begin as soon as all steps in earlier legs
+that are nearer to it than the distance have been flown. Since steps wait only for earlier legs, there are no cyclic
+waits, and the distance is kept even if a vehicle is late. This is the dependency graph for executing plans with delays
 (W. Hoenig et al., "Persistent and Robust Execution of MAPF Schedules in Warehouses", IEEE Robotics and Automation
-Letters 4(2), 2019, section IV), where legs determine the order of events.
+Letters 4(2), 2019, section IV), where the order of events is that of the legs.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from robochoc.maps.routes.distances import SLACK_M, Array, line_distances, squas
 from robochoc.vehicles.route_planner import PlannedLeg
 
 _PARTS = 32
-"""The largest number of steps of a straight piece."""
+"""The maximum number of steps in a straight piece."""
 
 
 class StepKind(Enum):
-    """The kind of a step. The vehicle's autopilot executes climbs and landings by itself."""
+    """The kind of a step. Climbs and landings are executed by the vehicle's autopilot."""
 
     CLIMB = auto()
     FLY = auto()
@@ -40,9 +40,9 @@ class RouteStep:
     begin: Point
     end: Point
     is_corner: bool
-    """Whether it is the last step of its straight piece."""
+    """Whether this is the last step of its straight piece."""
     needs: dict[str, int] = field(default_factory=dict)
-    """The number of steps of other vehicles, by name, that have to be complete before this step."""
+    """The number of steps that other vehicles must have completed before this step, by vehicle name."""
 
 
 @dataclass(frozen=True)
@@ -64,11 +64,11 @@ def steps_of(
     """Return the steps of each vehicle that has legs.
 
     Args:
-        legs: Legs in an order in which each is safe.
+        legs: Legs in an order in which each leg is safe.
         climbing: Vehicles whose first leg is flown by the autopilot.
         landing: Vehicles that land at the end of their last leg.
         distance_m: The smallest distance between two vehicles.
-        downwash: The number by which heights are divided for distances.
+        downwash: The number by which heights are divided in distances.
     """
     steps: dict[str, list[RouteStep]] = {}
     pieces: list[_Piece] = []
@@ -89,7 +89,7 @@ def steps_of(
 
 
 def _closed(path: Array) -> Array:
-    """Return a path whose last piece leads straight down, maybe with length 0: the autopilot flies it."""
+    """Return a path whose last piece leads straight down, possibly with length 0, and is flown by the autopilot."""
     down = (path[-1, :2] == path[-2, :2]).all() and path[-1, 2] <= path[-2, 2]
     return path if down else np.vstack((path, path[-1]))
 
@@ -110,7 +110,7 @@ def _piece(
 
 
 def _add_waits(steps: list[RouteStep], piece: _Piece, earlier: _Piece, distance_m: float, downwash: float) -> None:
-    """Add to the steps of a piece their dependencies on the steps of an earlier piece."""
+    """Add the dependencies on steps in an earlier piece to the steps of a piece."""
     least = distance_m - SLACK_M
     mine, theirs = _flat(piece.line, downwash), _flat(earlier.line, downwash)
     if line_distances(mine, theirs) >= least:
@@ -134,7 +134,7 @@ def _point(row: Array) -> Point:
 
 
 def length_along(begin: Point, end: Point, place: Point) -> float:
-    """Return the length along a line, from its beginning, of the projection of a place, in metres."""
+    """Return the distance from the beginning of a line to the projection of a place onto the line, in metres."""
     length = math.dist(begin, end)
     if not length:
         return 0.0
@@ -142,7 +142,7 @@ def length_along(begin: Point, end: Point, place: Point) -> float:
 
 
 def on_line(begin: Point, end: Point, length: float) -> Point:
-    """Return the point of a line at a distance from its beginning, in metres."""
+    """Return the point on a line at a distance from its beginning, in metres."""
     share = length / (math.dist(begin, end) or 1.0)
     x, y, z = (b + share * (e - b) for b, e in zip(begin, end, strict=True))
     return x, y, z

@@ -1,6 +1,6 @@
-"""The state reported by the supervisor of a Crazyflie's firmware: the bits of its log variable `supervisor.info`.
+"""The state reported by the supervisor in a Crazyflie's firmware, from the bits of its log variable `supervisor.info`.
 
-Source: the firmware's supervisor.c. Apart from `cflib_autopilot.py`, which needs cflib.
+Source: the firmware's supervisor.c. Separate from `cflib_autopilot.py`, which needs cflib.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Supervisor:
 
     @property
     def arms_itself(self) -> bool:
-        """Whether motors are always armed, as brushed motors are."""
+        """Whether motors are always armed, like brushed motors."""
         return self._has(ARMS_ITSELF)
 
     @property
@@ -41,12 +41,12 @@ class Supervisor:
 
     @property
     def flies(self) -> bool:
-        """Whether motors have had thrust within the last 2 s."""
+        """Whether motors had thrust within the last 2 s."""
         return self._has(FLIES)
 
     @property
     def commands(self) -> bool:
-        """Whether the high-level commander flies it."""
+        """Whether the high-level commander flies the Crazyflie."""
         return self._has(COMMANDS)
 
     @property
@@ -56,14 +56,14 @@ class Supervisor:
 
     @property
     def armed(self) -> bool:
-        """Whether motors run, or a command of ours can start them."""
+        """Whether motors run, or one of our commands can start them."""
         return self.flies or self.commands or (self._has(IS_ARMED) and not self.arms_itself)
 
     @property
     def mode(self) -> str:
-        """The flight mode, named as autopilots name theirs.
+        """The flight mode, with the names used by autopilots.
 
-        A Crazyflie in the air without the high-level commander gets set points from elsewhere: otherwise it would fall.
+        A Crazyflie in the air without the high-level commander must get set points from elsewhere, or it would fall.
         """
         if self.commands:
             return OFFBOARD
@@ -71,7 +71,7 @@ class Supervisor:
 
     @property
     def problem(self) -> str:
-        """The reason why it cannot be armed; empty if it can be, or is armed."""
+        """The reason why the Crazyflie cannot be armed; empty if it can be, or is, armed."""
         for bit, problem in _PROBLEMS.items():
             if self._has(bit):
                 return problem

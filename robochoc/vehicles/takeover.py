@@ -10,7 +10,7 @@ from robochoc.vehicles.limits import MODE_S, SILENCE_S
 
 
 class Takeover:
-    """Watches the modes of one vehicle from its first command on."""
+    """Monitors the modes of one vehicle from its first command on."""
 
     def __init__(self, clock: Callable[[], float]) -> None:
         self._clock = clock
@@ -35,13 +35,13 @@ class Takeover:
 
     @property
     def lasts(self) -> bool:
-        """Whether the other mode has lasted for some time: some autopilots report one briefly after a landing."""
+        """Whether another mode has lasted for some time: some autopilots report one briefly after a landing."""
         return self._clock() - self._foreign_s > MODE_S
 
     def detect(self, telemetry: Telemetry) -> bool:
         """Return whether the vehicle has been taken over, judged by all its telemetry.
 
-        Before the vehicle has obeyed once, its mode may be that from before its first command.
+        Until the vehicle has obeyed once, its mode may be the one from before its first command.
         """
         known = self._was_ours or self._clock() - self._commanded_s > MODE_S
         self._is_taken = self._is_taken or (known and telemetry.is_flown_by_others)
@@ -50,7 +50,7 @@ class Takeover:
     def is_deliberate(self) -> bool:
         """Return whether a vehicle has left our mode by the command of a person or its own failsafe.
 
-        That is assumed if its link had no long silence. After a silence it may have lacked set points.
+        This is assumed unless the link was silent for a long time, since the vehicle may then have lacked set points.
         """
         self._is_taken = self._is_taken or self._silence_s <= SILENCE_S
         return self._is_taken

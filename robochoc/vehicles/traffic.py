@@ -1,14 +1,14 @@
-"""Traffic: clearances of vehicles for their next steps. The order comes from the plan, the places from telemetry.
+"""Traffic control: gives vehicles clearance for their next steps, using the order in a plan and places from telemetry.
 
-`RoutePlanner` plans routes, `steps_of` derives the dependencies of their steps. A vehicle gets a set point on its
-straight line, a short distance ahead, and never beyond the last step that need not wait. So if a vehicle is late or
+`RoutePlanner` plans routes, and `steps_of` derives the dependencies between their steps. A vehicle gets a set point on
+its straight line, a short distance ahead, but not beyond the last step that need not wait. So if a vehicle is late or
 stops, vehicles that need its place wait, and the others continue.
 
 A vehicle that is blown off its line may come near to others, also on its way back. The others then do not fly towards
-it (`_vehicle_in_the_way`). When no vehicle can move, all routes are planned again from the present places.
+this vehicle (`_vehicle_in_the_way`). When no vehicle can move, all routes are planned again from the present places.
 
-The distance between two vehicles is therefore `distance`, less the deviation of each from its line: a vehicle within
-`tolerance_m` of its line (`Fleet`) counts as on it, and others stop for a vehicle farther off.
+The distance between two vehicles is therefore at least `distance`, less the deviations of both from their lines. A
+vehicle within `tolerance_m` (`Fleet`) of its line counts as on the line; others stop for a vehicle farther off.
 """
 
 from __future__ import annotations
@@ -31,15 +31,15 @@ from robochoc.vehicles.steps import RouteStep, StepKind, length_along, on_line, 
 STILL_S = 3.0
 """The time for which vehicles may block each other before routes are planned again, in seconds."""
 _AHEAD_M = 4.0
-"""The distance from a vehicle to its set point; or twice the distance between vehicles, if that is more."""
+"""The distance from a vehicle to its set point, in metres; or twice the distance between vehicles, if that is more."""
 _NEARER_M = 0.02
-"""Smaller approaches to another vehicle are ignored."""
+"""Smaller approaches to another vehicle are ignored, in metres."""
 _ALL_BUT = 0.999
 Line = tuple[Point, Point]
 
 
 class Traffic:
-    """Keeps the vehicles of `fleet` apart. Its methods may be called by several threads."""
+    """Keeps the vehicles in `fleet` apart. Methods may be called from several threads."""
 
     def __init__(self, fleet: Fleet, clock: Callable[[], float] = time.monotonic) -> None:
         self._fleet = fleet
@@ -69,7 +69,7 @@ class Traffic:
         """Plan routes to `targets`.
 
         Raises:
-            RouteError: There are no such routes; all keep their earlier targets.
+            RouteError: No routes were found; all vehicles keep their earlier targets.
         """
         with self._lock:
             before = {name: self._vehicles[name].target for name in targets}
@@ -98,7 +98,7 @@ class Traffic:
                 vehicle.done += 1
 
     def landing(self, name: str) -> None:
-        """Record that a vehicle lands where it is."""
+        """Record that a vehicle lands in place."""
         with self._lock:
             vehicle = self._vehicles[name]
             vehicle.lands = True
@@ -112,12 +112,12 @@ class Traffic:
             vehicle.flies = vehicle.lands = False
             vehicle.setpoint, vehicle.done = vehicle.place, len(vehicle.steps)
             if vehicle.target and not vehicle.target.lands and not self._ends:
-                self._replan()  # it got a new target while landing
+                self._replan()  # the vehicle got a new target while landing
             else:
                 vehicle.target = None
 
     def lose(self, name: str) -> None:
-        """Record that a vehicle is out of control: the others keep clear of it and of the space below it."""
+        """Record that a vehicle is out of control; others keep clear of this vehicle and the space below."""
         with self._lock:
             vehicle = self._vehicles[name]
             if not vehicle.gone:
@@ -127,7 +127,7 @@ class Traffic:
     # Clearances
 
     def clearance(self, name: str) -> Clearance:
-        """Return the clearance of a vehicle for its next step."""
+        """Return a vehicle's clearance for its next step."""
         with self._lock:
             vehicle = self._vehicles[name]
             self._advance(vehicle)
@@ -147,7 +147,7 @@ class Traffic:
             return Clearance(vehicle.setpoint, climbs=step.kind is StepKind.CLIMB, lands=step.kind is StepKind.LAND)
 
     def _is_due(self, vehicle: TrackedVehicle, step: RouteStep) -> bool:
-        """Return whether a vehicle needs a new set point: the last one is near, or not on its line."""
+        """Return whether a vehicle needs a new set point, because the last one is near, or not on its line."""
         before, place = vehicle.setpoint, vehicle.place
         if before is None or place is None or math.dist(place, before) <= self._fleet.kind.rules.renews_m:
             return True
@@ -157,7 +157,7 @@ class Traffic:
         return not is_on or math.dist(before, on_line(step.begin, end, reached)) > _NEARER_M
 
     def is_clear_below(self, name: str) -> bool:
-        """Return whether no vehicle that flies by our command is directly below a vehicle."""
+        """Return whether no vehicle flying by our command is directly below the vehicle `name`."""
         with self._lock:
             vehicle = self._vehicles[name]
             if vehicle.place is None:
@@ -167,7 +167,7 @@ class Traffic:
             return all(self._apart(column, (one.place or one.rest,) * 2) >= self._keep_m for one in others)
 
     def _advance(self, vehicle: TrackedVehicle) -> None:
-        """Count the steps that a vehicle has done, and release the steps that need not wait."""
+        """Update the completed steps of a vehicle, and release the steps that need not wait."""
         while (step := vehicle.step) and step.kind is StepKind.FLY:
             if vehicle.done == vehicle.released:
                 if self._waits_for(step):
@@ -178,7 +178,7 @@ class Traffic:
             vehicle.done += 1
             if vehicle.done == len(
                 vehicle.steps
-            ):  # near may be where it stops for another reason, as above its take-off
+            ):  # the vehicle may stop nearby for another reason, such as the end of its take-off
                 vehicle.setpoint = step.end
         following = vehicle.steps[vehicle.done : vehicle.released]
         is_corner = bool(following) and following[-1].is_corner
@@ -198,7 +198,7 @@ class Traffic:
         return reached >= length and math.dist(place, on_line(step.begin, step.end, reached)) <= near
 
     def _ahead(self, vehicle: TrackedVehicle) -> Point:
-        """Return the point on its line to which a vehicle may fly."""
+        """Return the point on its line to which the vehicle may fly."""
         step, place = vehicle.step, vehicle.place
         if step is None or place is None or vehicle.released <= vehicle.done:
             return vehicle.rest
@@ -217,7 +217,7 @@ class Traffic:
         return ""
 
     def _stopped(self, vehicle: TrackedVehicle, blocked: str) -> Clearance:
-        """Return the clearance to stay in place. If the vehicle is blocked for some time, plan all routes again."""
+        """Return a clearance to stay in place. If the vehicle has been blocked for some time, plan all routes again."""
         now = self._clock()
         if vehicle.blocked_s is None:
             vehicle.blocked_s = now
@@ -228,7 +228,7 @@ class Traffic:
         return Clearance(vehicle.setpoint, waits_for=blocked)
 
     def _vehicle_in_the_way(self, vehicle: TrackedVehicle, to: Point) -> str:
-        """Return the name of a vehicle that is too near to the straight line `to` a point; empty if there is none."""
+        """Return the name of a vehicle too near to the straight line `to` a point; empty if no vehicle is."""
         if vehicle.place is None:
             return ""
         mine = vehicle.place, to
@@ -244,7 +244,7 @@ class Traffic:
         return ""
 
     def _lines(self, other: TrackedVehicle, vehicle: TrackedVehicle) -> Iterator[tuple[Line, bool]]:
-        """Yield the lines on which another vehicle may be, and whether `vehicle` has to keep away from them."""
+        """Yield the lines on which the `other` vehicle may be, and whether `vehicle` must keep away from each line."""
         place = other.place or other.rest
         yield (place, place), True
         if other.in_air and (other.gone or other.lands):
@@ -270,7 +270,7 @@ class Traffic:
     # Plans
 
     def _replan(self) -> None:
-        """Plan all routes again from the present places. If that is not possible, flying vehicles stay in place."""
+        """Plan all routes again from the present places. If that fails, flying vehicles stay in place."""
         self._planned_s = self._clock()
         try:
             if self._ends:
@@ -281,7 +281,7 @@ class Traffic:
             return
 
     def _plan(self) -> None:
-        """Plan routes from the present destinations. Raises `RouteError`."""
+        """Plan routes to the present destinations. Raises `RouteError`."""
         self._planned_s = self._clock()
         vehicles = [one for one in self._vehicles.values() if one.place]
         standing = {one.name: self._standing(one) for one in vehicles if not self._moves(one)}
@@ -309,7 +309,7 @@ class Traffic:
                 vehicle.blocked_s = None
 
     def _moves(self, vehicle: TrackedVehicle) -> bool:
-        """Return whether a vehicle is planned for. Others stay, or land by themselves."""
+        """Return whether routes are planned for a vehicle. Other vehicles stay, or land by themselves."""
         if vehicle.gone or vehicle.lands:
             return False
         if vehicle.flies:
@@ -321,7 +321,7 @@ class Traffic:
         return vehicle.ground(at) if vehicle.in_air and (vehicle.gone or vehicle.lands) else at
 
     def _goals(self, moving: list[TrackedVehicle]) -> dict[str, Point]:
-        """Return the goals of vehicles: not below a vehicle that is out of control and still in the air."""
+        """Return the goals of vehicles, none of them below a vehicle that is out of control and still in the air."""
         found = {one.name: self._goal(one) for one in moving}
         falling = [one.place for one in self._vehicles.values() if one.gone and one.in_air and one.place]
         for name, goal in found.items():
@@ -342,13 +342,13 @@ class Traffic:
         return target.at
 
     def _present_distance(self, points: Iterable[Point]) -> float:
-        """Return the distance for planning: less than in the fleet file if vehicles are already nearer."""
+        """Return the distance for planning, which is less than in the fleet file if vehicles are already nearer."""
         least = spacing([*points], self._fleet.downwash)
         next_place = self._fleet.distance_m
         return next_place if least >= next_place else max(least * _ALL_BUT, next_place / 2)
 
     def bring_down(self) -> None:
-        """Plan the landing of all flying vehicles in place, the lowest first; beside a place that is not free."""
+        """Plan the landing of all flying vehicles, the lowest first: in place, or beside a place that is not free."""
         with self._lock:
             self._ends = True
             flying = [
@@ -375,16 +375,16 @@ class Traffic:
 
 @dataclass(frozen=True)
 class Clearance:
-    """The permission of a vehicle for its next step."""
+    """A permission for the next step of a vehicle."""
 
     to: Point | None = None
-    """Its set point; None before it has one."""
+    """The set point of the vehicle; None before the first one."""
     climbs: bool = False
     lands: bool = False
     rests: bool = False
     """True once the vehicle has arrived at the end of its route."""
     waits_for: str = ""
-    """The name of another vehicle; empty if it need not wait."""
+    """The name of the vehicle to wait for; empty if no wait is necessary."""
 
 
 @dataclass
@@ -396,7 +396,7 @@ class TrackedVehicle:
     place: Point | None = None
     in_air: bool = False
     ground_m: float = 0.0
-    """The height of the ground at its last place on the ground."""
+    """The height of the ground at the vehicle's last place on the ground."""
     flies: bool = False
     """True while the vehicle is in the air by our command."""
     lands: bool = False
@@ -416,7 +416,7 @@ class TrackedVehicle:
 
     @property
     def rest(self) -> Point:
-        """The destination by the newest set point."""
+        """The destination according to the newest set point."""
         return self.setpoint or self.place or (math.nan,) * 3
 
     def ground(self, at: Point) -> Point:

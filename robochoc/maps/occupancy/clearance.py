@@ -1,9 +1,9 @@
 """Distances from the pixels of a map that are not free, and the lattice of points at which a robot fits.
 
-The generators of teams and the flight search for routes on the same lattice, so that travel times of teams belong to
-routes that can be flown. Points are the centres of pixels; if pixels are large for a robot, those of parts of pixels.
+Team generators and flights search for routes on the same lattice, so that the travel times in a team are those of
+routes that can be flown. Points are the centres of pixels or, if pixels are large for a robot, of parts of pixels.
 
-Lengths are in sides of a pixel. Distances are to the borders of pixels, not to their centres.
+Lengths are in pixels. Distances are to the borders of pixels, not to their centres.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.maps.occupancy.grid import Counts, Flags, summed_area
 
 POINTS_MAX = 4_000_000
 _FINE = 4
-"""The least number of points along the radius of a robot, unless there would be too many."""
+"""The minimum number of points along the radius of a robot, unless there would be too many points."""
 _PARTS_MAX = 9
 _ROUNDING = 1e-6
 _PORTION = 2_000_000
@@ -27,11 +27,11 @@ _Places = npt.NDArray[np.float64]
 
 
 def parts_per_pixel(radius: float, pixels: int) -> int:
-    """Return the number of parts of a pixel's side, for robots of a radius on a map of `pixels` pixels.
+    """Return the number of parts of a pixel's side, for robots with a radius on a map of `pixels` pixels.
 
-    It is odd: then the centres of pixels are points of the lattice.
+    The number is odd, so that the centres of pixels are lattice points.
     """
-    # Rounding must not decide: the same radius in metres and in other units has to give the same lattice.
+    # The result must not depend on rounding: the same radius must give the same lattice in any unit.
     parts_wished = min(_FINE / max(radius, _ROUNDING) - _ROUNDING, _PARTS_MAX)
     parts = 2 * math.ceil((max(parts_wished, 1) - 1) / 2) + 1
     while parts > 1 and pixels * parts * parts > POINTS_MAX:
@@ -40,15 +40,15 @@ def parts_per_pixel(radius: float, pixels: int) -> int:
 
 
 def open_points(solid: Flags, keep: float, parts: int) -> Flags:
-    """Return the points of a lattice at which a robot keeps a distance from solid pixels and from the outside.
+    """Return the lattice points at which a robot keeps a distance from solid pixels and from the outside.
 
-    It also keeps the distance on the straight line to a neighbouring point: half way, walls may be nearer than at both
-    ends by at most a single corner. A larger `keep` gives a subset.
+    The robot also keeps the distance on straight lines between neighbouring points: half way, only a single corner of a
+    wall may be nearer than at both ends. A larger `keep` gives a subset.
 
     Args:
-        solid: The pixels that are not free, by rows.
-        keep: The distance.
-        parts: The number of parts of a pixel's side, that is of rows and of columns of points in a pixel.
+        solid: Which pixels are not free, by rows.
+        keep: The distance to keep.
+        parts: The number of parts of a pixel's side: the number of rows, and of columns, of points in a pixel.
     """
     square = (keep * parts) ** 2 + solid.ndim / 4
     flags: Flags = quadruple_squares(solid, parts, math.ceil(math.sqrt(square)) + 1) >= 4 * square
@@ -58,8 +58,8 @@ def open_points(solid: Flags, keep: float, parts: int) -> Flags:
 def quadruple_squares(solid: Flags, parts: int, reach: int) -> _Lengths:
     """Return four times the squared distances of points from the borders of solid pixels, and from the outside.
 
-    Each side has `parts` parts, whose centres are the points; lengths are in parts. Distances are limited to `reach`.
-    Squares are added up axis by axis.
+    Points are the centres of the parts of pixels, with `parts` parts per side; lengths are in parts. Distances are
+    clamped to `reach`. Squares are added up axis by axis.
     """
     fine = np.pad(solid, 1, constant_values=True)
     for axis in range(solid.ndim):
@@ -76,9 +76,9 @@ def quadruple_squares(solid: Flags, parts: int, reach: int) -> _Lengths:
 
 
 def clearances(solid: Flags, places: _Places, most: float) -> _Places:
-    """Return the distance (K,) of each of `places` (K, 2) from the nearest solid pixel, at most `most`.
+    """Return the distances (K,) of `places` (K, 2) from the nearest solid pixels, at most `most`.
 
-    Places are an x and a y from the lower left corner. Outside of the map the distance is 0.
+    Places are given as x and y from the lower left corner. Outside the map the distance is 0.
     """
     found = np.full(len(places), most)
     reach = math.ceil(most) + 1

@@ -1,9 +1,9 @@
 """Occupancy grids: the free, occupied and unknown pixels of a map.
 
-The format is that of the map_server of ROS 1 and Nav2 (wiki.ros.org/map_server, "Map format"): a YAML file has the name
-of an image, the size of a pixel, the place of the lower left corner with the yaw of the map around it, and the
-thresholds of free and occupied. The occupancy of a white pixel is 0, that of a black one 1; with `negate` the reverse.
-In the mode `raw`, shades from 0 to 100 of 255 are the occupancy in percent.
+The format is that of map_server in ROS 1 and Nav2 (wiki.ros.org/map_server, "Map format"). A YAML file has the name of
+an image, the size of a pixel, the place of the lower left corner, the yaw of the map around this corner, and the
+thresholds for free and occupied. The occupancy of a white pixel is 0, and of a black pixel 1; with `negate` the
+reverse. In the mode `raw`, shades from 0 to 100 (of 255) are the occupancy in percent.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ MAX_YAML = 64 * 1024
 _SIDE_MAX_M = Fraction(100)
 _SIDE_MIN_M = Fraction(1, 1000)
 _FAR_M = Fraction(1_000_000)
-"""The largest distance of a map from the origin of its frame, along an axis."""
+"""The largest distance of a map from the origin of its frame along an axis, in metres."""
 _YAW = Fraction(1000)
 _MODES = ("trinary", "scale", "raw")
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
@@ -48,12 +48,12 @@ class OccupancyGrid:
     """A map. Lengths are in metres, in the map's frame.
 
     Attributes:
-        name: The name of its file, without the ending.
-        resolution: The side of a pixel.
-        origin: The x and the y of the lower left corner of the lower left pixel.
-        free: Which pixels are free: rows from the lowest y on, in each the lowest x first.
+        name: The name of the file, without its extension.
+        resolution: The side length of a pixel.
+        origin: The x and y of the lower left corner of the lower left pixel.
+        free: Which pixels are free; rows are sorted by y, pixels in a row by x.
         occupied: Which pixels are occupied. A pixel that is neither free nor occupied is unknown.
-        turn: How far rows and columns are turned around the origin; by quadruple_squares they have been turned back.
+        turn: The rotation of rows and columns around the origin; quarter turns have been undone.
     """
 
     name: str
@@ -74,18 +74,18 @@ class OccupancyGrid:
         return found
 
     def in_pixels(self, place: Place) -> Place:
-        """Return a place in pixels to the right of the lower left corner and above it."""
+        """Return a place in pixels to the right of and above the lower left corner."""
         x, y = self.rotation.rotated_back((place[0] - self.origin[0], place[1] - self.origin[1]))
         return x / self.resolution, y / self.resolution
 
     @cached_property
     def free_sums(self) -> Counts:
-        """For each corner of a pixel, the number of free pixels with a smaller x and y (a summed-area table)."""
+        """The number of free pixels with smaller x and y, for each corner of a pixel (a summed-area table)."""
         return summed_area(self.free)
 
 
 def summed_area(flags: Flags) -> Counts:
-    """Return for each corner of a pixel the number of set flags with a smaller x and y (a summed-area table)."""
+    """Return the number of set flags with smaller x and y, for each corner of a pixel (a summed-area table)."""
     counts: Counts = np.cumsum(np.cumsum(np.pad(flags, ((1, 0), (1, 0))), axis=0, dtype=np.int64), axis=1)
     return counts
 
@@ -94,7 +94,7 @@ def read_occupancy_grid(path: Path) -> OccupancyGrid:
     """Return the map described by a YAML file, with its image.
 
     Raises:
-        InvalidInputError: One of the files cannot be read, is not valid, or is too large.
+        InvalidInputError: One of these files cannot be read, is not valid, or is too large.
     """
     with as_input_errors(path):
         if is_image(read_beginning(path, _MAGIC_BYTES)):
@@ -115,13 +115,13 @@ def read_occupancy_grid(path: Path) -> OccupancyGrid:
 
 
 def _without_quarter_turns(grid: OccupancyGrid, yaw: Fraction) -> OccupancyGrid:
-    """Return a map with a yaw of less than an eighth of a circle. Quarter turns rotate its rows, and its origin."""
+    """Return the map with a yaw of less than an eighth of a circle, after rotating rows and origin by quarter turns."""
     rows, columns = grid.free.shape
     quarters, rotation = split_yaw(yaw, Fraction(isqrt(rows * rows + columns * columns) + 1))
     free, occupied, (x, y) = grid.free, grid.occupied, grid.origin
     corner = (Fraction(0), Fraction(0))
     for _ in range(quarters):
-        # The first row becomes the last column, whose end is the new corner.
+        # The first row becomes the last column; the end of this column is the new corner.
         corner = (-corner[1], corner[0])
         corner = (corner[0] - free.shape[0], corner[1])
         free, occupied = free.T[:, ::-1], occupied.T[:, ::-1]
@@ -130,7 +130,7 @@ def _without_quarter_turns(grid: OccupancyGrid, yaw: Fraction) -> OccupancyGrid:
 
 
 class _Description:
-    """The description of a map in its YAML file. Raises `MistakeError` for invalid or missing entries."""
+    """Parses the description of a map in a YAML file. Raises `MistakeError` for invalid or missing entries."""
 
     def __init__(self, root: Node) -> None:
         if not root.is_mapping:
@@ -146,9 +146,9 @@ class _Description:
         self._free = self._number("free_thresh", Fraction(0), self._occupied)
 
     def classified(self, image: Image) -> tuple[Flags, Flags]:
-        """Return which pixels are free, and which are occupied; rows from the lowest y on, unlike in the image."""
-        # Thresholds are compared in Python's integers: equality is exact on every machine, and no number of decimal
-        # places overflows.
+        """Return which pixels are free, and which are occupied, with rows in ascending order of y, unlike the image."""
+        # Thresholds are compared as Python integers: equality is exact on every machine, and any number of decimal
+        # places is possible without overflow.
         shares, full = self._shares(image.white)
         free_below, occupied_above = self._free * full, self._occupied * full
         free = np.array([share is not None and share < free_below for share in shares])[image.pixels]
@@ -158,7 +158,7 @@ class _Description:
         return free[::-1], occupied[::-1]
 
     def _shares(self, white: int) -> tuple[Sequence[int | None], int]:
-        """Return the occupancy of each shade (None: unknown), and the occupancy that means certainly occupied."""
+        """Return the occupancy of each shade (None: unknown), and the occupancy of a certainly occupied pixel."""
         if self.mode == "raw":
             percents = ((2 * _RAW * shade + white) // (2 * white) for shade in range(white + 1))
             return [percent if percent <= _PERCENT else None for percent in percents], _PERCENT

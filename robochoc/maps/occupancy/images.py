@@ -1,7 +1,7 @@
 """Images of maps, as written by map_saver: PGM, PNG and BMP.
 
-map_server uses the mean of a pixel's channels. Here a pixel is their sum, and white the sum of the channels of a white
-pixel, so that nothing is rounded.
+map_server uses the mean of a pixel's channels. Here the value of a pixel is the sum of its channels, and white is the
+sum for a white pixel, so that nothing is rounded.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ class Image:
     """An image of a map.
 
     Attributes:
-        pixels: The sum of each pixel's channels, rows from the top.
+        pixels: The sum of each pixel's channels, in rows from the top.
         white: The sum for a white pixel. 0 is black.
-        opaque: Which pixels are opaque. None: all.
+        opaque: Which pixels are opaque. None: all pixels.
     """
 
     pixels: Pixels
@@ -66,10 +66,10 @@ def read_image(content: bytes, *, adds_alpha: bool) -> Image:
 
 
 def _read_other(content: bytes, name: str, *, adds_alpha: bool) -> Image:
-    """Return an image that Pillow decodes. Its size is checked before its pixels are decoded."""
+    """Return an image decoded by Pillow, after checking its size."""
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # Pillow's limit of pixels is above ours
+            warnings.simplefilter("ignore")  # Pillow's limit on pixels is above ours
             with Pillow.open(io.BytesIO(content), formats=(name,)) as opened:
                 width, height = opened.size
                 if width * height > MAX_PIXELS or min(width, height) < 1:
@@ -102,7 +102,7 @@ def _summed(opened: Pillow.Image, *, adds_alpha: bool) -> Image:
 
 
 def _wide(opened: Pillow.Image) -> Image:
-    """Return an image with shades of grey of two bytes."""
+    """Return a greyscale image with two bytes per pixel."""
     pixels = np.asarray(opened).astype(np.int64)
     if not 0 <= pixels.min() <= pixels.max() <= _WIDE:
         raise MistakeError("has shades of grey of more than two bytes", "convert it to one byte a pixel")

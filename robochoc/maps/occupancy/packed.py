@@ -1,4 +1,4 @@
-"""Flags of pixels, or voxels, as bytes: eight in a byte, the first in the highest bit, row by row without gaps."""
+"""Flags of pixels or voxels, packed row by row without gaps: eight per byte, the first in the highest bit."""
 
 from __future__ import annotations
 

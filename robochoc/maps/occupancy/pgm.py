@@ -1,7 +1,7 @@
-"""Grey images in the format PGM: the plain one (P2, text) and the raw one (P5), one image in a file.
+"""Greyscale images in Netpbm's PGM format, plain (P2, text) or raw (P5), with one image per file.
 
-The format is Netpbm's: magic number, width, height and the value of white as text, then the pixels row by row from
-the top. A `#` begins a comment until the end of its line.
+A file has the magic number, the width, the height and the value of white as text, then the pixels row by row from the
+top. A `#` begins a comment, which extends to the end of the line.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 MAX_PIXELS = 4_000_000
 """The maximum number of pixels, 2,000 x 2,000."""
 MAX_BYTES = 32 * 1024 * 1024
-"""The maximum size of a file: a plain image has up to six characters for a pixel."""
+"""The maximum size of a file: a plain image has up to six characters per pixel."""
 _WHITE_MAX = 65_535
 _ONE_BYTE = 255
 _HEADER_MAX = 64 * 1024
@@ -29,7 +29,7 @@ Pixels = npt.NDArray[np.int64]
 
 
 def read_pgm(content: bytes) -> tuple[Pixels, int]:
-    """Return the pixels of an image, rows from the top, and the value that is white; 0 is black.
+    """Return the pixels of an image, in rows from the top, and the value of white; 0 is black.
 
     Raises:
         MistakeError: The content is not a valid PGM image, or has more than `MAX_PIXELS`.
@@ -57,7 +57,7 @@ def read_pgm(content: bytes) -> tuple[Pixels, int]:
 
 
 def _raw(content: bytes, place: int, count: int, white: int) -> Pixels:
-    """Return the pixels after one blank: a byte each, or two if white needs two bytes."""
+    """Return the pixels, which follow one whitespace character: a byte each, or two bytes if white needs two."""
     size = 1 if white <= _ONE_BYTE else 2
     end = place + 1 + count * size
     raster = content[place + 1 : end]
@@ -68,7 +68,7 @@ def _raw(content: bytes, place: int, count: int, white: int) -> Pixels:
 
 
 def _plain(content: bytes, place: int, count: int, white: int) -> Pixels:
-    """Return the pixels, given as numbers separated by blanks."""
+    """Return the pixels, given as numbers separated by whitespace."""
     words = _COMMENT.sub(b"", content[place:]).split(None, count)
     if len(words) < count:
         raise MistakeError(f"ends after {len(words)} of {count} pixels", "the image is incomplete")

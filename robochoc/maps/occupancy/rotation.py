@@ -1,6 +1,6 @@
 """Rotated maps: the yaw of a map's origin, as a number of quarter turns and the sine and cosine of the rest.
 
-Sines are computed in integers, to 40 decimal places, so that cells of rotated maps are the same on every machine.
+Sines are computed in integers, to 40 decimal places, so that the cells of rotated maps are the same on every machine.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ _ONE = 10**50
 _PLACES = 10**40
 _HALF_PI = Fraction(1_570796_326794_896619_231321_691639_751442_098584_699687_552910_487, 10**57)
 _TERMS = 45
-"""The last term of the series, for an angle of less than 1, is below 10**-50."""
+"""The number of terms in the series, the last of which is below 10**-50 for angles below 1."""
 
 Place = tuple[Fraction, Fraction]
-"""The x and the y of a place, in metres or in pixels."""
+"""The x and y of a place, in metres or pixels."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,8 @@ def split_yaw(yaw: Fraction, reach: Fraction) -> tuple[int, Rotation]:
     """Return the quarter turns of a yaw, 0 to 3, and the remaining rotation by at most an eighth of a circle.
 
     Args:
-        yaw: The angle in radians. Quarter turns are given with few decimal places.
-        reach: A remaining rotation that moves no point within this radius by more than 1/100 is omitted.
+        yaw: The angle in radians. Quarter turns may be given with few decimal places.
+        reach: The remaining rotation is omitted if it moves points within this radius by at most 1/100.
     """
     quadruple_squares = round(yaw / _HALF_PI)
     rest = yaw - quadruple_squares * _HALF_PI

@@ -1,18 +1,18 @@
-"""Reads the leaves of OctoMap's octrees from files `.bt` and `.ot`.
+"""Reads the leaves of OctoMap's octrees from `.bt` and `.ot` files.
 
 OctoMap: Hornung, Wurm, Bennewitz, Stachniss and Burgard, "OctoMap: an efficient probabilistic 3D mapping framework
-based on octrees", Autonomous Robots 34 (2013). An octree of 16 levels covers the cube of 65,536 voxels a side, whose
-middle is the origin of the frame. A file has a text header, and the nodes in depth-first order:
+based on octrees", Autonomous Robots 34 (2013). An octree with 16 levels covers a cube of 65,536 voxels per side, whose
+centre is the origin of the frame. A file has a text header, and the nodes in depth-first order:
 
 - `.bt`: two bytes for each inner node, with two bits for each of its eight children: 1 for a free leaf, 2 for an
   occupied leaf, 3 for an inner node, and 0 for unknown.
-- `.ot`: for each node the logarithm of its odds as a float, in trees with colours three bytes for the colour, and a
-  byte with a bit for each existing child. A leaf is occupied from even odds on, which is OctoMap's default.
+- `.ot`: for each node the logarithm of its odds as a float, three bytes for its colour in trees with colours, and a
+  byte with a bit for each existing child. A leaf is occupied if its odds are at least even, as by default in OctoMap.
 
-The bits 0, 1 and 2 of a child's number are set if it lies in the upper half along x, y and z.
+Bits 0, 1 and 2 of a child's number are set if the child is in the upper half along x, y and z.
 
-Nodes are not visited one by one. The end of each subtree follows from the number of outstanding children before each
-node (the Lukasiewicz path of the tree), by one sort; then each level of the tree is read at once.
+Nodes are not visited one by one. A single sort finds the end of each subtree from the number of outstanding children
+before each node (the Lukasiewicz path of the tree). Then each level of the tree is read at once.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ import numpy.typing as npt
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 
 DEPTH = 16
-"""Levels below the root. A leaf of the last one is a voxel."""
+"""The number of levels below the root. A leaf in the last level is a voxel."""
 MAX_BYTES = 32 * 1024 * 1024
 MAX_NODES = 4_000_000
 """The maximum number of nodes stored in a file; in `.bt` files these are inner nodes."""
@@ -39,12 +39,12 @@ _KEYS = ("id", "size", "res")
 _NUMBER = re.compile(r"[0-9]{1,20}(?:\.[0-9]{1,30})?(?:e[+-]?[0-9]{1,2})?")
 _COUNT = re.compile(r"[0-9]{1,10}")
 _BYTES_OF_NODE = {"OcTree": 5, "1": 5, "OcTreeStamped": 5, "ColorOcTree": 8}
-"""The supported types of trees, and the bytes of a node in `.ot`."""
+"""The supported types of trees, and the size of a node in `.ot` files, in bytes."""
 _FREE, _OCCUPIED, _INNER = 1, 2, 3
 
 Integers = npt.NDArray[np.int64]
 Corners = npt.NDArray[np.uint16]
-"""Places in the tree, at most 2 ** 16 along each axis; two bytes each, since there may be millions."""
+"""Positions in the tree, below 2 ** 16 on each axis; in two bytes each, since there may be millions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class Leaves:
     """Leaves of one size. A side has 2 ** `exponent` voxels.
 
     Attributes:
-        exponent: The binary logarithm of the side, in voxels.
-        corners: The lowest corner of each leaf: x, y and z, in sides of a leaf from the lowest corner of the tree.
+        exponent: The binary logarithm of a leaf's side in voxels.
+        corners: The x, y and z of each leaf's lowest corner, in leaves from the lowest corner of the tree.
         occupied: Which leaves are occupied. The others are free.
     """
 
@@ -64,19 +64,19 @@ class Leaves:
 
 @dataclass(frozen=True, eq=False)
 class Octree:
-    """An octree: the side of a voxel in metres, and the known leaves, largest first."""
+    """An octree: the side length of a voxel in metres, and the known leaves, the largest first."""
 
     resolution: Fraction
     leaves: tuple[Leaves, ...]
 
 
 def is_octomap(begin: bytes) -> bool:
-    """Return whether a file with this beginning is an OctoMap."""
+    """Return whether a file that begins with `begin` is an OctoMap."""
     return begin.startswith((_BINARY, _FULL))
 
 
 def read_octree(content: bytes) -> Octree:
-    """Return the octree of a file.
+    """Return the octree in a file.
 
     Raises:
         MistakeError: The content is not a valid OctoMap, is incomplete, or has more than `MAX_NODES`.
@@ -92,13 +92,13 @@ def read_octree(content: bytes) -> Octree:
 
 
 def _check_end(content: bytes, end: int) -> None:
-    """Raise `MistakeError` for anything but blanks after the last node."""
+    """Raise `MistakeError` if anything but whitespace follows the last node."""
     if content[end:].strip():
         raise MistakeError(f"has {len(content) - end:,} bytes after its last node", "the file is damaged")
 
 
 class _Header:
-    """The header of a file: lines with a keyword and its value, up to `data`."""
+    """The header of a file: lines with a keyword and a value, up to `data`."""
 
     def __init__(self, content: bytes) -> None:
         if not is_octomap(content):
@@ -156,14 +156,14 @@ class _Nodes:
     """The nodes of a file, in depth-first order.
 
     Args:
-        begin: The byte at which they begin.
-        size: The bytes of a node.
-        children: For each possible node of the file, the number of its children that are also stored.
+        begin: The offset of the first node.
+        size: The size of a node, in bytes.
+        children: The number of stored children of each possible node in the file.
     """
 
     def __init__(self, begin: int, size: int, children: Integers) -> None:
         self._begin, self._size = begin, size
-        left = np.cumsum(children - 1) + 1  # outstanding nodes after each
+        left = np.cumsum(children - 1) + 1  # outstanding nodes after each node
         ends = np.flatnonzero(left == 0)
         if not ends.size:
             known = f"ends after {len(children):,} nodes"
@@ -176,11 +176,11 @@ class _Nodes:
 
     @property
     def end(self) -> int:
-        """The byte after the last node."""
+        """The offset of the first byte after the last node."""
         return self._begin + self.count * self._size
 
     def _ends(self, left: Integers) -> Integers:
-        """Return for each node the one after its subtree: the first with fewer outstanding nodes before it."""
+        """Return the node after each node's subtree: the first node with fewer outstanding nodes before it."""
         count = self.count
         before = np.concatenate(([1], left[:count]))
         keys = before * (count + 1) + np.arange(count + 1)
@@ -203,7 +203,7 @@ class _Nodes:
 
 
 class _BinaryNodes(_Nodes):
-    """The inner nodes of a file `.bt`."""
+    """The inner nodes in a `.bt` file."""
 
     def __init__(self, content: bytes, header: _Header) -> None:
         count = min((len(content) - header.end) // 2, MAX_NODES)
@@ -246,7 +246,7 @@ class _BinaryNodes(_Nodes):
 
 
 class _FullNodes(_Nodes):
-    """The nodes of a file `.ot`, including leaves."""
+    """The nodes in an `.ot` file, including leaves."""
 
     def __init__(self, content: bytes, header: _Header) -> None:
         size = _BYTES_OF_NODE[header.type]
@@ -258,7 +258,7 @@ class _FullNodes(_Nodes):
         self._expected = header.size
 
     def leaves(self) -> Iterator[Leaves]:
-        """Yield the known leaves, level by level. A leaf whose odds are nan is unknown."""
+        """Yield the known leaves, level by level. A leaf with NaN as odds is unknown."""
         nodes, corners = np.zeros(1, dtype=np.int64), np.zeros((1, 3), dtype=np.int64)
         exponent = DEPTH
         while nodes.size:
@@ -284,6 +284,6 @@ def _other_count(found: int, expected: int) -> MistakeError:
 
 
 def _child_corners(corners: Integers, child: int) -> Integers:
-    """Return the corners of the children with a given number, in sides of a child."""
+    """Return the corners of the children with the number `child`, in sides of a child."""
     upper: Integers = np.array([child & 1, child >> 1 & 1, child >> 2 & 1], dtype=np.int64)
     return 2 * corners + upper

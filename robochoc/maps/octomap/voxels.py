@@ -1,4 +1,4 @@
-"""Voxels of three-dimensional maps: free, occupied and unknown ones."""
+"""The free, occupied and unknown voxels of three-dimensional maps."""
 
 from __future__ import annotations
 
@@ -31,10 +31,10 @@ class VoxelGrid:
     """A three-dimensional map, cut to its free space and one more voxel on each side. Lengths are in metres.
 
     Attributes:
-        name: The name of its file, without the ending.
-        resolution: The side of a voxel.
+        name: The name of the file, without its extension.
+        resolution: The side length of a voxel.
         origin: The x, y and z of the lowest corner.
-        free: Which voxels are free: by z, then y, then x, each from the lowest on.
+        free: Which voxels are free, sorted by z, then y, then x.
         occupied: Which voxels are occupied. A voxel that is neither free nor occupied is unknown.
     """
 
@@ -46,12 +46,12 @@ class VoxelGrid:
 
     @cached_property
     def free_sums(self) -> Sums:
-        """For each corner of a voxel, the number of free voxels with a smaller x, y and z (a summed-volume table)."""
+        """The number of free voxels with smaller x, y and z, for each corner of a voxel (a summed-volume table)."""
         return _summed_volume(self.free)
 
     @cached_property
     def occupied_sums(self) -> Sums:
-        """For each corner of a voxel, the number of occupied voxels with a smaller x, y and z."""
+        """The number of occupied voxels with smaller x, y and z, for each corner of a voxel."""
         return _summed_volume(self.occupied)
 
     def in_voxels(self, place: tuple[Fraction, ...]) -> Corner:
@@ -63,8 +63,8 @@ class VoxelGrid:
 def read_voxels(path: Path) -> VoxelGrid:
     """Return the map in an OctoMap file.
 
-    If it has more than `MAX_VOXELS`, its voxels are joined, eight by eight: the result is free if all parts are free,
-    and occupied if any part is.
+    If the map has more than `MAX_VOXELS`, groups of eight voxels are joined: the result is free if all parts are free,
+    and occupied if any part is occupied.
 
     Raises:
         InvalidInputError: The file cannot be read, is not valid, is too large, or has no free voxel.
@@ -91,7 +91,7 @@ def _voxels(name: str, tree: Octree) -> VoxelGrid:
 
 
 def _around_free(leaves: Sequence[Leaves], exponent: int) -> tuple[Integers, Integers]:
-    """Return the first voxel around all free space along x, y and z, and the one after the last."""
+    """Return the first voxel around all free space along x, y and z, and the voxel after the last."""
     lows, highs = [], []
     for some in leaves:
         corners = some.corners[~some.occupied]
@@ -106,7 +106,7 @@ def _around_free(leaves: Sequence[Leaves], exponent: int) -> tuple[Integers, Int
 def _states(leaves: Sequence[Leaves], exponent: int, low: Integers, high: Integers) -> States:
     """Return the states of voxels (free, occupied or unknown), by z, y and x.
 
-    The whole tree is the first voxel; the sides of voxels are halved until they have the required size.
+    At first, the whole tree is one voxel; the sides of voxels are halved until they have the required size.
     """
     by_size = {some.exponent: some for some in leaves}
     states = np.zeros((1, 1, 1), dtype=np.uint8)
@@ -131,7 +131,7 @@ def _states(leaves: Sequence[Leaves], exponent: int, low: Integers, high: Intege
 def _merge_small_leaves(leaves: Sequence[Leaves], exponent: int, states: States, low: Integers, high: Integers) -> None:
     """Set the states of voxels that consist of smaller leaves."""
     free = np.zeros(states.size, dtype=np.int64)
-    """The free part of each voxel."""
+    """The free volume of each voxel."""
     for some in leaves:
         corners: Corners = some.corners >> np.uint16(exponent - some.exponent)
         inside = ((corners >= low) & (corners < high)).all(axis=1)
@@ -143,7 +143,7 @@ def _merge_small_leaves(leaves: Sequence[Leaves], exponent: int, states: States,
 
 
 def _places(corners: Corners, first: Integers) -> tuple[Sums, Sums, Sums]:
-    """Return the indices of voxels in an array by z, y and x whose first voxel is `first`."""
+    """Return the indices of voxels in an array by z, y and x that begins with the voxel `first`."""
     z, y, x = (corners[:, axis].astype(np.int32) - np.int32(first[axis]) for axis in (2, 1, 0))
     return z, y, x
 

@@ -1,4 +1,4 @@
-"""Divides a map into cells for robots of a radius: with a given side, or the smallest side for a maximum number."""
+"""Divides a map into cells for robots with a radius. The side of cells is given, or minimal for a maximum number."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from robochoc.maps.reachability.free_space import free_space
 MAX_RADIUS = 100
 """The maximum radius of a robot, in pixels."""
 MAX_SIDE = 1000
-"""The maximum number of columns, of rows, and of levels of cells."""
+"""The maximum number of columns, rows, and levels of cells."""
 
 AnyCells: TypeAlias = Cells | Cubes
 
@@ -29,7 +29,7 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
         grid: The map.
         radius: The robots' radius in metres.
         most: The maximum number of free cells.
-        side: The side of a cell. None: the smallest multiple of a pixel's side with at most `most` free cells.
+        side: The side length of a cell. None: the smallest multiple of a pixel's side with at most `most` free cells.
 
     Raises:
         ValueError: There is no free cell, or there are too many.
@@ -51,7 +51,7 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
 
 
 def _cell_factory(grid: Map, radius: Fraction) -> Callable[[Fraction], AnyCells]:
-    """Return a function from the side of cells to the cells of a map. Raises `ValueError` if a robot fits nowhere."""
+    """Return a function from the side of a cell to the cells of a map. Raises `ValueError` if a robot fits nowhere."""
     nowhere = f"is free for a robot of the radius {float(radius):g} m; use a smaller radius"
     if isinstance(grid, OccupancyGrid):
         space = free_space(grid.free, in_pixels(radius, grid.resolution))
@@ -81,25 +81,25 @@ def _check_cells(cells: AnyCells, most: int) -> AnyCells:
 
 
 def in_pixels(radius: Fraction, resolution: Fraction) -> Fraction:
-    """Return a radius in sides of a pixel. Raises `ValueError` if it is more than `MAX_RADIUS`."""
+    """Return a radius in pixels. Raises `ValueError` if it exceeds `MAX_RADIUS`."""
     if radius > MAX_RADIUS * resolution:
         raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
     return radius / resolution
 
 
 def passable(free: Flags, resolution: Fraction, radius: Fraction) -> Flags:
-    """Return the pixels at which the centre of a robot can be: all pixels within its radius are free.
+    """Return the pixels at which the centre of a robot can be, because all pixels within its radius are free.
 
-    Obstacles are inflated, as by costmap_2d with the inscribed radius. Distances are between centres of pixels.
-    The outside of the map is not free. Squares of distances are added up axis by axis, up to the radius.
+    Obstacles are inflated, as by costmap_2d with the inscribed radius. Distances are between centres of pixels. The
+    outside of the map is not free. Squared distances are added up axis by axis, up to the radius.
 
     Args:
-        free: Which pixels are free, in an array of two dimensions or three.
-        resolution: The side of a pixel in metres.
+        free: Which pixels are free, in an array with two or three dimensions.
+        resolution: The side length of a pixel, in metres.
         radius: The radius in metres.
 
     Raises:
-        ValueError: The radius has more than `MAX_RADIUS` pixels.
+        ValueError: The radius is more than `MAX_RADIUS` pixels.
     """
     limit = floor(in_pixels(radius, resolution) ** 2)
     beyond = limit + 1

@@ -1,10 +1,10 @@
 """The cells of a map, which are values of variables: squares of pixels (`Cells`), or cubes of voxels (`Cubes`).
 
 A cell is free if all pixels that it touches are free, and a robot fits at its centre. Cells are the destinations of
-robots; paths are found on the pixels (`path_lengths.py`), so that a door narrower than a cell can be passed.
+robots. Paths are found on the pixels (`path_lengths.py`), so that robots can pass doors narrower than a cell.
 
-The centre of a cell lies at whole multiples of its side in the map's frame. So the waypoint of a cell has integers as
-coordinates, and the side is the scale: integers x scale are exactly metres in the map's frame.
+In the map's frame, the coordinates of a cell's centre are whole multiples of its side. So the waypoint of a cell has
+integer coordinates, and the side is the scale: integers times scale are exact metres in the map's frame.
 """
 
 from __future__ import annotations
@@ -25,11 +25,11 @@ from robochoc.maps.octomap.voxels import VoxelGrid
 from robochoc.maps.reachability.free_space import FreeSpace
 
 Place = tuple[Fraction, ...]
-"""The x and the y of a place in metres, and on three-dimensional maps its z."""
+"""The x and y of a place, and the z on three-dimensional maps, in metres."""
 
 
 _HAIR = 1e-6
-"""The largest overlap due to rounding, in pixels."""
+"""The largest overlap that can result from rounding, in pixels."""
 
 _Lengths = npt.NDArray[np.float64]
 
@@ -41,31 +41,31 @@ _Numbers = npt.NDArray[np.int64]
 
 
 _CHECKED_MAX = 10_000
-"""The maximum number of cells that are checked individually: more are too many for a problem."""
+"""The maximum number of cells that are checked individually; a problem cannot have more."""
 
 
 class CellGrid(ABC):
     """Cells along the axes of a map's frame.
 
-    They are numbered from 0, along x first, then along y, and then along z on a three-dimensional map; lowest first.
+    Cells are numbered from 0, along x first, then along y, and along z on a three-dimensional map, in ascending order.
     """
 
     side: Fraction
-    """The side of a cell, in metres."""
+    """The side length of a cell, in metres."""
 
     @property
     @abstractmethod
     def ends(self) -> Sequence[tuple[Fraction, Fraction]]:
-        """For each axis the lowest and the highest coordinate of the map, in metres."""
+        """The lowest and the highest coordinate of the map on each axis, in metres."""
 
     @cached_property
     def first(self) -> tuple[int, ...]:
-        """The coordinates of cell 0, in sides of a cell."""
+        """The coordinates of cell 0, in cells."""
         return self.containing([low for low, _ in self.ends])
 
     @cached_property
     def counts(self) -> tuple[int, ...]:
-        """The number of columns, of rows, and of levels."""
+        """The numbers of columns, rows, and levels."""
         behind = [ceil(high / self.side + _HALF) for _, high in self.ends]
         return tuple(end - first for end, first in zip(behind, self.first, strict=True))
 
@@ -80,7 +80,7 @@ class CellGrid(ABC):
         return self.counts[1]
 
     def coordinates(self, cell: int) -> tuple[int, ...]:
-        """Return the coordinates of a cell's centre, in sides of a cell."""
+        """Return the coordinates of a cell's centre, in cells."""
         found = []
         for first, count in zip(self.first, self.counts, strict=True):
             cell, place = divmod(cell, count)
@@ -92,17 +92,17 @@ class CellGrid(ABC):
         return tuple(part * self.side for part in self.coordinates(cell))
 
     def containing(self, place: Sequence[Fraction]) -> tuple[int, ...]:
-        """Return the coordinates of the cell that contains a place, in sides of a cell."""
+        """Return the coordinates of the cell that contains a place, in cells."""
         return tuple(floor(part / self.side + _HALF) for part in place)
 
     def spans(self, axis: int, corner: Fraction, size: Fraction, parts: int = 1) -> tuple[_Numbers, ...]:
-        """Return for each column, row or level its first pixel, the one after its last, and the part with its centre.
+        """Return the first pixel of each column, row or level, the pixel after its last, and the part with its centre.
 
         Args:
             axis: 0 for columns, 1 for rows, 2 for levels.
-            corner: The beginning of the first pixel, or voxel.
-            size: The side of a pixel.
-            parts: The number of parts of a pixel.
+            corner: The coordinate at which the first pixel, or voxel, begins.
+            size: The side length of a pixel.
+            parts: The number of parts into which a pixel is divided.
         """
         found = [
             (
@@ -116,7 +116,7 @@ class CellGrid(ABC):
 
 
 def sums(table: npt.NDArray[_Count], low: Sequence[_Numbers], high: Sequence[_Numbers]) -> npt.NDArray[_Count]:
-    """Return the number of set flags in each cell, given by its first pixel on each axis and the one after its last.
+    """Return the number of set flags in each cell, given by its first pixel and the pixel after its last on each axis.
 
     `table` is the summed-area table of the flags.
     """
@@ -129,13 +129,13 @@ def sums(table: npt.NDArray[_Count], low: Sequence[_Numbers], high: Sequence[_Nu
 
 @dataclass(frozen=True, eq=False)
 class Cells(CellGrid):
-    """The cells of a map.
+    """The cells of a two-dimensional map.
 
-    Cells are numbered row by row from 0, the row of the lowest y first.
+    Cells are numbered from 0, row by row, beginning with the lowest y.
 
     Attributes:
         grid: The map.
-        side: The side of a cell, in metres.
+        side: The side length of a cell, in metres.
         space: The free space of a robot.
     """
 
@@ -150,7 +150,7 @@ class Cells(CellGrid):
 
     @property
     def ends(self) -> list[tuple[Fraction, Fraction]]:
-        """For each axis the lowest and the highest coordinate of the map, in metres."""
+        """The lowest and the highest coordinate of the map on each axis, in metres."""
         return [(min(ends), max(ends)) for ends in zip(*self.grid.corners, strict=True)]
 
     @cached_property
@@ -160,7 +160,7 @@ class Cells(CellGrid):
             touched, flagged = self._turned.counts(self.grid.free)
             return self._numbers(touched == flagged, self._turned.centres(self.space.parts))
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
-        sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
+        sizes = np.outer(high[0] - low[0], high[1] - low[1])  # including pixels outside the map, which are not free
         found = sums(self.grid.free_sums, low, high) == sizes
         return self._numbers(found, np.ix_(*middle))
 
@@ -178,7 +178,7 @@ class Cells(CellGrid):
         return x, y
 
     def pixel(self, place: tuple[Fraction, ...]) -> tuple[int, int] | None:
-        """Return the row and the column of the pixel of a place; None outside the map."""
+        """Return the row and the column of the pixel that contains a place; None outside the map."""
         x, y = map(floor, self.grid.in_pixels((place[0], place[1])))
         rows, columns = self.grid.free.shape
         return (y, x) if 0 <= y < rows and 0 <= x < columns else None
@@ -192,9 +192,9 @@ class Cells(CellGrid):
         return RotatedSquares(self.grid, self.side, (self.first[0], self.first[1]), (self.rows, self.columns))
 
     def _numbers(self, found: Flags, centres: tuple[npt.NDArray[np.int64], ...]) -> tuple[int, ...]:
-        """Return the numbers of the cells in `found` at whose centre a robot fits.
+        """Return the numbers of the cells in `found` with a centre where a robot fits.
 
-        Centres are given by their points on the lattice of the free space.
+        Centres are given as points on the lattice of the free space.
         """
         height, width = self.space.points.shape
         fits = self.space.points[centres[0].clip(0, height - 1), centres[1].clip(0, width - 1)]
@@ -206,22 +206,22 @@ class Cells(CellGrid):
         return tuple(cells)
 
     def _pixels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
-        """Return for each column (`axis` 0) or row its first pixel, the one after its last, and its centre's point."""
+        """Return the first pixel of each column (`axis` 0) or row, the pixel after its last, and the centre's point."""
         return self.spans(axis, self.grid.origin[axis], self.grid.resolution, self.space.parts)
 
 
 class RotatedSquares:
-    """Squares along the axes of the map's frame, in columns and rows, on a map with rotated pixels.
+    """Finds the pixels in squares that are parallel to the axes of the map's frame, on a map with rotated pixels.
 
-    The pixels that a square touches are found row by row of the pixels: a convex figure touches an interval of each
-    row. All squares of a map are computed together, in floating point; if a centre lies on the border of two pixels
-    within the precision, it is computed again, in fractions.
+    The pixels that a square touches are found for each row of pixels: a convex figure touches an interval of each row.
+    All squares on a map are computed together, in floating point. If a centre is on the border between two pixels,
+    within the precision, it is computed again as a fraction.
 
     Args:
         grid: The map.
-        side: The side of a square, in metres.
-        first: The x and the y of the first square's centre, in sides.
-        shape: The number of rows and of columns.
+        side: The side length of a square, in metres.
+        first: The x and y of the first square's centre, in sides of a square.
+        shape: The numbers of rows and columns.
     """
 
     def __init__(self, grid: OccupancyGrid, side: Fraction, first: tuple[int, int], shape: tuple[int, int]) -> None:
@@ -239,7 +239,7 @@ class RotatedSquares:
         """Return the row and the column of the pixel, or the part of a pixel, at each square's centre.
 
         Args:
-            parts: The number of parts of a pixel's side.
+            parts: The number of parts into which the side of a pixel is divided.
         """
         at_x, at_y = parts * self._x, parts * self._y
         x, y = np.floor(at_x).astype(np.int64), np.floor(at_y).astype(np.int64)
@@ -269,7 +269,7 @@ class RotatedSquares:
         return touched, flagged
 
     def _furthest_left(self, low: _Lengths, high: _Lengths) -> _Lengths:
-        """Return the leftmost x of a square between two heights; coordinates are relative to its centre."""
+        """Return the leftmost x of a square between two heights, relative to its centre."""
         cosine, sine, half = self._cosine, self._sine, self._half
         corner = half * (cosine - abs(sine))  # the height of the left corner, or of the right one
         at = np.clip(-corner if sine > 0 else corner, low, high)
@@ -281,11 +281,11 @@ class RotatedSquares:
 class Cubes(CellGrid):
     """The cells of a three-dimensional map.
 
-    Cells are numbered level by level from 0, in each row by row, the lowest level and the lowest y first.
+    Cells are numbered from 0, level by level, and row by row in each level, beginning with the lowest level and y.
 
     Attributes:
         grid: The map.
-        side: The side of a cell, in metres.
+        side: The side length of a cell, in metres.
         passable: The voxels where the centre of a robot can be.
     """
 
@@ -295,7 +295,7 @@ class Cubes(CellGrid):
 
     @property
     def ends(self) -> list[tuple[Fraction, Fraction]]:
-        """For each axis the lowest and the highest coordinate of the map, in metres."""
+        """The lowest and the highest coordinate of the map on each axis, in metres."""
         sizes = [size * self.grid.resolution for size in reversed(self.grid.free.shape)]
         return [(corner, corner + size) for corner, size in zip(self.grid.origin, sizes, strict=True)]
 
@@ -316,7 +316,7 @@ class Cubes(CellGrid):
 
     @property
     def sides(self) -> tuple[int, ...]:
-        """For each blocked cell the sides towards cells with free and without occupied voxels.
+        """The sides of each blocked cell that face cells with free voxels and no occupied ones.
 
         Bits: 1 towards a lower x and 2 towards a higher x, 4 and 8 for y, 16 and 32 for z.
         """
@@ -329,16 +329,16 @@ class Cubes(CellGrid):
         return tuple(found[occupied > 0].tolist())
 
     def _counted(self, table: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-        """Return the number of flagged voxels of each cell."""
+        """Return the number of flagged voxels in each cell."""
         (x, xs, _), (y, ys, _), (z, zs, _) = (self._voxels(axis) for axis in range(3))
         return sums(table, (z, y, x), (zs, ys, xs))
 
     def pixel(self, place: Place) -> tuple[int, ...] | None:
-        """Return the voxel of a place by z, y and x; None outside the map."""
+        """Return the voxel (z, y, x) that contains a place; None outside the map."""
         x, y, z = (floor(part) for part in self.grid.in_voxels(place))
         inside = all(0 <= at < size for at, size in zip((z, y, x), self.grid.free.shape, strict=True))
         return (z, y, x) if inside else None
 
     def _voxels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
-        """Return for each column, row or level its first voxel, the one after its last, and that of its centre."""
+        """Return the first voxel of each column, row or level, the voxel after its last, and the central voxel."""
         return self.spans(axis, self.grid.origin[axis], self.grid.resolution)

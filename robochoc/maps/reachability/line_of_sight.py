@@ -1,6 +1,6 @@
 """Lines of sight between cells: straight lines that touch only free pixels, or voxels.
 
-Computations are exact: places are integers in a unit that divides a pixel. So visibility is symmetric, and a line that
+Computations are exact, since places are integers in a fraction of a pixel. So visibility is symmetric, and a line that
 just touches the corner of a wall is blocked on every machine.
 """
 
@@ -26,13 +26,13 @@ Point = tuple[int, ...]
 
 
 class LinesOfSight(ABC):
-    """Lines of sight between the free cells of a map."""
+    """Finds lines of sight between the free cells of a map."""
 
     def __init__(self, cells: AnyCells) -> None:
         self._cells = cells
         places = [self._in_pixels(cell) for cell in cells.free]
         self._unit = lcm(1, *(part.denominator for place in places for part in place))
-        """The length of a pixel's side."""
+        """The side length of a pixel, in these integers."""
         self._points: dict[int, Point] = {
             cell: tuple(int(part * self._unit) for part in place)
             for cell, place in zip(cells.free, places, strict=True)
@@ -40,17 +40,17 @@ class LinesOfSight(ABC):
 
     @abstractmethod
     def is_clear(self, one: int, other: int) -> bool:
-        """Return whether the straight line between two free cells touches free pixels only."""
+        """Return whether the straight line between two free cells touches only free pixels."""
 
     @abstractmethod
     def _in_pixels(self, cell: int) -> Place:
         """Return the place of a cell's centre, in pixels from the lower left corner of the map."""
 
     def visible_cells(self, sensing: Fraction) -> dict[int, frozenset[int]]:
-        """Return the cells that are visible from each free cell within a range in metres, including the cell itself.
+        """Return the cells visible from each free cell within the range `sensing` in metres, including the cell itself.
 
         Raises:
-            ValueError: More than `MAX_PAIRS` pairs of cells are that near.
+            ValueError: More than `MAX_PAIRS` pairs of cells are within the range.
         """
         reach = (sensing / self._cells.grid.resolution * self._unit) ** 2
         near = [
@@ -72,7 +72,7 @@ class LinesOfSight(ABC):
 
 
 class _SightOnGround(LinesOfSight):
-    """Lines of sight on a map of the ground."""
+    """Finds lines of sight on a two-dimensional map."""
 
     def __init__(self, cells: Cells) -> None:
         self._grid = cells.grid
@@ -84,7 +84,7 @@ class _SightOnGround(LinesOfSight):
         solid = self._solid
         for column in range(_first_touched(x, unit), right // unit + 1):
             if across:
-                # The heights at the borders of the column, times `across`: fractions would be slower.
+                # The heights at the borders of the column, multiplied by `across`, since fractions would be slower.
                 left = max(x, column * unit) - x
                 back = min(right, (column + 1) * unit) - x
                 low, high = sorted((y * across + left * up, y * across + back * up))
@@ -97,7 +97,7 @@ class _SightOnGround(LinesOfSight):
 
     @cached_property
     def _solid(self) -> npt.NDArray[np.int64]:
-        """The number of pixels that are not free below each row, by column."""
+        """The number of pixels below each row that are not free, by column."""
         return np.cumsum(np.pad(~self._grid.free, ((1, 0), (0, 0))), axis=0, dtype=np.int64)
 
     def _in_pixels(self, cell: int) -> Place:
@@ -106,7 +106,7 @@ class _SightOnGround(LinesOfSight):
 
 
 class _SightInSpace(LinesOfSight):
-    """Lines of sight on a three-dimensional map: through layers of voxels along x, and in each through rows along y."""
+    """Finds lines of sight on a three-dimensional map: by layers of voxels along x, and by rows along y in each."""
 
     def __init__(self, cells: Cubes) -> None:
         self._grid = cells.grid
@@ -116,7 +116,7 @@ class _SightInSpace(LinesOfSight):
         (x, y, z), (right, back, top) = sorted((self._points[one], self._points[other]))
         across, along, up = right - x, back - y, top - z
         whole = (across or 1) * (abs(along) or 1)
-        """The length from end to end, chosen so that all borders of layers and rows are at integers."""
+        """The length of the line, chosen such that it crosses borders between layers and rows at integers."""
         size, solid = self._unit * whole, self._solid
         for column, begin, end in _crossed(x, across, (0, whole), whole, self._unit):
             for row, first, last in _crossed(y, along, (begin, end), whole, self._unit):
@@ -127,7 +127,7 @@ class _SightInSpace(LinesOfSight):
 
     @cached_property
     def _solid(self) -> npt.NDArray[np.int32]:
-        """The number of voxels that are not free below each voxel."""
+        """The number of voxels below each voxel that are not free."""
         return np.cumsum(np.pad(~self._grid.free, ((1, 0), (0, 0), (0, 0))), axis=0, dtype=np.int32)
 
     def _in_pixels(self, cell: int) -> Place:
@@ -143,7 +143,7 @@ def _crossed(place: int, moved: int, part: tuple[int, int], whole: int, unit: in
     """Yield the layers that a part of a line touches along an axis, each with the positions of entry and exit.
 
     Args:
-        place: The beginning of the line on the axis.
+        place: The coordinate of the line's beginning on the axis.
         moved: The extent of the line along the axis.
         part: The part of the line, within 0 and `whole`.
         whole: The length of the line, a multiple of `moved`.
@@ -159,5 +159,5 @@ def _crossed(place: int, moved: int, part: tuple[int, int], whole: int, unit: in
 
 
 def _first_touched(place: int, size: int) -> int:
-    """Return the first pixel of a size that touches a place: on a border, the pixel before it."""
+    """Return the first pixel, of side `size`, that touches a place: on a border, the pixel before the border."""
     return -(-place // size) - 1

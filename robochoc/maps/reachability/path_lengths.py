@@ -1,13 +1,15 @@
 """Lengths of the shortest paths from a pixel, or a voxel, to all others, around obstacles.
 
-Dijkstra's algorithm (1959) on the pixels with eight neighbours, or on the voxels with 26, in integers: a step across a
-face counts 15, across an edge 21 and across a corner 26. In the plane these are the 5 and 7 of the chamfer distance in
-Borgefors, "Distance transformations in digital images", CVGIP 34 (1986), 1 % less than the root of 2; the third is less
-than 0.1 % more than the root of 3. A diagonal step cuts no corner: all pixels beside it have to be passable. If a robot
-does not fit between two neighbours, neither a step between them nor a diagonal step past their border is possible.
+Dijkstra's algorithm (1959) is used on pixels with eight neighbours, or voxels with 26, in integers: a step across a
+face counts 15, across an edge 21, and across a corner 26. In the plane, the ratio is that of 5 and 7 in the chamfer
+distance of Borgefors, "Distance transformations in digital images", CVGIP 34 (1986), 1 % less than the square root of
+2. The third length is less than 0.1 % more than the square root of 3. Diagonal steps cut no corners: all pixels beside
+   the
+step must be passable. If a robot does not fit between two neighbours, neither a step between these nor a diagonal step
+past their border is possible.
 
-Lengths are integers, and no step is shorter than 15. So all pixels whose lengths differ by less are processed together:
-none of them depends on another (Dial, CACM 12, 1969).
+Lengths are integers, and no step is shorter than 15. So pixels whose lengths differ by less do not depend on each
+other, and are processed together (Dial, CACM 12, 1969).
 """
 
 from __future__ import annotations
@@ -31,7 +33,7 @@ _LONGEST = np.iinfo(np.int32).max - SPACE_DIAGONAL
 
 
 class _Step(NamedTuple):
-    """A step in a flat array: its offset, the pixels beside it, the crossed borders by axis, and its length."""
+    """A step in a flat array: its offset, the pixels beside the step, the crossed borders by axis, and its length."""
 
     to: int
     beside: tuple[int, ...]
@@ -45,10 +47,10 @@ def lengths_from(
     """Return the lengths of the shortest paths to all pixels: `STRAIGHT` per pixel, or `UNREACHED`.
 
     Args:
-        start: The indices of the pixel at which all paths begin. It is passable.
-        passable: The pixels of paths, in an array of two or three dimensions.
-        longest: The length up to which paths are searched.
-        joined: For each axis, the pixels from which a robot can move to the next pixel. Empty: all.
+        start: The indices of the passable pixel at which all paths begin.
+        passable: Which pixels are passable, in an array with two or three dimensions.
+        longest: The maximum length of paths.
+        joined: For each axis, the pixels from which a robot can move to the next pixel. Empty: all pixels.
     """
     free = np.pad(passable, 1)
     flat = free.ravel()
@@ -86,7 +88,7 @@ def lengths_from(
 
 
 def _steps(shape: tuple[int, ...]) -> list[_Step]:
-    """Return all steps in a flat array of a shape."""
+    """Return all steps in the flat array for a shape."""
     strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
     found = []
     for moves in product((-1, 0, 1), repeat=len(shape)):
@@ -99,7 +101,7 @@ def _steps(shape: tuple[int, ...]) -> list[_Step]:
 
 
 def _crossed(parts: Sequence[int]) -> tuple[tuple[int, ...], ...]:
-    """Return for each axis the pixels whose border to the next pixel a step crosses or passes: all edges of its box."""
+    """Return, by axis, the pixels whose border to the next pixel a step crosses or passes: all edges of its box."""
     found = []
     for axis, part in enumerate(parts):
         others = product(*((0, other) for other in (*parts[:axis], *parts[axis + 1 :]) if other))

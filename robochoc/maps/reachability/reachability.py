@@ -1,4 +1,4 @@
-"""Reachability: the cells that each robot on a map can reach, and the travel times to them."""
+"""Reachability: the cells that each robot on a map can reach, and the travel times to these cells."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.maps.reachability.cells import Cells, Cubes, Place
 from robochoc.maps.reachability.path_lengths import UNREACHED, lengths_from
 
 PLACES = 1
-"""Decimal places of travel times, in seconds."""
+"""The decimal places of travel times in seconds."""
 _HALF = Fraction(1, 2)
 
 
@@ -27,11 +27,11 @@ class Reachability:
     Attributes:
         cells: The cells of the map.
         starts: The place of each robot.
-        unit: The time of a length of 1 on the pixels, in seconds.
+        unit: The travel time for a length of 1 on the pixels, in seconds.
         radius: The radius of a robot.
         speed: The speed of a robot, in m/s.
         longest: The longest path of a robot, as a length on the pixels. None: unlimited.
-        seconds: For each robot the travel time to each cell that it can reach, in units of 10**-`PLACES` seconds.
+        seconds: The travel time of each robot to each cell that it can reach, in units of 10**-`PLACES` seconds.
     """
 
     cells: AnyCells
@@ -53,7 +53,7 @@ class Reachability:
         return sorted({cell for one in self.seconds for cell in one})
 
     def nearest(self, place: Place, among: Iterable[int]) -> int:
-        """Return the cell whose centre is nearest to a place; among equally near cells the one of the lowest number."""
+        """Return the cell whose centre is nearest to a place; of equally near cells, that with the lowest number."""
 
         def distance(cell: int) -> tuple[Fraction, int]:
             return squared(self.cells.centre(cell), place), cell
@@ -61,7 +61,7 @@ class Reachability:
         return min(among, key=distance)
 
     def seconds_from(self, pixel: tuple[int, ...]) -> dict[int, int]:
-        """Return the travel time from a passable pixel, or voxel, to each free cell that can be reached from there."""
+        """Return the travel times from a passable pixel, or voxel, to all free cells that can be reached from there."""
         cells = self.cells
         joined = cells.space.joined if isinstance(cells, Cells) else ()
         lengths = lengths_from(pixel, cells.passable, self.longest, joined)
@@ -142,13 +142,13 @@ def squared(one: Place, other: Place) -> Fraction:
 
 
 def off_map(name: str, cells: AnyCells) -> str:
-    """Return the error text for something outside the map, with the extent of the map."""
+    """Return the error text for `name`, which is outside the map, with the extent of the map."""
     low, high = zip(*cells.ends, strict=True)
     return f"{name} is not on the map, which lies between {point_text(low)} and {point_text(high)}, in metres"
 
 
 def start_pixel(cells: AnyCells, number: int, place: Place) -> tuple[int, ...]:
-    """Return the pixel, or voxel, of the place of robot `number`.
+    """Return the pixel, or voxel, at the place of robot `number`.
 
     Raises:
         ValueError: The place is outside the map, or the robot does not fit there.

@@ -1,6 +1,6 @@
 """Distances between points, straight lines and moving points.
 
-Lengths are in metres, arrays are of float64, a point is a row of three.
+Lengths are in metres, arrays contain float64, and a point is a row with three elements.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 SLACK_M = 1e-10
-"""The tolerance for rounding: points that are nearer than the distance by no more than this are not too near."""
+"""The tolerance for rounding: points are too near only if they are nearer than the distance by more than this."""
 
 
 def squashed(points: Array, downwash: float) -> Array:
-    """Return `points` (..., 3) with their heights divided by `downwash`: spheres there are tall ellipsoids here."""
+    """Return `points` (..., 3) with heights divided by `downwash`, which maps tall ellipsoids to spheres."""
     return np.asarray(points / np.array([1.0, 1.0, downwash]))
 
 
 def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
-    """Return the distance (K, P) of each straight line `origins` to `ends` (K, 3) from each of `points` (P, 3)."""
+    """Return the distances (K, P) between the straight lines from `origins` to `ends` (K, 3) and `points` (P, 3)."""
     along = ends - origins
     squared = np.einsum("kc,kc->k", along, along)
     squared[squared == 0] = 1
@@ -33,7 +33,7 @@ def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
 
 
 def line_distances(first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
-    """Return the distances between straight lines: each pair has origins and ends (..., 3), which broadcast.
+    """Return the distances between straight lines, given by origins and ends (..., 3), which are broadcast.
 
     Source: C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.9.
     """
@@ -63,7 +63,7 @@ def norms(vectors: Array) -> Array:
 
 
 def closest_approach(apart: Array, later: Array) -> Array:
-    """Return the smallest distance of two points in uniform motion, from their differences at the begin and the end.
+    """Return the smallest distance of two points in uniform motion, from their differences at the start and the end.
 
     Vectors are along the last axis.
     """

@@ -1,7 +1,7 @@
-"""The floor plan of a building: walls that no drone can fly over, and routes around them in the plane.
+"""The floor plan of a building: walls that no drone can fly over, and routes around these in the plane.
 
 Walls are the pixels of a map that are not free, and the outside of the map. A drone keeps `keep` metres between its
-centre and the nearest border of such a pixel, measured exactly: not between centres of pixels.
+centre and the nearest border of such a pixel, measured exactly, not between centres of pixels.
 
 A route is found on a lattice (`lattice.py`), and then shortened (`string_pulling.py`).
 """
@@ -24,9 +24,9 @@ from robochoc.maps.walls import PixelFrame
 SPARE_M = 0.1
 """The additional distance of routes from walls, if the detour is at most a quarter."""
 CORNER_M = 0.25
-"""The length that a corner is worth, since drones come to rest there."""
+"""The extra length by which a corner is penalized, since drones come to rest there."""
 _ROUNDING = 1e-9
-"""The tolerance of distances from walls for rounding, in pixels."""
+"""The tolerance for rounding in distances from walls, in pixels."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +34,10 @@ class FloorPlan:
     """Walls, and how far from them drones keep. Lengths are in metres.
 
     Attributes:
-        solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first.
+        solid: Which pixels are not free, sorted by y, then x.
         frame: The place of the pixels.
         keep: The distance of a drone's centre from walls.
-        parts: The number of lattice points along a pixel's side. 0: suitable for `keep`.
+        parts: The number of lattice points along a pixel's side. 0: a suitable number for `keep`.
     """
 
     solid: Flags
@@ -51,7 +51,7 @@ class FloorPlan:
         return self if keep == self.keep else replace(self, keep=keep, parts=self._parts, _routes={})
 
     def clearances(self, points: Array, most: float) -> Array:
-        """Return the distance (K,) of each of `points` (K, 2) from the nearest wall, at most `most`."""
+        """Return the distances (K,) of `points` (K, 2) from the nearest walls, at most `most`."""
         size = self.frame.size
         return size * clearances(self.solid, self.frame.in_pixels(points), most / size)
 
@@ -61,7 +61,7 @@ class FloorPlan:
         return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
 
     def route(self, first: Array, second: Array) -> Array | None:
-        """Return a short route (K + 1, 2) between two points of the plane; None if there is none."""
+        """Return a short route (K + 1, 2) between two points in the plane; None if there is no route."""
         key = np.concatenate((first[:2], second[:2])).tobytes()
         if key not in self._routes:
             self._routes[key] = self._find_route(first[:2], second[:2])
@@ -92,11 +92,11 @@ class FloorPlan:
 
     @cached_property
     def _before(self) -> npt.NDArray[np.int32]:
-        """The number of solid pixels of a row before each column."""
+        """The number of solid pixels in each row before each column."""
         return np.cumsum(np.pad(self.solid, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
 
     def _sees(self, first: Array, second: Array, keep: float) -> bool:
-        """Return whether no wall is nearer than `keep`, in metres, to a straight line, whose ends are in pixels.
+        """Return whether a straight line, with its ends in pixels, is at least `keep` metres from all walls.
 
         The thickened line covers an interval of each row of pixels, in which no pixel may be solid.
         """
@@ -117,11 +117,11 @@ class FloorPlan:
 def _covered(
     row: npt.NDArray[np.int64], origin: tuple[float, float], along: tuple[float, float], radius: float
 ) -> tuple[Array, Array]:
-    """Return the least and the greatest x that a line of this radius covers in each of the rows that it touches.
+    """Return the least and the greatest x that a line with a radius covers in each of the rows that it touches.
 
-    These are the extreme x of all discs around its points, cut to the row. Along the line the greatest x is a concave
-    function (the least x a convex one), so its extremum is at an end, where the line enters or leaves the row, or where
-    the slope of the disc's border at the row's edge is that of the line.
+    These are the extreme x of the discs around all points on the line, cut to the row. Along the line the greatest x is
+    a concave function (the least x a convex function). So its extremum is at an end, where the line enters or leaves
+    the row, or where the slope of the disc's border at the row's edge is that of the line.
     """
     (x, y), (right, up) = origin, along
     shares: list[Array] = [np.zeros(len(row)), np.ones(len(row))]

@@ -1,12 +1,12 @@
-"""Shortest routes on a lattice of points that are far enough from all walls, in the plane or in space.
+"""Shortest routes on a lattice of points that are far enough from all walls, in two or three dimensions.
 
-A* (Hart, Nilsson, Raphael 1968) on the points with eight neighbours, or 26, in integers: steps of 15, 21 and 26 as in
-the travel times of generated teams (`reachability/path_lengths.py`), multiplied by four far from walls, and by five
-near them. Points whose estimates differ by less than a step are expanded together, and again if a shorter route to them
-is found.
+Routes are found by A* (Hart, Nilsson, Raphael 1968) in integers, on points with 8 or 26 neighbours. The lengths of
+steps are 15, 21 and 26, as in the travel times of generated teams (`reachability/path_lengths.py`), multiplied by four
+far from walls, and by five near walls. Points whose estimates differ by less than a step are expanded together, and
+again if a shorter route to them is found.
 
-Points are the centres of pixels, or of voxels; if these are large for a drone, those of their parts, and if they are
-small, those of every second pixel, for example.
+Points are the centres of pixels or voxels. If pixels are large for a drone, points are the centres of parts of pixels;
+if pixels are small, only every second pixel, for example, has a point.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ from robochoc.maps.routes.distances import Array, Flags, norms
 _LENGTHS = (15, 21, 26)
 """The lengths of steps along one axis, two and three."""
 _WIDE, _NARROW = 4, 5
-"""The factors of steps to a point far from walls, and near walls."""
+"""The factors for steps to points far from walls, and near walls."""
 _TOGETHER = _WIDE * _LENGTHS[0]
 _LIMIT = 2**30
-"""The length of points without a route."""
+"""The length assigned to points without a route."""
 _GATES = 4
 """The number of lattice points that are tried as the first, or the last, point of a route."""
 
@@ -38,14 +38,14 @@ Lengths = npt.NDArray[np.int32]
 
 
 class Lattice:
-    """A lattice over pixels or voxels. Lengths are in their sides; places have the x first, arrays have it last.
+    """Finds routes on a lattice over pixels or voxels. Lengths are in pixels; x is first in places, and last in arrays.
 
     Args:
         solid: The pixels or voxels that are not free.
-        keep: The distance of all lines between neighbours from these, and from the outside.
-        spare: The additional distance from which on a point is far from walls.
+        keep: The distance of all lines between neighbours from solid pixels, and from the outside.
+        spare: The additional distance at which a point is far from walls.
         parts: The number of points along the side of a pixel.
-        every: The step with which points are selected: 2 uses every second one.
+        every: The interval between used points: 2 uses every second point.
     """
 
     def __init__(self, solid: Flags, keep: float, spare: float, parts: int, every: int = 1) -> None:
@@ -53,7 +53,7 @@ class Lattice:
         self._begin = min(every // 2, min(solid.shape) * parts - 1)
         self._side = every / parts
         self._offset = (self._begin + 0.5) / parts
-        # Half way between two neighbours, walls may be nearer than at both ends by at most a single corner.
+        # Half way between two neighbours, only a single corner of a wall may be nearer than at both ends.
         bulge = solid.ndim * every * every / 4
         squares = [((keep + more) * parts) ** 2 + bulge for more in (0.0, spare)]
         apart = quadruple_squares(solid, parts, math.ceil(math.sqrt(squares[1])) + 1)
@@ -65,17 +65,17 @@ class Lattice:
     def path(
         self, start: Array, goal: Array, sees: Callable[[Array, Array], bool], without: Numbers | None = None
     ) -> tuple[Array, Flags] | None:
-        """Return the points of a shortest route from near `start` to near `goal`, and whether each is far from walls.
+        """Return the points on a shortest route from near `start` to near `goal`, and whether each is far from walls.
 
-        The first point is visible from `start`, and the last from `goal`. None: there is no route. The points `without`
-        are excluded.
+        The first point is visible from `start`, and the last from `goal`. The points `without` are excluded. None is
+        returned if there is no route.
         """
         free = self._without(without)
         firsts, lasts = [*self._gates(start, sees, free)], [*self._gates(goal, sees, free)]
         if not (firsts and lasts):
             return None
         lengths = self._search(free, firsts, lasts[0])
-        reached = [last for last in lasts if lengths[last] < _LIMIT]  # there may be no route to the first one
+        reached = [last for last in lasts if lengths[last] < _LIMIT]  # there may be no route to the first of `lasts`
         if not reached:
             return None
         numbers = self._traced(lengths, free, reached[0])
@@ -93,9 +93,9 @@ class Lattice:
         return self._places(found[np.argsort(lengths[found], kind="stable")])
 
     def around(self, place: Array, radii: Array) -> Numbers:
-        """Return the points in an ellipsoid around a place, a little larger than the radii along the axes.
+        """Return the points in an ellipsoid around a place, with semi-axes a little larger than `radii`.
 
-        A line between two other neighbours does not pass through the ellipsoid with these radii.
+        Lines between neighbours among all other points do not pass through the ellipsoid with the given radii.
         """
         least = float(radii.min())
         radii = radii * math.sqrt(1 + self._free.ndim * self._side**2 / (4 * least * least))
@@ -139,10 +139,10 @@ class Lattice:
                     return
 
     def _search(self, free: Flags, firsts: list[int], last: int | None, most: int = _LIMIT) -> Lengths:
-        """Return the lengths of shortest routes from any of `firsts`; `_LIMIT` where none is known.
+        """Return the lengths of shortest routes from any of `firsts`; `_LIMIT` for points without a known route.
 
-        The search ends when the route to `last` is known. If `last` is None, or cannot be reached, all points with a
-        route of at most `most` are found.
+        The search ends when the route to `last` is known. If `last` is None or unreachable, all points with routes no
+        longer than `most` are found.
         """
         lengths = np.full(free.size, _LIMIT, dtype=np.int32)
         waiting: dict[int, list[Numbers]] = {}
@@ -180,7 +180,7 @@ class Lattice:
         return lengths
 
     def _least(self, points: Numbers, last: int | None) -> Lengths:
-        """Return the length of the route to `last` without walls."""
+        """Return the lengths that the routes from `points` to `last` would have without walls."""
         if last is None:
             return np.zeros(len(points), dtype=np.int32)
         ends = np.unravel_index(last, self._free.shape)
@@ -195,7 +195,7 @@ class Lattice:
         while lengths[found[-1]]:
             here = found[-1]
             weight = int(self._weights[here])
-            # A step is the same both ways: it cuts no corner.
+            # A step is possible in both directions or in none, since it cuts no corner.
             before = next(
                 here + step
                 for step, beside, length in self._steps
@@ -208,7 +208,7 @@ class Lattice:
 
     @cached_property
     def _steps(self) -> list[tuple[int, tuple[int, ...], int]]:
-        """All steps in the flat array, with the offsets of the points beside each, and its length; shortest first."""
+        """All steps in the flat array, with the offsets of points beside the step, and its length; shortest first."""
         shape = self._free.shape
         strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
         found = []

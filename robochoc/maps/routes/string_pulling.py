@@ -1,6 +1,6 @@
-"""String pulling: replaces the many points of a route by few straight pieces that are clear of walls.
+"""String pulling: replaces the many points of a route by a few straight pieces that are clear of walls.
 
-A corner is worth a length, since drones come to rest there.
+Each corner is penalized by an extra length, since drones come to rest there.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ import numpy as np
 from robochoc.maps.routes.distances import Array, norms
 
 Sees = Callable[[Array, Array, float], bool]
-"""A function that returns whether a straight line between two points keeps a distance from all walls."""
+"""Returns whether a straight line between two points keeps a distance from all walls."""
 _Numbered = Callable[[int, int], bool]
 
 _AROUND = (-16, -8, -4, -2, -1, 0, 1, 2, 4, 8, 16)
-"""Offsets of the points of a route beside each corner that may replace it."""
+"""The offsets, along the route, of points that may replace a corner."""
 _LOOK_BACK = 60
 _ROUNDS = 2
 _HALVINGS = 6
@@ -27,10 +27,10 @@ def taut(points: Array, keeps: Array, sees: Sees, corner: float) -> Array:
     """Return the corners of a short route along `points` (K, D), from the first to the last one.
 
     Args:
-        points: The points; the lines between consecutive points keep the least of `keeps`.
-        keeps: The distance from walls at each point (K,). A piece keeps the least distance of its points.
-        sees: Whether a line keeps a distance.
-        corner: The length that a corner is worth.
+        points: The points; the lines between consecutive points keep the smallest of `keeps`.
+        keeps: The distance from walls at each point (K,). A piece keeps the smallest distance of its points.
+        sees: Returns whether a line keeps a distance.
+        corner: The extra length by which a corner is penalized.
     """
     least = float(keeps.min())
 
@@ -64,7 +64,7 @@ def _nearer(before: Array, bend: Array, after: Array, keep: float, sees: Sees) -
 
 
 def _far_sighted(last: int, sees: _Numbered) -> list[int]:
-    """Return points from 0 to `last`, each visible from the one before, and about as far away as possible."""
+    """Return points from 0 to `last`, each visible from the previous point, and about as far from it as possible."""
     chain = [0]
     while (here := chain[-1]) < last:
         good, bad = here + 1, last + 1
@@ -81,7 +81,7 @@ def _far_sighted(last: int, sees: _Numbered) -> list[int]:
 
 
 def _shortest(points: Array, chain: Sequence[int], sees: _Numbered, corner: float) -> list[int]:
-    """Return the corners of the shortest route over points of `chain` and near them; a corner is worth a length."""
+    """Return the corners of the shortest route over points in `chain` and near them, with `corner` as penalty."""
     last = chain[-1]
     links = set(pairwise(chain))
     numbers = sorted({*chain, *(at + by for at in chain[1:-1] for by in _AROUND if 0 < at + by < last)})
@@ -101,7 +101,7 @@ def _shortest(points: Array, chain: Sequence[int], sees: _Numbered, corner: floa
 
 
 def _earlier(numbers: Sequence[int], place: int, chain: Sequence[int]) -> Iterator[int]:
-    """Yield the points before a place that are considered: the last ones, and those of the chain."""
+    """Yield the considered points before an index: the last points, and points in the chain."""
     first = max(0, place - _LOOK_BACK)
     yield from numbers[first:place]
     yield from (one for one in chain if one < numbers[first])

@@ -1,8 +1,8 @@
-"""The walls of a three-dimensional map, with floors and ceilings, and routes around them in space.
+"""The walls, floors and ceilings on a three-dimensional map, and routes around them.
 
 Walls are the voxels of a map that are not free, and the outside of the map. A drone keeps `keep` metres between its
-centre and the nearest border of such a voxel. A route is found on a lattice (`lattice.py`), on a finer one if the first
-has no route, and then shortened (`string_pulling.py`). It may also keep a distance from other drones.
+centre and the nearest border of such a voxel. A route is found on a lattice (`lattice.py`), or on a finer lattice if
+the first has no route, and then shortened (`string_pulling.py`). Routes can also keep a distance from other drones.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from robochoc.maps.routes.voxel_surface import VoxelSurface
 from robochoc.maps.walls import VoxelFrame
 
 _FINE = (2, 4)
-"""The numbers of points of the lattices along the distance of drones from walls."""
+"""The numbers of points in each lattice per distance of drones from walls."""
 _FINE_M = 0.04
-"""The least distance between points."""
+"""The minimum distance between points."""
 _POINTS_MAX = 4_000_000
 
 
@@ -31,9 +31,9 @@ class Resting:
     """Drones at rest, from which routes keep a distance.
 
     Attributes:
-        points: Their places (K, 3), in metres.
+        points: The places (K, 3) of these drones, in metres.
         distance: The distance to keep.
-        downwash: The number by which heights are divided for the distance.
+        downwash: The number by which heights are divided in distances.
     """
 
     points: Array
@@ -42,11 +42,11 @@ class Resting:
 
     @property
     def radii(self) -> Array:
-        """The radii along the axes of the closed ellipsoid around each drone."""
+        """The semi-axes of the closed ellipsoid around each drone."""
         return self.distance * np.array([1.0, 1.0, self.downwash])
 
     def clear(self, origins: Array, ends: Array) -> Flags:
-        """Return which straight lines (K,) keep the distance from all of the drones."""
+        """Return which straight lines (K,) keep the distance from all these drones."""
         flat = (squashed(points, self.downwash) for points in (origins, ends, self.points))
         apart = segment_distances(*flat).min(axis=1, initial=math.inf)
         return np.asarray(apart >= self.distance - SLACK_M / 2)
@@ -57,7 +57,7 @@ class VoxelPlan:
     """Walls in space, and how far from them drones keep. Lengths are in metres.
 
     Attributes:
-        solid: The voxels that are not free: by z, then y, then x, each from the lowest on.
+        solid: Which voxels are not free, sorted by z, then y, then x.
         frame: The place of the voxels.
         keep: The distance of a drone's centre from walls.
     """
@@ -76,7 +76,7 @@ class VoxelPlan:
         )
 
     def clearances(self, points: Array, most: float) -> Array:
-        """Return the distance (K,) of each of `points` (K, 3) from the nearest wall, at most `most`."""
+        """Return the distances (K,) of `points` (K, 3) from the nearest walls, at most `most`."""
         found = self._surface.distances(self.frame.in_voxels(points), most / self.frame.size)
         return np.asarray(np.minimum(self.frame.size * found, most))
 
@@ -97,12 +97,12 @@ class VoxelPlan:
         return self.frame.corner[2] + self.frame.size * (int(below[-1]) + 1 if len(below) else 0)
 
     def route(self, first: Array, second: Array) -> Array | None:
-        """Return a short route (K + 1, 3) between two points; None if there is none."""
+        """Return a short route (K + 1, 3) between two points; None if there is no route."""
         found = self._known(first, second)
         return found and found[1]
 
     def route_among(self, first: Array, second: Array, others: Resting) -> Array | None:
-        """Return a short route (K + 1, 3) between two points that avoids drones at rest, too; None if none is found."""
+        """Return a short route (K + 1, 3) that also avoids drones at rest; None if no route is found."""
         known = self._known(first, second)
         if known is None:
             return None
@@ -115,7 +115,7 @@ class VoxelPlan:
     def reached(self, start: Array, others: Resting, most: float) -> Array:
         """Return points (K, 3) that can be reached from `start`, the nearest first.
 
-        Routes to them avoid drones at rest, and are at most `most` long.
+        Routes to these points avoid drones at rest, and are at most `most` long.
         """
         end = self.frame.in_voxels(start[None])[0]
         places = self._lattice(0).reached(
@@ -166,7 +166,7 @@ class VoxelPlan:
         return self._sees(first, second, keep)
 
     def _sees(self, first: Array, second: Array, keep: float) -> bool:
-        """Return whether no wall is nearer than `keep`, in metres, to a straight line, whose ends are in voxels."""
+        """Return whether a straight line, with its ends in voxels, is at least `keep` metres from all walls."""
         return self._surface.clear(first, second, keep / self.frame.size)
 
     @property

@@ -1,7 +1,7 @@
 """The surface of a three-dimensional map: distances of points and straight lines from voxels that are not free.
 
-All lengths are in sides of a voxel, places are relative to the map's lowest corner. Only solid voxels that touch a free
-one are relevant. They are grouped by blocks of voxels, so that few have to be compared.
+All lengths are in voxels, and places are relative to the map's lowest corner. Only solid voxels next to a free voxel
+are relevant. These are grouped into blocks, so that few voxels have to be compared.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy.typing as npt
 from robochoc.maps.routes.distances import Array, Flags, norms, segment_distances
 
 _BLOCK = 4
-"""The side of a block."""
+"""The side length of a block, in voxels."""
 _HALF_DIAGONAL = math.sqrt(3) / 2
 _ROUNDING = 1e-9
 _PORTION = 500_000
@@ -25,7 +25,7 @@ Numbers = npt.NDArray[np.int64]
 
 
 class VoxelSurface:
-    """The surface of the `solid` voxels, by z, y and x. The outside of the map is solid, too."""
+    """Measures distances from the `solid` voxels, given by z, y and x. The outside of the map is also solid."""
 
     def __init__(self, solid: Flags) -> None:
         self._solid = solid
@@ -34,7 +34,7 @@ class VoxelSurface:
         self._blocks = -(-self._size // _BLOCK)
 
     def distances(self, places: Array, most: float) -> Array:
-        """Return the distance (K,) of each of `places` (K, 3) from the nearest solid voxel, at most `most`."""
+        """Return the distances (K,) of `places` (K, 3) from the nearest solid voxels, at most `most`."""
         outside = np.minimum(places, self._size - places).min(axis=1)
         found: Array = np.clip(outside, 0, most)
         voxels = np.floor(places).astype(np.int64).clip(0, self._size - 1)
@@ -54,7 +54,7 @@ class VoxelSurface:
         return found
 
     def clear(self, first: Array, second: Array, radius: float) -> bool:
-        """Return whether no solid voxel is nearer than `radius` to a straight line."""
+        """Return whether a straight line is at least `radius` from all solid voxels."""
         low, high = np.minimum(first, second) - radius, np.maximum(first, second) + radius
         if (low < -_ROUNDING).any() or (high > self._size + _ROUNDING).any():
             return False
@@ -75,7 +75,7 @@ class VoxelSurface:
         return not len(near) or float(_line_distances(first, second, near).min()) >= radius - _ROUNDING
 
     def _near(self, blocks: Numbers, reach: float) -> Numbers:
-        """Return all voxels (K, 3) of the surface that may be within `reach` of one of `blocks` (B, 3)."""
+        """Return all voxels (K, 3) on the surface that may be within `reach` of one of `blocks` (B, 3)."""
         steps = range(-(far := math.ceil((reach + 1) / _BLOCK)), far + 1)
         moves = np.array([*product(steps, repeat=3)])
         around = (blocks[:, None] + moves[None]).reshape(-1, 3)
@@ -95,7 +95,7 @@ class VoxelSurface:
 
     @cached_property
     def _sorted(self) -> tuple[Numbers, Numbers]:
-        """The voxels of the surface (K, 3), block by block, and the index of each block's first voxel."""
+        """The voxels on the surface (K, 3), block by block, and the index of each block's first voxel."""
         free = np.pad(~self._solid, 1)
         for axis in range(3):
             lines = np.moveaxis(free, axis, 0)
@@ -117,7 +117,7 @@ class VoxelSurface:
 
 
 def _gaps(places: Array, voxels: Numbers) -> Array:
-    """Return for each axis the distance of places from voxels."""
+    """Return the distance of places from voxels along each axis."""
     gaps: Array = np.maximum(np.maximum(voxels - places, places - voxels - 1), 0)
     return gaps
 
@@ -126,7 +126,7 @@ def _line_distances(first: Array, second: Array, voxels: Numbers) -> Array:
     """Return the distance (K,) of a straight line from each of `voxels` (K, 3).
 
     The squared distance is a convex, piecewise quadratic function of the position on the line. So its slope is
-    piecewise linear, with breaks where the line enters or leaves the space between two opposite sides of a voxel.
+    piecewise linear, and changes where the line enters or leaves the space between two opposite sides of a voxel.
     """
     along = second - first
     moves = along != 0

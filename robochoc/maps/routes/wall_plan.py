@@ -9,11 +9,11 @@ from robochoc.maps.routes.voxel_plan import VoxelPlan
 from robochoc.maps.walls import VoxelFrame, Walls
 
 WallPlan: TypeAlias = FloorPlan | VoxelPlan
-"""Walls in the plane, or in space. Both provide distances to walls, whether a straight line is clear, and routes."""
+"""Walls in two or three dimensions. Both find distances to walls, check straight lines, and find routes."""
 
 
 def wall_plan_of(walls: Walls) -> WallPlan:
-    """Return the plan of walls, whose robots keep their radius as distance."""
+    """Return the plan for walls, with the robots' radius as distance."""
     frame = walls.frame
     if isinstance(frame, VoxelFrame):
         return VoxelPlan(walls.solid, frame, walls.radius)
