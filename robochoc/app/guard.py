@@ -1,4 +1,4 @@
-"""Protection of the application's server: access control, and limits of requests and connections."""
+"""Protection of the application's server: access control, and limits on requests and connections."""
 
 from __future__ import annotations
 
@@ -31,34 +31,34 @@ _HEADERS = (
     (b"cross-origin-opener-policy", b"same-origin"),
 )
 MOST_BYTES = (64 << 20) + (1 << 16)
-"""The maximum number of bytes of a request: the largest file that can be opened, and the overhead of a form."""
+"""The maximum number of bytes in a request: the largest file that can be opened, and the overhead of a form."""
 PART_S = 30.0
-"""The longest wait for the next part of a request's body, in seconds."""
+"""The maximum time to wait for the next part of a request's body, in seconds."""
 NOT_FOUND = 404
 _METHODS = frozenset({"GET", "HEAD", "POST"})
-"""POST: uploaded files, and browsers without WebSockets."""
+"""The allowed methods. POST: for uploaded files, and for browsers without WebSockets."""
 _MOST_DIGITS = 12
 _NO_ANSWER = "No response returned."
-"""Starlette's error for a page that was closed before it was built, which is harmless."""
+"""Starlette's error message for a page that was closed before it was built, which is harmless."""
 _POLICY = (
     "default-src 'self'; "
     "script-src 'self' 'unsafe-inline' 'unsafe-eval'; "  # NiceGUI's pages require both
     "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
     "connect-src 'self' ws://{host}; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
-"""The policy of a page without its own policy: no connections to other hosts."""
+"""The Content-Security-Policy for pages without their own policy: no connections to other hosts."""
 
 
 class AccessGuard:
     """Passes requests to `served` if they have the secret path and come from this machine and the application's pages.
 
     Other users of this machine do not know the path. Other sites in the same browser do not know the path either, and
-    have another Origin; after DNS rebinding, their Host header differs.
+    have a different Origin header; after DNS rebinding, their Host header differs.
     """
 
     def __init__(self, served: Served, secret: str, port: int) -> None:
         self.app = served
-        """The served application. NiceGUI looks for this attribute."""
+        """The served application. NiceGUI requires this attribute."""
         self._secret = secret.encode()
         self._hosts = {f"127.0.0.1:{port}".encode(), f"localhost:{port}".encode()}
 
@@ -79,7 +79,7 @@ class AccessGuard:
 
         async def sending(message: MutableMapping[str, Any]) -> None:
             nonlocal is_started
-            if is_started or not (body.too_much or body.is_late):  # else the answer below has the reason
+            if is_started or not (body.too_much or body.is_late):  # otherwise the answer below contains the reason
                 is_started = True
                 await send(message)
 
@@ -94,7 +94,7 @@ class AccessGuard:
             await _answer(send, 413 if body.too_much else 408)
 
     def _rejection(self, scope: Scope) -> int | None:
-        """Return the HTTP status of a rejected request; None if it is accepted."""
+        """Return the HTTP status for rejecting a request, or None to accept it."""
         headers: dict[bytes, bytes] = dict(scope["headers"])
         host = headers.get(b"host", b"")
         given = scope["path"].split("/")[1] if "/" in scope["path"] else ""
@@ -125,7 +125,7 @@ class AccessGuard:
 
 
 class _BoundedBody:
-    """Receives a request; if the request is too long or late, the client counts as disconnected."""
+    """Receives a request. If the request is too long or too late, the client counts as disconnected."""
 
     def __init__(self, receive: Receive) -> None:
         self.too_much = False
@@ -160,18 +160,18 @@ async def _answer(send: Send, status: int, text: str = "") -> None:
 
 
 MAX_CONNECTIONS = 200
-"""The maximum number of open connections; more are closed at once. A browser opens six for each page."""
+"""The maximum number of open connections; further ones are closed at once. A browser opens six for each page."""
 MAX_HEAD = 1 << 16
-"""The maximum number of bytes of a request's line and headers."""
+"""The maximum number of bytes in a request's first line and headers."""
 HEAD_S = 30.0
-"""The time limit for the line and headers of a request; twice that on a connection with earlier requests."""
+"""The time limit for a request's first line and headers in seconds, doubled on a connection with earlier requests."""
 
 
 class BoundedConnection(HTTPProtocol):
-    """One connection, closed if a request is late or its line and headers are too long."""
+    """A connection that is closed if a request is late, or its first line and headers are too long."""
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]  # as uvicorn has it
-        """Start the time limit of the first request."""
+        """Start the time limit for the first request."""
         super().connection_made(transport)
         self._head = 0
         if len(self.connections) > MAX_CONNECTIONS:
@@ -192,8 +192,8 @@ class BoundedConnection(HTTPProtocol):
         return bool(getattr(self.cycle, "response_complete", True))
 
     def _check(self, last: object) -> None:
-        """Close the connection if it still waits for the request after `last`."""
-        if self.transport.is_closing() or self.transport.get_protocol() is not self:  # it is a WebSocket now
+        """Close the connection if it is still waiting for the request after `last`."""
+        if self.transport.is_closing() or self.transport.get_protocol() is not self:  # it has become a WebSocket
             return
         if self._is_waiting and self.cycle is last:
             self.transport.close()

@@ -1,6 +1,6 @@
 """The application's logs: messages in the terminal, and the error log (`error_log.log_errors_to`).
 
-This module is apart from `error_log`, since the processes of jobs use it, and must not load NiceGUI.
+This module is separate from `error_log`, because the processes of jobs use it and must not load NiceGUI.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from robochoc.app.texts import say
 USER_LOG = logging.getLogger("robochoc.app")
 """Messages that users must see in the terminal, even if no page is open."""
 ERROR_LOG = logging.getLogger("robochoc.app.error_log")
-"""Unforeseen errors, with their tracebacks."""
+"""Unexpected errors, with their tracebacks."""
 
 
 def error_text(error: Exception) -> str:
@@ -30,7 +30,7 @@ def log_error(error: Exception, doing: str) -> str:
 
     Args:
         error: The error.
-        doing: The work that failed, for the log.
+        doing: A description of the failed work, for the log.
     """
     ERROR_LOG.error("%s: %s", doing, type(error).__name__, exc_info=error)
     return error_text(error)

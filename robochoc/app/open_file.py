@@ -1,4 +1,4 @@
-"""Open a file as a new team in a separate process, since reading an untrusted file can take any time and memory.
+"""Opens a file as a new team, in a separate process, since reading an untrusted file can take any time and memory.
 
 python -m robochoc.app.open_file STORE FILE
 """
@@ -21,18 +21,18 @@ from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 
 PATIENCE_S = 60.0
-"""The time limit for opening a file."""
+"""The time limit for opening a file, in seconds."""
 
 
 class OpenedFile(msgspec.Struct, frozen=True):
-    """The id of the new team, or the errors in the file, one on each line."""
+    """The id of the new team, or the errors in the file, one per line."""
 
     team: str = ""
     mistakes: str = ""
 
 
 def open_file_job(file: Path, store: TeamStore, *, within_s: float = PATIENCE_S) -> Job[OpenedFile]:
-    """Start opening `file` as a new team in `store`; return the job."""
+    """Start opening `file` as a new team in `store`, and return the job."""
 
     def work(job: Job[OpenedFile]) -> OpenedFile:
         try:
@@ -52,7 +52,7 @@ def main() -> None:
     try:
         found = open_team(file)
         team = store.add(found) if isinstance(found, Sketch) else store.add_imported(found)
-        with suppress(OSError):  # a saved state also has a run
+        with suppress(OSError):  # a saved state also contains a run
             unpack_run(file, store.path(team))
     except (InvalidInputError, OSError) as error:
         answer = OpenedFile(mistakes=str(error))

@@ -1,1 +1,1 @@
-"""Imported teams, which were not drawn in the application: facts about their files, in words and as a picture."""
+"""Imported teams, which were not drawn in the application: facts from their files, in words and as a picture."""

@@ -1,4 +1,4 @@
-"""The facts about an imported team that pages show. They are computed when the team is opened, and saved."""
+"""The facts about an imported team shown on pages. They are computed when the team is opened, and saved."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ from robochoc.model.problem import (
 )
 
 MOST_VARIABLES = 20_000
-"""The maximum number of decisions that are listed with their robots."""
+"""The maximum number of decisions listed with their robots."""
 MOST_LINKS = 400
 MOST_EVENTS = 100
 MOST_CHANGES = 12
-"""The maximum number of changes of an event that are listed."""
+"""The maximum number of changes listed for an event."""
 _MOST_RANGES = 8
 _LONGEST_VALUES = 160
 _LONGEST_NOTE = 400
@@ -51,10 +51,10 @@ class RobotFacts(msgspec.Struct, frozen=True):
     """A robot.
 
     Attributes:
-        name: Its name.
-        decides: Its decisions.
-        weight: The weight of its withdrawal.
-        joins: Whether it joins later.
+        name: The robot's name.
+        decides: The robot's decisions.
+        weight: The weight of the robot's withdrawal.
+        joins: Whether the robot joins later.
     """
 
     name: str
@@ -67,20 +67,20 @@ class ImportedFacts(msgspec.Struct, frozen=True):
     """The facts about a team.
 
     Attributes:
-        robots: Its robots in order, followed by those that join later.
+        robots: The team's robots in order, followed by robots that join later.
         last: The robots after all events.
         variables: The number of decisions.
         constraints: The number of constraints at the start.
-        private: The number of constraints of a single robot.
+        private: The number of constraints that concern a single robot.
         partial: The number of parts of partially known constraints.
-        links: The pairs of robots with a common constraint, up to a maximum.
-        linked: The number of such pairs.
+        links: The pairs of robots with a common constraint, up to a maximum number.
+        linked: The number of all such pairs.
         costs: Whether there are costs.
         maximised: Whether costs are utilities, whose sum is maximised.
         events: The events in words.
-        flies: Whether its files have positions of robots.
-        files: Of a team that was drawn here, the files that were changed later; else empty.
-        notes: Changes by the import.
+        flies: Whether the team's files contain positions of robots.
+        files: For a team that was drawn here, the files that were changed later; otherwise empty.
+        notes: The changes made by the import.
         origin: The name of the opened file.
     """
 
@@ -131,12 +131,12 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
 
 
 def events_in_words(team: Team) -> tuple[str, ...]:
-    """Return a sentence for each event of a team, up to a maximum."""
+    """Return a sentence for each event in a team's scenario, up to a maximum number."""
     return tuple(_events(team.scenario, domains_of(team) if team.scenario else {}))
 
 
 def all_robots(team: Team) -> list[Robot]:
-    """Return a team's robots in order, followed by those that join later, without duplicates."""
+    """Return a team's robots in order, followed by robots that join later, without duplicates."""
     joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
     found = {robot.name: robot for robot in team.robots}
     for robot in joining:
@@ -145,7 +145,7 @@ def all_robots(team: Team) -> list[Robot]:
 
 
 def domains_of(team: Team) -> dict[str, Domain]:
-    """Return the domains of all variables, also of robots that join later."""
+    """Return the domains of all variables, including those of robots that join later."""
     return {one.name: one.domain for robot in all_robots(team) for one in robot.variables}
 
 
@@ -159,7 +159,7 @@ def _robots(team: Team) -> Iterator[RobotFacts]:
 
 
 def _values(domain: Domain) -> str:
-    """Return the values of a decision, in short: `1..4, 7`."""
+    """Return the values of a decision in short form: `1..4, 7`."""
     if domain.symbols:
         text = ", ".join(str(domain.label(value)) for value in islice(domain, _LONGEST_VALUES))
     else:

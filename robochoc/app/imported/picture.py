@@ -1,4 +1,4 @@
-"""The picture of an imported team: its robots at the positions in their files, or else side by side."""
+"""The picture of an imported team: its robots at the positions in their files, or side by side."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def picture_sketch(team: ImportedTeam) -> Sketch:
 
 
 def _cells_in_files(robots: Sequence[Robot]) -> list[Cell] | None:
-    """Return the fixed cells of robots in their files; None if there are none, or they do not fit on a map."""
+    """Return the fixed cells given in the robots' files, or None if there are none or they do not fit on a map."""
     if not all(map(has_place, robots)):
         return None
     found = [craft.cell for robot in robots for craft in crafts_of(robot, {})[:1]]

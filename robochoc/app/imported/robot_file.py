@@ -16,7 +16,7 @@ from robochoc.model.expression.tree import SYMBOLIC
 
 MOST_SENTENCES = 60
 MOST_SHOWN = 40_000
-"""The maximum number of characters of a file that are shown."""
+"""The maximum number of characters shown from a file."""
 
 
 class ShownRobotFile(msgspec.Struct, frozen=True):
@@ -24,11 +24,11 @@ class ShownRobotFile(msgspec.Struct, frozen=True):
 
     Attributes:
         name: The file's name.
-        text: Its content, or the beginning of it.
+        text: The content of the file, or its beginning.
         is_cut: Whether `text` is only the beginning.
-        neighbours: The robots with common constraints.
-        sentences: Its constraints in words, up to a maximum.
-        count: The number of its constraints.
+        neighbours: The robots that share constraints with this robot.
+        sentences: The robot's constraints in words, up to a maximum number.
+        count: The number of the robot's constraints.
     """
 
     name: str
@@ -40,7 +40,7 @@ class ShownRobotFile(msgspec.Struct, frozen=True):
 
 
 def read_robot_file(folder: Path, robot: str) -> ShownRobotFile:
-    """Return the file of a robot in the team's `folder`. Raises `InvalidInputError`, `OSError`."""
+    """Return a robot's file in the team's `folder`. Raises `InvalidInputError`, `OSError`."""
     file = _file_of(folder, robot)
     found = read_robot(file)
     constraints = [*found.constraints()]
@@ -58,7 +58,7 @@ def read_robot_file(folder: Path, robot: str) -> ShownRobotFile:
 
 
 def _file_of(folder: Path, robot: str) -> Path:
-    """Return the path of a robot's file; robots that join later are in separate folders."""
+    """Return the path of a robot's file. Robots that join later have separate folders."""
     places = [folder, *sorted(folder.glob("late*"))]
     return next((file for place in places if (file := place / f"{robot}.xml").is_file()), folder / f"{robot}.xml")
 
@@ -79,12 +79,12 @@ _CLOSED = frozenset({"abs", "not", "min", "max", "imp", "if"})
 
 
 def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUnits | None = None) -> str:
-    """Return a constraint in one line, such as `V1 ≠ V2`, with the cost of a violation.
+    """Return a constraint on one line, such as `V1 ≠ V2`, with the cost of a violation.
 
     Args:
         constraint: The constraint.
         symbols: The names of the team's symbols, by their codes.
-        units: The units of the costs in its robot's file. None: integers.
+        units: The units of the costs in the robot's file. None: integers.
     """
     units = units or CostUnits()
     text = _in_words(constraint, symbols, units)
@@ -135,13 +135,13 @@ def _priced(cost: float, units: CostUnits) -> str:
 
 
 class _Reading:
-    """Converts expressions to infix notation, with parameters replaced by the arguments."""
+    """Converts expressions to infix notation, with parameters replaced by arguments."""
 
     def __init__(self, given: Mapping[str, str | int], symbolic: Sequence[str], symbols: Sequence[str]) -> None:
         self._given, self._symbolic, self._symbols = given, frozenset(symbolic), symbols
 
     def text(self, expression: Expression, *, inner: bool = False) -> str:
-        """Return the text of an expression, with parentheses if it is an `inner` one and needs them."""
+        """Return the text of an expression. An `inner` expression is in parentheses if necessary."""
         match expression:
             case Constant(value):
                 return str(value)

@@ -1,1 +1,1 @@
-"""Jobs: work in a thread and its child processes, which can be ended in bounded time."""
+"""Jobs: work in a thread and in child processes, which can be ended in bounded time."""

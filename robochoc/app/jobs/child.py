@@ -1,6 +1,6 @@
-"""The process of a job: `python -m robochoc.app.jobs.child PARENT MODULE ...` is `python -m MODULE ...`.
+"""The process of a job: `python -m robochoc.app.jobs.child PARENT MODULE ...` runs `python -m MODULE ...`.
 
-It ends with the server process PARENT, by a signal of the kernel.
+The kernel ends the process by a signal when the server process PARENT ends.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ def main() -> None:
     """Run the module, unless the parent process has already ended."""
     parent, module = int(sys.argv.pop(1)), sys.argv.pop(1)
     signal_when_orphaned(signal.SIGTERM)
-    if os.getppid() != parent:  # the parent has ended before the signal was requested
+    if os.getppid() != parent:  # the parent ended before the signal was requested
         return
     runpy.run_module(module, run_name="__main__", alter_sys=True)
 

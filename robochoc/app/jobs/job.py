@@ -1,4 +1,4 @@
-"""A job: work in a thread, with the processes that it starts one after the other."""
+"""A job: work in a thread, which can start processes one after the other."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ from robochoc.app.log import log_error
 from robochoc.system.errors import RobochocError
 
 OBSERVE_S = 0.2
-"""The interval of the callback that observes a process."""
+"""The interval at which the callback that observes a process is called, in seconds."""
 _PAUSES_S = (0.001, 0.05)
-"""The first and the longest pause between two checks whether a process has ended."""
+"""The first and the longest pause between two checks whether a process has ended, in seconds."""
 _JOIN_S = 0.1
-"""The interval at which a job that waits for others checks whether it was ended."""
+"""The interval at which a job that waits for other jobs checks whether it was ended, in seconds."""
 END_S = 1.5
-"""The time limit for jobs that are ended together. Their processes are killed at once."""
+"""The time limit in seconds for jobs that are ended together. Their processes are killed at once."""
 AT_ONCE = ((0.0, signal.SIGKILL),)
-"""The signals that stop a job without a result: its process is killed."""
+"""The signals for a job without a result: its process is killed at once."""
 
 T = TypeVar("T")
 Call = Callable[[Callable[[], None]], object]
-"""Calls a function, perhaps later and in another thread."""
+"""Calls a function, possibly later and in another thread."""
 OnIncomplete = Callable[[str], object]
-"""Called once, in the job's thread, if the job did not complete: with the error, or empty if the job was ended."""
+"""Called once in the job's thread if the job did not complete, with the error, or an empty text if it was ended."""
 
 
 class EndedError(RobochocError):
@@ -39,11 +39,11 @@ class EndedError(RobochocError):
 
 
 class LateError(RobochocError):
-    """A process has reached its time limit, and was ended."""
+    """A process reached its time limit and was ended."""
 
 
 def event_loop_caller() -> Call:
-    """Return a function that schedules calls in the current event loop. Without a loop, it calls immediately."""
+    """Return a function that schedules calls in the current event loop, or calls immediately if there is no loop."""
     try:
         loop = asyncio.get_running_loop()
     except RuntimeError:
@@ -57,17 +57,17 @@ def event_loop_caller() -> Call:
 
 
 class Job(Generic[T]):
-    """Work in a thread. The argument of `work` is the job, which can start processes.
+    """Work in a thread. The function `work` receives the job, which can start processes.
 
-    The job always ends: after an error, `future` has the exception, and `on_incomplete` is called. Unforeseen errors
+    A job always ends. After an error, `future` contains the exception, and `on_incomplete` is called. Unexpected errors
     are written to the error log.
 
     Args:
         name: A description of the job, for the error log.
         work: The work.
         on_incomplete: Called if the work was not completed.
-        folder: The folder that the job uses, if any: see `end_jobs_in`.
-        stopping: The signals that stop its process, each with the seconds after which it is sent.
+        folder: The folder that the job uses, if any; see `end_jobs_in`.
+        stopping: The signals that stop the job's process, each with the delay in seconds after which it is sent.
     """
 
     def __init__(
@@ -89,13 +89,13 @@ class Job(Generic[T]):
         self._process: GroupProcess | None = None
         self._thread = threading.Thread(target=self._work, name=name, daemon=True)
         self.stopped_at: float | None = None
-        """The time of the request to stop, on the monotonic clock."""
+        """The time at which a stop was requested, on the monotonic clock."""
         self.is_ended = False
         """True if the job was ended."""
 
     @property
     def pid(self) -> int | None:
-        """The id of the present process, which is also its group."""
+        """The id of the current process and its group."""
         process = self._process
         return process.pid if process else None
 
@@ -117,13 +117,13 @@ class Job(Generic[T]):
         return self
 
     def stop(self) -> None:
-        """Request a stop by the `stopping` signals. Returns immediately."""
+        """Request a stop by the `stopping` signals, and return immediately."""
         if self.stopped_at is None:
             self.stopped_at = time.monotonic()
         self._news.set()
 
     def end(self) -> None:
-        """End the job: kill its process, and start no others. Returns immediately."""
+        """End the job: kill its process, and start no further processes. Returns immediately."""
         self.is_ended = True
         with self._lock:
             process = self._process
@@ -132,17 +132,17 @@ class Job(Generic[T]):
         self._news.set()
 
     def give_up(self) -> None:
-        """Report the end of the job, although its thread is still running."""
+        """Report that the job has ended, although its thread is still running."""
         self._report("")
 
     def join(self, within_s: float | None = None) -> bool:
-        """Wait for the end of the thread; return whether it has ended."""
+        """Wait for the thread to end, and return whether it has ended."""
         if self._thread.ident is not None:
             self._thread.join(within_s)
         return not self.is_alive
 
     def wait_for(self, others: Iterable[Job[Any]]) -> None:
-        """Wait, in this job's thread, for the end of others. Raises `EndedError` if this job is ended meanwhile."""
+        """Wait in this job's thread until other jobs end. Raises `EndedError` if this job is ended in the meantime."""
         for other in others:
             while not other.join(_JOIN_S):
                 self.check()
@@ -160,11 +160,11 @@ class Job(Generic[T]):
         Args:
             command: The process.
             observe: Called repeatedly while the process runs.
-            within_s: The time limit of the process.
+            within_s: The time limit for the process, in seconds.
 
         Raises:
             EndedError: if the job was ended.
-            LateError: if the process has reached its time limit.
+            LateError: if the process reached its time limit.
             OSError: if the process cannot be started.
         """
         with self._lock:
@@ -182,7 +182,7 @@ class Job(Generic[T]):
         return finished
 
     def _watch(self, process: GroupProcess, observe: Callable[[], object] | None, within_s: float | None) -> bool:
-        """Watch a process until its end; return whether it has reached its time limit."""
+        """Watch a process until it ends, and return whether it reached its time limit."""
         began = observed = time.monotonic()
         sent = 0
         pause_s, longest_s = _PAUSES_S
@@ -247,12 +247,12 @@ def jobs_alive() -> list[Job[Any]]:
 
 
 def end_all(within_s: float = END_S) -> None:
-    """End all jobs within a time limit, since the server is shutting down; threads end with the process."""
+    """End all jobs within a time limit, since the server is shutting down. Their threads end with the process."""
     _end(jobs_alive(), within_s)
 
 
 def end_jobs_in(folder: Path) -> list[Job[Any]]:
-    """End the jobs of a folder and its subfolders; return them without waiting for their end."""
+    """End the jobs that use a folder or its subfolders, and return them without waiting for their end."""
     found = [job for job in jobs_alive() if job.folder and (job.folder == folder or folder in job.folder.parents)]
     for job in found:
         job.end()

@@ -1,4 +1,4 @@
-"""One process of a job, which leads a process group and is ended with that group."""
+"""One process of a job. It leads a process group, and is ended together with the group."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from robochoc.system.temporary_files import unnamed_file
 
 ROBOCHOC = "robochoc"
 MAX_OUT = 64 << 20
-"""The maximum number of bytes that are read of a process's output."""
+"""The maximum number of bytes read from a process's output."""
 MAX_ERRORS = 8_000
 _REAPED_S = 5.0
-"""The longest wait for the end of a killed process, in seconds."""
+"""The maximum time to wait for the end of a killed process, in seconds."""
 
 
 @dataclass(frozen=True)
@@ -28,13 +28,14 @@ class Command:
     """A process to start.
 
     Attributes:
-        arguments: The arguments of `module`.
-        folder: Its working directory. None: that of this process.
-        module: The module that it runs.
-        given: Its standard input.
-        out: The file of its standard output. None: the output is in `Finished.out`.
-        errors: The file of its standard error. None: no file.
-        can_be_asked: Whether the signal `STOP` requests its stop; the signal is blocked until the process handles it.
+        arguments: The arguments for `module`.
+        folder: The working directory. None: the working directory of this process.
+        module: The module to run.
+        given: The standard input.
+        out: The file for the standard output. None: the output is returned in `Finished.out`.
+        errors: The file for the standard error. None: no file.
+        can_be_asked: Whether the signal `STOP` asks the process to stop. The signal is blocked until the process
+            handles it.
     """
 
     arguments: tuple[str, ...]
@@ -48,7 +49,7 @@ class Command:
 
 @dataclass(frozen=True)
 class Finished:
-    """The result of a process. `status` is its exit status, or minus the number of the signal that ended it."""
+    """The result of a process. `status` is the exit status, or minus the number of the signal that ended it."""
 
     status: int
     out: bytes
@@ -56,16 +57,16 @@ class Finished:
 
     @property
     def why(self) -> str:
-        """The end of its standard error, or else its exit status."""
+        """The end of the standard error, or the exit status if there is none."""
         if self.errors:
             return self.errors
         return f"exit status {self.status}" if self.status >= 0 else signal.Signals(-self.status).name
 
 
 class GroupProcess:
-    """A process with its process group.
+    """A process that leads a process group.
 
-    The thread that starts the process must wait for it: on Linux the process ends with that thread.
+    The thread that starts the process must wait for it: on Linux, the process ends together with that thread.
 
     Raises:
         OSError: if the process cannot be started.
@@ -115,7 +116,7 @@ class GroupProcess:
         """Kill the process group, and return the result."""
         self.kill()
         with self._lock:
-            self._is_over = True  # from now on the id may be reused
+            self._is_over = True  # from now on another process may have the id
             with suppress(subprocess.TimeoutExpired):
                 self._process.wait(_REAPED_S)
         with self._files:
@@ -133,7 +134,7 @@ def _read(file: IO[bytes], begin: int, most: int) -> bytes:
 
 def _started(command: Command, given: IO[bytes] | None, out: IO[bytes], errors: IO[bytes]) -> subprocess.Popen[bytes]:
     held = {STOP} if command.can_be_asked else set()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, held)  # blocked until the process handles it
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, held)  # blocked until the process handles the signal
     try:
         return subprocess.Popen(  # noqa: S603 - our own module
             [

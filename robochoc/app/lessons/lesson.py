@@ -1,7 +1,7 @@
-"""A lesson: a team of four, runs of protocols on it, and steps with a question about the next event.
+"""A lesson: a team of four robots, runs of protocols, and steps that ask about the next event.
 
-A lesson is a data file (`data/NN.toml`), which also has its texts: its teams, runs and steps. The claim of a choice is
-given in fields, too, which a test compares with the recorded run.
+A lesson is a data file (`data/NN.toml`) with its texts, teams, runs and steps. Fields of a choice repeat its claim,
+which a test compares with the recorded run.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from importlib.resources import files
 import msgspec
 
 ROBOTS = ("Ada", "Bob", "Cleo", "Dan")
-"""The team of all lessons, in its order: the highest priority first."""
+"""The team in all lessons, the highest priority first."""
 COUNT = 10
 PLACES = {"Ada": (90, 72), "Bob": (310, 72), "Cleo": (90, 218), "Dan": (310, 218)}
 """The default positions of the drawn robots."""
@@ -20,18 +20,18 @@ Apart = tuple[str, str]
 
 
 class TeamSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A team: each robot chooses a level, and pairs in `apart` must choose different ones.
+    """A team in which each robot chooses a level, and pairs in `apart` must choose different levels.
 
     Attributes:
         values: The levels of all robots, except those in `values_of`.
         apart: The pairs of robots that must be at different levels.
-        broken_costs: The cost of a pair at the same level; 0: it is forbidden.
-        low: Whether a robot's level is also a cost, equal to its number.
-        chain: The number of robots in a row, instead of the four.
-        partly_known: Whether only its first robot knows each rule.
+        broken_costs: The cost if a pair has the same level. 0: this is forbidden.
+        low: Whether a robot's level number is also a cost.
+        chain: The number of robots in a row, instead of the four robots.
+        partly_known: Whether only the first robot in each rule knows the rule.
         changes: Whether a level is removed after the first solution.
         places: The positions of the drawn robots.
-        names: The side of a robot's name: `left` or `right`; otherwise above or below.
+        names: The side on which a robot's name is drawn: `left` or `right`; by default above or below.
     """
 
     values: tuple[int, ...] = (1, 2)
@@ -55,7 +55,7 @@ class TeamSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
 
 
 class RunSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A run in the simulator; for `auto` only the choice is recorded. `turns`: the number of recorded turns; 0: all."""
+    """A run in the simulator, or only the choice of `auto`. `turns`: the number of recorded turns; 0: all."""
 
     team: str = "team"
     protocol: str
@@ -66,19 +66,19 @@ class RunSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class AnswerChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """One of the answers: its text, its claim, and the reason why it is right or wrong.
+    """One possible answer: its text, its claim, and the reason why it is right or wrong.
 
     Attributes:
-        text: Its text; a message is shown unchanged.
-        why: The reason why it is right or wrong.
-        right: Whether it is the answer.
+        text: The text of the answer. Messages are shown unchanged.
+        why: The reason why the answer is right or wrong.
+        right: Whether this is the correct answer.
         to, words: The claim that the robot sends this message to that robot.
         silent: The claim that the robot sends nothing.
         undecided: The claim that the robot chooses no level.
         takes: The claim that the robot chooses this level.
         levels: The claimed levels of the team.
         breaks: A pair of robots for which `levels` are wrong.
-        robots: The claimed robots, and no others.
+        robots: The claim that exactly these robots are meant.
         number: The claimed number.
         protocol: The claimed protocol.
     """
@@ -104,18 +104,18 @@ class AnswerChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
 
 
 class LessonStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """A moment of a run, and a question.
+    """A moment in a run, and a question about it.
 
     Attributes:
-        title: Its title.
+        title: The title of the step.
         text: The events so far, and further information.
         ask: The question.
-        about: The kind of the question, with names (`tests/support/lesson_truth.py`).
-        run: The run; empty: there are no messages yet, and the picture shows the team.
+        about: The kind of question, followed by names (`tests/support/lesson_truth.py`).
+        run: The run. Empty: there are no messages yet, and the picture shows the team.
         turn: The number of past turns. The question is about the robot of the next turn.
         team: The team, if there is no run.
-        levels: The levels in the picture, if there is no run.
-        choices: Three or four choices.
+        levels: The levels shown in the picture, if there is no run.
+        choices: Three or four possible answers.
     """
 
     title: str
@@ -130,7 +130,7 @@ class LessonStep(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_onl
 
     @property
     def is_spoken(self) -> bool:
-        """True if the question is about the actions and messages of the robot of the next turn."""
+        """True if the question is about the actions and messages of the robot in the next turn."""
         return self.about == "next" or self.about.startswith("told ")
 
     @property
@@ -150,7 +150,7 @@ class Lesson(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tr
     end: str
 
     def team_of(self, step: LessonStep) -> TeamSpec:
-        """Return the team of a step."""
+        """Return the team in a step."""
         return self.teams[self.runs[step.run].team if step.run else step.team]
 
 

@@ -17,7 +17,7 @@ _Point = tuple[float, float]
 
 
 def picture(team: TeamSpec, moment: LessonMoment) -> str:
-    """Return the picture of a team at a moment, without empty lines, so that it can be part of a Markdown page."""
+    """Return the picture of a team at a moment, without empty lines, so that a Markdown page can contain it."""
     if team.chain:
         return _chain(team.chain)
     parts = [
@@ -48,7 +48,7 @@ def _framed(words: str, parts: list[str]) -> str:
 
 def _link(team: TeamSpec, one: str, other: str) -> str:
     (x1, y1), (x2, y2) = team.place(one), team.place(other)
-    part = 0.5 if x1 == x2 or y1 == y2 else _SIGN  # so that the signs of crossing links do not overlap
+    part = 0.5 if x1 == x2 or y1 == y2 else _SIGN  # keeps the signs on crossing links apart
     x, y = x1 + part * (x2 - x1), y1 + part * (y2 - y1)
     return (
         f'<line class="link" x1="{x1}" y1="{y1}" x2="{x2}" y2="{y2}"/>'
@@ -77,7 +77,7 @@ def _robot(team: TeamSpec, moment: LessonMoment, robot: str) -> str:
 
 
 def _arrows(messages: tuple[LessonMessage, ...]) -> dict[tuple[str, str], str]:
-    """Return one arrow for each sender and receiver, with the kind of the last message."""
+    """Return one arrow for each pair of sender and receiver, with the kind of the last message."""
     return {(one.sender, one.to): one.kind for one in messages}
 
 
@@ -125,7 +125,7 @@ _SHOWN = 7
 
 
 def _chain(count: int) -> str:
-    """Return the picture of a row of robots, of which a few are drawn."""
+    """Return the picture of a long row of robots, of which only a few are drawn."""
     xs = [40 + 53 * place for place in range(_SHOWN)]
     y = HEIGHT // 2
     gap = _SHOWN - 2

@@ -13,14 +13,14 @@ _MOST_BYTES = 1 << 16
 
 
 class LessonProgress:
-    """The answered steps by lesson, saved in `folder`. After an error of reading, the progress is empty."""
+    """The number of answered steps in each lesson, saved in `folder`; empty if the saved file cannot be read."""
 
     def __init__(self, folder: Path) -> None:
         self._file = folder / _FILE
         self._done = self._read()
 
     def done(self, number: int) -> int:
-        """Return the number of answered steps of a lesson, from its first one on."""
+        """Return the number of answered steps at the beginning of a lesson."""
         return min(max(self._done.get(number, 0), 0), len(lesson(number).steps))
 
     def is_over(self, number: int) -> bool:
@@ -28,7 +28,7 @@ class LessonProgress:
         return self.done(number) == len(lesson(number).steps)
 
     def next(self) -> int:
-        """Return the first lesson that is not completed; the first lesson if all are."""
+        """Return the first lesson that is not completed, or lesson 1 if all are completed."""
         return next((number for number in range(1, COUNT + 1) if not self.is_over(number)), 1)
 
     def answered(self, number: int, step: int) -> None:
@@ -56,5 +56,5 @@ class LessonProgress:
         try:
             fresh.write_bytes(msgspec.json.encode(self._done))
             fresh.replace(self._file)
-        except OSError:  # the lesson continues if the disk is full, for example
+        except OSError:  # a full disk, for example, does not stop the lesson
             fresh.unlink(missing_ok=True)

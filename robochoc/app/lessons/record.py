@@ -1,4 +1,4 @@
-"""Record the runs of a lesson in the simulator. `robochoc app` does not use this module."""
+"""Records the runs of a lesson in the simulator. `robochoc app` does not use this module."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ AUTO = "auto"
 
 
 def recorded(lesson: Lesson) -> dict[str, LessonRun]:
-    """Run and return the recordings of a lesson."""
+    """Execute the runs of a lesson, and return their recordings."""
     return {name: _recorded(lesson.teams[run.team], run) for name, run in lesson.runs.items()}
 
 
@@ -74,7 +74,7 @@ def _recorded(spec: TeamSpec, run: RunSpec) -> LessonRun:
 def _messages_and_turns(
     events: list[AnyEvent], run: RunSpec
 ) -> tuple[tuple[LessonMessage, ...], tuple[LessonTurn, ...]]:
-    """Return the messages and turns, in the words of the sniffer and the replay."""
+    """Return the messages and turns, in the words used by the sniffer and the replay."""
     header = Header(team="lesson", protocol=run.protocol, runtime="simulator", seed=run.seed)
     trace = Trace(header)
     trace.add(events)

@@ -1,6 +1,6 @@
 """The recorded runs of a lesson, made from real runs (`record.py`) and stored with the lesson.
 
-A test repeats the runs and compares them with the recordings, so that lessons show the protocols' actual behaviour.
+A test repeats the runs and compares them with the recordings, so that lessons show the actual behaviour of protocols.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class LessonMessage(msgspec.Struct, frozen=True):
 
 
 class LessonTurn(msgspec.Struct, frozen=True, omit_defaults=True):
-    """One step of a robot: the received and sent messages by number, its level, and the reasons for the level."""
+    """One step of a robot: the received and sent messages (by number), its level, and the reasons for this level."""
 
     robot: str
     heard: tuple[int, ...] = ()
@@ -33,7 +33,7 @@ class LessonTurn(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class LessonRun(msgspec.Struct, frozen=True, omit_defaults=True):
-    """A run: its protocol, the reason for its choice, messages and turns in order, verdict and cost."""
+    """A run: its protocol, the reason for choosing it, messages and turns in order, verdict and cost."""
 
     protocol: str
     reason: str = ""
@@ -48,7 +48,7 @@ class LessonRun(msgspec.Struct, frozen=True, omit_defaults=True):
 
 
 class LessonMoment(msgspec.Struct, frozen=True):
-    """The content of a picture: levels, the present messages, and the robot of the question."""
+    """The content of a picture: levels, the current messages, and the robot that the question is about."""
 
     levels: dict[str, int]
     messages: tuple[LessonMessage, ...] = ()
@@ -57,13 +57,13 @@ class LessonMoment(msgspec.Struct, frozen=True):
 
 @cache
 def recordings(number: int) -> dict[str, LessonRun]:
-    """Return the runs of a lesson by their names."""
+    """Return the runs of a lesson by name."""
     file = files(__package__) / "runs" / f"{number:02}.json"
     return msgspec.json.decode(file.read_bytes(), type=dict[str, LessonRun])
 
 
 def before(number: int, step: LessonStep) -> LessonMoment:
-    """Return the moment of a step: the robot of the question has received the drawn messages, and sent none yet."""
+    """Return the moment of a step: the robot in question has received the drawn messages, but has not sent any yet."""
     if not step.run:
         return LessonMoment(step.levels)
     run = recordings(number)[step.run]
@@ -87,7 +87,7 @@ def after(number: int, step: LessonStep) -> LessonMoment:
 
 
 def reasons(number: int, step: LessonStep) -> tuple[str, ...]:
-    """Return the robot's reasons for its new level, from the replay of the run."""
+    """Return the reasons for the robot's new level, from the replay of the run."""
     if not step.run or not step.is_spoken:
         return ()
     why = recordings(number)[step.run].turns[step.turn].why

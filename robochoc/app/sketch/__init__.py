@@ -1,1 +1,1 @@
-"""Sketches: teams as drawn by the user, with their edits, checks, files and conversions. NiceGUI is not used here."""
+"""Sketches: teams drawn by the user, with edits, checks, files and conversions. NiceGUI is not used here."""

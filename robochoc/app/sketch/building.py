@@ -1,4 +1,4 @@
-"""Conversion of a sketch to a `robochoc.Model` and a team, and of a solution to the sketch's values."""
+"""Converts a sketch to a `robochoc.Model` and a team, and a solution to the values in the sketch."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from robochoc.modelling.team_builder import build_team, saved_order
 from robochoc.modelling.terms import ModelVariable, Term
 
 WAYPOINT = "waypoint"
-"""The topic of a robot's target, after the robot's name."""
+"""The name of the topic for a robot's target, which follows the robot's name."""
 
 
 def model_of(sketch: Sketch) -> Model:
-    """Return the model of a sketch, which must have no errors (`checks.errors_of`).
+    """Return the model for a sketch, which must not have errors (`checks.errors_of`).
 
-    Constraints are named after their rule and its robots, such as `R1.North.South`.
+    Constraints are named after the rule and its robots, such as `R1.North.South`.
 
     Raises:
         ModelError: if the sketch has an error.
@@ -42,15 +42,15 @@ def model_of(sketch: Sketch) -> Model:
 def decided(
     sketch: Sketch, assignment: Mapping[str, int | str], model: Model | None = None
 ) -> dict[tuple[str, str], int | str]:
-    """Return the robots' decisions as values of the sketch.
+    """Return the robots' decisions as values in the sketch.
 
     Args:
         sketch: The sketch.
-        assignment: Values by variables in the form of `solve --json`, in which names have no blanks.
-        model: The model that was solved, if it is not that of the sketch.
+        assignment: Values by variable, in the form of `solve --json`, in which names have no spaces.
+        model: The solved model, if it is not the model of the sketch.
 
     Returns:
-        Values of the sketch, by robot and decision. Unknown values are left out.
+        The values in the sketch, by robot and decision. Unknown values are left out.
     """
     model = model_of(sketch) if model is None else model
     found: dict[tuple[str, str], int | str] = {}
@@ -66,20 +66,20 @@ def decided(
 
 
 def saved_team(sketch: Sketch) -> Team:
-    """Return the team in the files of a sketch. Raises `ModelError` if the sketch has an error."""
+    """Return the team that the files of a sketch contain. Raises `ModelError` if the sketch has an error."""
     model = model_of(sketch)
     order = saved_order(model.team)
     return model.team if order == model.team.order else build_team(model, order)
 
 
 def applied(sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, tuple[str, ...]]]:
-    """Yield the name and the robots of each constraint of a rule."""
+    """Yield the name and the robots of each constraint for a rule."""
     for robots in PALETTE[rule.kind].groups(sketch, rule):
         yield name_of(rule, robots), robots
 
 
 def name_of(rule: SketchRule, robots: Sequence[str]) -> str:
-    """Return the name of the constraint of `rule` for the robots of one link."""
+    """Return the name of the constraint for `rule` and the robots in one link."""
     few = 3
     return ".".join([rule.id, *robots]) if len(robots) < few else rule.id
 
@@ -90,24 +90,24 @@ def _add(model: Model, sketch: Sketch, rule: SketchRule) -> None:
 
 
 def term_of(model: Model, sketch: Sketch, rule: SketchRule, robots: Sequence[str]) -> Term:
-    """Return the condition of a rule for the robots of one link, over the variables of a model."""
+    """Return the condition for a rule and the robots in one link, over the variables of a model."""
     term = PALETTE[rule.kind].condition(Applied(sketch, rule), [model.robots[robot][rule.decision] for robot in robots])
     assert isinstance(term, Term), "variables of a model make terms"  # noqa: S101
     return term
 
 
 def add_constraint(model: Model, rule: SketchRule, name: str, term: Term, robots: Sequence[str]) -> None:
-    """Add the constraint of a rule for the robots of one link."""
+    """Add the constraint for a rule and the robots in one link."""
     if PALETTE[rule.kind].graded:
         model.minimize(term)
-    elif rule.private and len(robots) > 1:  # partially known: the other robot has no part in it, and never learns it
+    elif rule.private and len(robots) > 1:  # partially known: the other robot has no part, and never learns this one
         model.robots[robots[0]].knows(term, cost=rule.cost, name=name)
     else:
         model.add(term, cost=rule.cost, name=name)
 
 
 def add_topic(sketch: Sketch, robot: ModelRobot) -> None:
-    """Add the topic for a robot's target, if it decides a place or a level."""
+    """Add the topic for a robot's target, if the robot decides a place or a level."""
     variables: dict[DecisionKind, ModelVariable] = {}
     for decision in _decided_by(sketch, robot.name):
         variables.setdefault(decision.kind, robot.variables[decision.name])

@@ -1,8 +1,9 @@
-"""A changing problem from two sketches: a model of the first sketch, with an event that converts it to the second one.
+"""Builds a changing problem from two sketches: a model of the first, with an event that converts it to the second.
 
 An event can add and remove robots, values, and constraints between robots (docs/reference/format.md, "Changes over
-time"). It cannot add or remove constraints of a single robot: their changes are expressed by the remaining values.
-Other differences cannot be expressed, so that the team must decide from scratch: `FromScratchError` has the reason.
+time"). It cannot add or remove constraints of a single robot, so changes of these are expressed by removing or adding
+values. Other differences cannot be expressed: `FromScratchError` contains the reason why the team must decide from
+scratch.
 """
 
 from __future__ import annotations
@@ -26,11 +27,11 @@ from robochoc.modelling.model import Model
 from robochoc.system.errors import RobochocError
 
 Domains = dict[tuple[str, str], list[Value]]
-"""The remaining values, by robot and decision."""
+"""The allowed values, by robot and decision."""
 
 
 class FromScratchError(RobochocError, ValueError):
-    """Events cannot express a difference, so that the team must decide from scratch. `key`: the key of the text."""
+    """Events cannot express a difference, so the team must decide from scratch. `key`: the key of the error text."""
 
     def __init__(self, key: str, **named: object) -> None:
         super().__init__(key)
@@ -48,7 +49,7 @@ class RuleLink:
 
     @cached_property
     def meaning(self) -> tuple[object, ...]:
-        """The content of the constraint. Links with equal contents are the same constraint, also from other rules."""
+        """The content of the constraint. Links with equal contents are the same constraint, even for different rules."""
         rule = self.rule
         settings = {name: value for name, value in rule.settings.items() if name != "radius"}
         encoded = msgspec.json.encode(settings, order="sorted")
@@ -56,7 +57,7 @@ class RuleLink:
 
     @property
     def restricts_values(self) -> bool:
-        """True if the constraint can be expressed by the remaining values of its only robot."""
+        """True if the constraint concerns a single robot, and can be expressed by removing values."""
         return len(self.robots) == 1 and self.rule.cost is None and not PALETTE[self.rule.kind].graded
 
     def allows(self, value: Value) -> bool:
@@ -65,7 +66,7 @@ class RuleLink:
 
 
 def changing_model(before: Sketch, after: Sketch) -> Model:
-    """Return the model of `before` with an event that converts it to `after` when it is solved.
+    """Return the model of `before`, with an event that converts it to `after` once it is solved.
 
     Raises:
         FromScratchError: if events cannot express the difference.
@@ -103,7 +104,7 @@ class _Difference:
         self._added = [*_with_names(_beyond(then_links, [left for _, left in remaining]), taken)]
 
     def _remaining(self, link: RuleLink) -> RuleLink | None:
-        """Return a link without the robots that have left: a count is restated; None for others, which are dropped."""
+        """Return a link without the robots that have left: a count is restated; other links are dropped (None)."""
         if self._stay.issuperset(link.robots):
             return link
         rest = tuple(name for name in link.robots if name in self._stay)
@@ -126,7 +127,7 @@ class _Difference:
                 _check_link(link)
 
     def _check_robot(self, name: str) -> None:
-        """Raise `FromScratchError` if a remaining robot has other decisions, or another weight or rank."""
+        """Raise `FromScratchError` if a remaining robot has different decisions, or a different weight or rank."""
         was, now = self._before.robot(name), self._after.robot(name)
         decided, decides = (
             {one.name: one.kind for one in _decisions_of(sketch, name)} for sketch in (self._before, self._after)
@@ -138,12 +139,12 @@ class _Difference:
         if (was.weight, was.rank) != (now.weight, now.rank):
             raise FromScratchError("whatif.anew-importance", robot=name)
         if was.at != now.at and DecisionKind.LEVEL in decided.values() and DecisionKind.PLACE not in decided.values():
-            raise FromScratchError("whatif.anew-moved", robot=name)  # its waypoint depends on its position
+            raise FromScratchError("whatif.anew-moved", robot=name)  # the robot's waypoint depends on its position
 
     def model(self) -> Model:
-        """Return the model of the first sketch, with the event.
+        """Return the model of the first sketch with the event.
 
-        Changed constraints of a single robot are expressed by values. They are added to the event before the
+        Changed constraints of a single robot are expressed by values. Values are added to the event before constraints,
         constraints, since the value of a constraint must exist.
         """
         before, after = self._before, self._after
@@ -158,7 +159,7 @@ class _Difference:
         return model
 
     def _robots(self, domains: Domains) -> Model:
-        """Return a model of the first sketch's robots with these values, without constraints."""
+        """Return a model with the first sketch's robots and these values, without constraints."""
         before = self._before
         model = Model(before.name)
         for drawn in before.robots:
@@ -173,7 +174,7 @@ class _Difference:
         return model
 
     def _add_value_changes(self, model: Model, event: ModelEvent, was: Domains, now: Domains) -> None:
-        """Add the new and removed values of remaining robots to the event."""
+        """Add to the event the changes in the values of remaining robots."""
         for (name, decision), values in now.items():
             if name in self._stay:
                 old, variable = was[name, decision], model.robots[name][decision]
@@ -183,9 +184,9 @@ class _Difference:
                     event.remove_value(variable, value)
 
     def _add_other_changes(self, model: Model, event: ModelEvent) -> None:
-        """Add the new and removed robots and constraints to the event."""
+        """Add to the event the new and removed robots and constraints."""
         for link in self._dropped:
-            if not self._stay.issuperset(link.robots):  # before it is restated for the remaining robots
+            if not self._stay.issuperset(link.robots):  # removed before it is restated for the remaining robots
                 event.remove_constraint(link.name)
         for name in self._leave:
             event.remove_robot(name)
@@ -205,7 +206,7 @@ class _Difference:
         return link.restricts_values and self._stay.issuperset(link.robots)
 
     def _domains(self, sketch: Sketch, links: Sequence[RuleLink]) -> Domains:
-        """Return the values of a sketch, without those that `links` forbid to remaining robots."""
+        """Return a sketch's values, without those that `links` forbid for remaining robots."""
         found: Domains = {
             (name, decision.name): [*sketch.values(decision)]
             for decision in sketch.decisions
@@ -219,7 +220,7 @@ class _Difference:
 
 
 def links_of(sketch: Sketch) -> Iterator[RuleLink]:
-    """Yield the constraints of all active rules."""
+    """Yield the constraints of all active rules in a sketch."""
     for rule in sketch.rules:
         if rule.on:
             for name, robots in applied(sketch, rule):
@@ -227,7 +228,7 @@ def links_of(sketch: Sketch) -> Iterator[RuleLink]:
 
 
 def _beyond(links: Collection[RuleLink], others: Collection[RuleLink]) -> Iterator[RuleLink]:
-    """Yield the links that are not in `others`; links that occur several times are counted."""
+    """Yield the links that are not in `others`. Repeated links are counted."""
     there = Counter(link.meaning for link in others)
     for link in links:
         if there[link.meaning]:
@@ -260,7 +261,7 @@ def _add(event: ModelEvent, model: Model, link: RuleLink) -> None:
     if not PALETTE[link.rule.kind].graded:
         event.add(term, cost=link.rule.cost, name=link.name)
         return
-    (robot,) = link.robots  # an event has no sum to minimise: each value gets a constraint with its cost
+    (robot,) = link.robots  # an event cannot minimise a sum, so each value has a constraint with its cost
     variable, decision = model.robots[robot][link.rule.decision], link.sketch.decision(link.rule.decision)
     assert decision is not None  # noqa: S101 - an active rule has a decision
     for value in link.sketch.values(decision):

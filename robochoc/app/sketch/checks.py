@@ -1,4 +1,4 @@
-"""All errors of a sketch, and hints on problems."""
+"""Finds all errors in a sketch, and gives hints on probable mistakes."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from robochoc.solver.compiled_domain import MAX_SOLUTIONS
 
 
 def troubles(sketch: Sketch) -> list[Trouble]:
-    """Return the errors of a sketch, followed by hints. Without errors, `building.model_of` returns its model.
+    """Return the errors in a sketch, followed by hints. Without errors, `building.model_of` can build its model.
 
-    Hints are on probable mistakes: rules that can never be satisfied, or too many combinations.
+    Hints point out probable mistakes: rules that can never be satisfied, or too many combinations.
     """
     found, facts = _checked(sketch)
     if facts and not any(trouble.is_error for trouble in found):
@@ -27,12 +27,12 @@ def troubles(sketch: Sketch) -> list[Trouble]:
 
 
 def errors_of(sketch: Sketch) -> list[Trouble]:
-    """Return the errors of a sketch. This is faster than `troubles`, since hints are slow."""
+    """Return the errors in a sketch. This is faster than `troubles`, since hints are slow."""
     return [trouble for trouble in _checked(sketch)[0] if trouble.is_error]
 
 
 def _checked(sketch: Sketch) -> tuple[list[Trouble], SketchFacts | None]:
-    """Return all errors and quick hints, and the facts about a sketch that is within bounds."""
+    """Return all errors and quick hints, and the facts about the sketch if it is within bounds."""
     found = [*element_checks.check_bounds(sketch)]
     if found:
         return found, None
@@ -51,17 +51,17 @@ def _checked(sketch: Sketch) -> tuple[list[Trouble], SketchFacts | None]:
 
 
 MAX_PAIRS = 10_000
-"""The maximum number of pairs of values that are checked for two robots."""
+"""The maximum number of pairs of values checked for two robots."""
 MAX_TRIED = 100_000
-"""The maximum number of pairs of values that are checked for a sketch."""
+"""The maximum number of pairs of values checked for a sketch."""
 MAX_CHECKED_LINKS = 5_000
-"""The maximum number of links of two robots that are checked."""
+"""The maximum number of checked links between two robots."""
 
 Values = frozenset[int | str]
 Own = dict[tuple[str, str], Values]
-"""The values that rules of a single robot allow, by robot and decision."""
+"""The values that rules for a single robot allow, by robot and decision."""
 _Link = tuple[str, str, str]
-"""A decision, and two robots."""
+"""A decision and two robots."""
 
 
 def hopeless(facts: SketchFacts) -> Iterator[Trouble]:
@@ -81,7 +81,7 @@ def hopeless(facts: SketchFacts) -> Iterator[Trouble]:
 
 
 def _single_conflicts(facts: SketchFacts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
-    """Remove from `own` the values that each rule forbids. Yield the rules that leave a robot no values."""
+    """Remove from `own` the values that each rule forbids. Yield the rules that leave a robot without values."""
     for rule in rules:
         given, entry = Applied(facts.sketch, rule), PALETTE[rule.kind]
         for (robot,) in entry.groups(facts.sketch, rule):
@@ -139,7 +139,7 @@ def _is_satisfiable(facts: SketchFacts, left: tuple[Values, Values], applied: li
 
 
 def _group_conflicts(facts: SketchFacts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
-    """Yield a rule that its robots cannot satisfy together."""
+    """Yield `rule` if its robots cannot satisfy it together."""
     robots = facts.sketch.bound(rule)
     left = [_left(facts, own, robot, rule.decision) for robot in robots]
     if rule.kind == "different":
@@ -154,7 +154,7 @@ def _group_conflicts(facts: SketchFacts, rule: SketchRule, own: Own) -> Iterator
 
 
 def large(facts: SketchFacts) -> Iterator[Trouble]:
-    """Yield one robot of each group with equal decisions that have too many combinations."""
+    """Yield one robot from each group of robots with equal decisions and too many combinations."""
     groups: dict[tuple[str, ...], list[str]] = {}
     for robot in facts.sketch.robots:
         decisions = tuple(name for name, robots in facts.deciders.items() if robot.name in robots)

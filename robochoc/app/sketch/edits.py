@@ -1,6 +1,7 @@
-"""Edits of a sketch. Each returns another sketch, or raises `EditError` with the invalid element.
+"""Edits of a sketch. Each edit returns a new sketch, or raises `EditError` with the invalid element.
 
-An edit leaves no dangling references: a removed robot is removed from rules, a removed decision with its rules.
+An edit leaves no dangling references: a removed robot is also removed from rules, and a removed decision with its
+rules.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from robochoc.system.errors import RobochocError
 
 
 class EditError(RobochocError, ValueError):
-    """An invalid edit: the `key` of its text in the catalogue, the arguments of the text, and the element."""
+    """An invalid edit: the `key` of the error text in the catalogue, the text's arguments, and the invalid element."""
 
     def __init__(self, key: str, element: str = "", **named: object) -> None:
         super().__init__(key)
@@ -34,7 +35,7 @@ def renamed(sketch: Sketch, name: str) -> Sketch:
 
 
 def with_robot(sketch: Sketch, at: Cell, name: str | None = None) -> Sketch:
-    """Add a robot in a cell; without a name, it gets an unused one."""
+    """Add a robot in a cell. Without `name`, it is given an unused name."""
     if len(sketch.robots) >= limits.MAX_ROBOTS:
         raise EditError("edit.too-many-robots", most=limits.MAX_ROBOTS)
     check_cell(sketch, at)
@@ -44,7 +45,7 @@ def with_robot(sketch: Sketch, at: Cell, name: str | None = None) -> Sketch:
 
 
 def without_robot(sketch: Sketch, name: str) -> Sketch:
-    """Remove a robot, also from decisions and rules. Decisions and rules of this robot only are removed."""
+    """Remove a robot, also from decisions and rules. Decisions and rules of this robot alone are removed."""
     robots = tuple(robot for robot in sketch.robots if robot.name != name)
     decisions = tuple(
         msgspec.structs.replace(one, robots=_without(one.robots, name))
@@ -93,7 +94,7 @@ def with_importance(sketch: Sketch, name: str, *, weight: int | None = None, ran
 
 
 def with_area(sketch: Sketch, columns: int, rows: int) -> Sketch:
-    """Resize the map. Robots outside the new map move to its edge; cells keep their positions."""
+    """Resize the map. Robots outside the new map are moved to its edge; cells keep their positions."""
     most = limits.MAX_SIDE
     if not (1 <= columns <= most and 1 <= rows <= most):
         raise EditError("edit.map", "map", most=most)
@@ -101,7 +102,7 @@ def with_area(sketch: Sketch, columns: int, rows: int) -> Sketch:
 
 
 def with_cell_blocked(sketch: Sketch, cell: Cell, *, blocked: bool) -> Sketch:
-    """Block or free a cell of the map. Blocked cells are not values of decisions."""
+    """Block or free a cell of the map. Blocked cells cannot be chosen in decisions."""
     check_cell(sketch, cell)
     cells = sketch.area.blocked | {cell} if blocked else sketch.area.blocked - {cell}
     return msgspec.structs.replace(sketch, area=msgspec.structs.replace(sketch.area, blocked=cells))
@@ -111,7 +112,7 @@ def with_cell_blocked(sketch: Sketch, cell: Cell, *, blocked: bool) -> Sketch:
 
 
 def with_decision(sketch: Sketch, decision: Decision, *, instead_of: str | None = None) -> Sketch:
-    """Add a decision, or replace another one. `checks` reports rules that do not fit the decision any more."""
+    """Add a decision, or replace one. Rules that no longer fit the decision are reported by `checks`."""
     others = {one.name for one in sketch.decisions} - {instead_of}
     if instead_of is None and len(sketch.decisions) >= limits.MAX_DECISIONS:
         raise EditError("edit.too-many-decisions", most=limits.MAX_DECISIONS)
@@ -129,7 +130,7 @@ def with_decision(sketch: Sketch, decision: Decision, *, instead_of: str | None 
 
 
 def without_decision(sketch: Sketch, name: str) -> Sketch:
-    """Remove a decision and its rules."""
+    """Remove a decision together with its rules."""
     decisions = tuple(one for one in sketch.decisions if one.name != name)
     return _without_lost_rules(msgspec.structs.replace(sketch, decisions=decisions))
 
@@ -138,7 +139,7 @@ def without_decision(sketch: Sketch, name: str) -> Sketch:
 
 
 def with_rule(sketch: Sketch, rule: SketchRule) -> Sketch:
-    """Add a rule, or replace the rule with the same id; a new rule gets an unused id."""
+    """Add a rule, or replace the rule with the same id. A new rule is given an unused id."""
     if rule.cost is not None and not 1 <= rule.cost <= limits.MAX_COST:
         raise EditError("edit.cost", rule.id, most=limits.MAX_COST)
     if sketch.rule(rule.id) is not None:
@@ -179,7 +180,7 @@ def _without(names: Sequence[str], name: str) -> tuple[str, ...]:
 
 
 def check_cell(sketch: Sketch, cell: Cell, element: str = "map") -> None:
-    """Raise `EditError` for a cell that is not on the map."""
+    """Raise `EditError` for a cell outside the map."""
     if not sketch.area.has(cell):
         raise EditError("edit.outside", element, columns=sketch.area.columns, rows=sketch.area.rows)
 
@@ -199,10 +200,10 @@ def _free_name(stem: str, taken: set[str]) -> str:
 
 
 def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
-    """Return the sketch with a map of this size. Cells remain at their positions, so that their numbers change.
+    """Return the sketch with a map of this size. Cells keep their positions, so their numbers change.
 
-    Robots outside the new map move to its edge. Removed cells are dropped from decisions and rules: `checks` then
-    reports a missing setting of a rule, and a decision without remaining cells gets all free cells.
+    Robots outside the new map are moved to its edge. Removed cells are dropped from decisions and rules: `checks` then
+    reports the missing setting of a rule, and a decision without remaining cells is given all free cells.
     """
     blocked = frozenset(cell for cell in sketch.area.blocked if cell.x < columns and cell.y < rows)
     area = Area(columns, rows, blocked)
@@ -222,17 +223,17 @@ def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
 
 
 class _ResizedMap:
-    """Converts cells of a map to those of a map of another size."""
+    """Converts cells of a map to the cells of a map of another size."""
 
     def __init__(self, before: Area, after: Area) -> None:
         self._before, self._after = before, after
 
     def decision(self, decision: Decision) -> Decision:
-        """Return a decision with the numbers of its remaining cells on the new map."""
+        """Return a decision with the new numbers of its remaining cells."""
         return msgspec.structs.replace(decision, values=tuple(self._values(decision.values)))
 
     def rule(self, rule: SketchRule) -> SketchRule:
-        """Return a rule with the numbers of its remaining cells on the new map."""
+        """Return a rule with the new numbers of its remaining cells."""
         settings = dict(rule.settings)
         for opening in PALETTE[rule.kind].openings if rule.kind in PALETTE else ():
             if opening.form != Form.NUMBER and opening.name in settings:

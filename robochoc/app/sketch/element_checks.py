@@ -1,4 +1,4 @@
-"""Checks of names, sizes and numbers of a sketch. Edits respect these bounds, but files may not."""
+"""Checks of names, sizes and numbers in a sketch. Edits respect these bounds, but files may not."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
 from robochoc.formats.names import MAX_WEIGHT, RESERVED, is_name
 
 MAX_NUMBER = 1_000_000
-"""The largest absolute value of a number as a decision's value."""
+"""The largest absolute value of a number in a decision."""
 
 _FURTHEST = 10**12
-"""The largest absolute value of any number in a readable sketch; browsers represent such numbers exactly."""
+"""The largest absolute value of any number in a readable sketch. Browsers represent such numbers exactly."""
 _LONGEST = 10_000
 """The maximum length of any text in a readable sketch."""
 
 
 def check_bounds(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield exceeded bounds of a sketch. The other checks require a sketch within the bounds."""
+    """Yield the exceeded bounds in a sketch. The other checks require that the sketch is within the bounds."""
     if not is_label(sketch.name):
         yield Trouble(About.TEAM, "team", "trouble.team-name", {"name": shortened(sketch.name)})
     area = sketch.area
@@ -63,7 +63,7 @@ def check_names(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def _clashes(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield decisions with an ambiguous variable name: robot `A.B` with `C`, and robot `A` with `B.C`."""
+    """Yield decisions whose variable names are ambiguous: `C` for robot `A.B`, and `B.C` for robot `A`."""
     if not any("." in decision.name for decision in sketch.decisions):
         return
     known: set[str] = set()
@@ -75,7 +75,7 @@ def _clashes(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def check_robots(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield the errors of robots."""
+    """Yield errors in robots."""
     if not sketch.robots:
         yield Trouble(About.MAP, "map", "trouble.no-robots")
     elif not sketch.decisions:
@@ -98,7 +98,7 @@ def check_robots(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def check_decisions(sketch: Sketch) -> Iterator[Trouble]:
-    """Yield the errors of decisions: of their robots and values."""
+    """Yield errors in decisions, including their robots and values."""
     known = {robot.name for robot in sketch.robots}
     for decision in sketch.decisions:
         named: dict[str, str | int] = {"name": shortened(decision.name)}
@@ -116,7 +116,7 @@ def check_decisions(sketch: Sketch) -> Iterator[Trouble]:
 
 
 def _check_values(sketch: Sketch, decision: Decision) -> Iterator[Trouble]:
-    """Yield the first invalid value of a decision, or else its first duplicate value."""
+    """Yield the first invalid value of a decision, or its first duplicate value."""
     named: dict[str, str | int] = {"name": shortened(decision.name)}
     for value in decision.values:
         key = _value_error(sketch, decision.kind, value)
@@ -145,17 +145,17 @@ def _value_error(sketch: Sketch, kind: DecisionKind, value: int | str) -> str | 
 
 
 def first_unknown(names: Iterable[str], known: set[str]) -> str | None:
-    """Return the first unknown name; None if all are known."""
+    """Return the first unknown name, or None if all names are known."""
     return next((name for name in names if name not in known), None)
 
 
 def first_repeated(items: Sequence[int | str]) -> int | str | None:
-    """Return the first item that occurs more than once; None if there is none."""
+    """Return the first item that occurs more than once, or None if there is no such item."""
     return next((item for item, count in Counter(items).items() if count > 1), None)
 
 
 def is_sound(sketch: Sketch) -> bool:
-    """Return whether a sketch from a file can be shown: its sizes, texts and numbers are within the widest bounds."""
+    """Return whether a sketch from a file can be shown: its sizes, texts and numbers are within the widest limits."""
     area = sketch.area
     sizes = (
         (len(sketch.robots), limits.MAX_ROBOTS),
@@ -183,7 +183,7 @@ def _is_sound(item: int | str) -> bool:
 
 
 def _items(sketch: Sketch) -> Iterator[int | str]:
-    """Yield all texts and numbers of a sketch."""
+    """Yield all texts and numbers in a sketch."""
     yield from (sketch.name, sketch.story)
     for cell in sketch.area.blocked:
         yield from (cell.x, cell.y)

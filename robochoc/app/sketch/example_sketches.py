@@ -1,4 +1,4 @@
-"""The example sketches of the gallery. Their texts are in `texts/en/examples.toml`."""
+"""The example sketches in the gallery. Their texts are in `texts/en/examples.toml`."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from robochoc.app.texts import say
 
 
 def examples() -> dict[str, Sketch]:
-    """Return the sketches with their stories by key, in the order of the gallery: those with a flight first.
+    """Return the example sketches with their stories by key, in the order of the gallery: those with a flight first.
 
-    `title_of` returns the title of an example, and `shows` its topic.
+    For the title of an example see `title_of`, for its topic `shows`.
     """
     return {key: example(key) for key in _MADE}
 
@@ -34,7 +34,7 @@ def shows(key: str) -> str:
 
 
 class _RuleList:
-    """A growing list of rules, which are numbered."""
+    """A growing list of numbered rules."""
 
     def __init__(self) -> None:
         self.all: tuple[SketchRule, ...] = ()
@@ -48,7 +48,7 @@ class _RuleList:
         private: bool = False,
         **settings: Setting,
     ) -> _RuleList:
-        """Add a rule; return this object, for further calls."""
+        """Add a rule, and return this object for chained calls."""
         made = SketchRule(f"R{len(self.all) + 1}", kind, decision, robots, settings, cost, private)
         self.all = (*self.all, made)
         return self
@@ -73,7 +73,7 @@ def _charging() -> Sketch:
 
 
 def _cube() -> Sketch:
-    """Return 4 x 4 robots with 4 levels: in rows, columns and long diagonals, all levels are different."""
+    """Return 4 x 4 robots with 4 levels, which are all different in each row, column and long diagonal."""
     side = range(4)
     robots = tuple(SketchRobot(f"D{x + 1}{y + 1}", Cell(x, y)) for y in side for x in side)
     lines = [

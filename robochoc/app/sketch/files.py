@@ -1,7 +1,7 @@
-"""Teams of the application as files: a folder of XML files, which all commands read, and the sketch.
+"""The application's teams as files: a folder of XML files, which all commands read, and the sketch.
 
-`sketch.json` has the sketch, and a digest of it and of the XML files. If one of these was changed later, the sketch may
-differ from the team, and the team is opened as an imported one, from its XML files.
+`sketch.json` contains the sketch, and a digest of the sketch and the XML files. If a file was changed later, the sketch
+may differ from the team, and the team is opened from its XML files as an imported team.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelError
 
 VERSION = 1
-"""The version of the format of `sketch.json`."""
+"""The format version of `sketch.json`."""
 MAX_SKETCH = 16 << 20
-"""The maximum number of bytes of `sketch.json`. Larger files are rejected."""
+"""The maximum size of `sketch.json` in bytes. Larger files are rejected."""
 
 
 class _Version(msgspec.Struct):
-    """The version of a `sketch.json`; a newer one may have more fields than this version of robochoc knows."""
+    """The version in a `sketch.json`. Newer versions may have fields that are unknown to this version of robochoc."""
 
     version: int
 
@@ -48,7 +48,7 @@ class _SketchFile(msgspec.Struct, forbid_unknown_fields=True):
 
 
 def save(sketch: Sketch, folder: Path, *, replace: bool = False) -> None:
-    """Write the team of a sketch and the sketch into `folder`, atomically.
+    """Write a sketch and its team into `folder`, atomically.
 
     Args:
         sketch: The sketch.
@@ -66,7 +66,7 @@ def save(sketch: Sketch, folder: Path, *, replace: bool = False) -> None:
 
 
 def zipped(sketch: Sketch) -> bytes:
-    """Return the files of `save` as one ZIP archive. Raises `InvalidInputError` if the sketch has errors."""
+    """Return the files that `save` writes as one ZIP archive. Raises `InvalidInputError` if the sketch has errors."""
     files = team_files(_checked_team(sketch))
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -76,17 +76,17 @@ def zipped(sketch: Sketch) -> bytes:
 
 
 def xml_sources(sketch: Sketch) -> dict[str, str]:
-    """Return the XML files of a sketch, by name. Raises `InvalidInputError` if the sketch has errors."""
+    """Return the XML files for a sketch, by name. Raises `InvalidInputError` if the sketch has errors."""
     return {name: content.decode() for name, content in team_files(_checked_team(sketch)).items()}
 
 
 def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...]:
-    """Return the sketch in a folder with the XML files `xml`, if the files are unchanged.
+    """Return the sketch in a folder with the XML files `xml`, if all files are unchanged.
 
-    Otherwise return the files that differ from the sketch; none if there is no sketch.
+    Otherwise return the files that differ from the sketch, or an empty tuple if there is no sketch.
 
     Raises:
-        InvalidInputError: if the sketch's file is damaged, or the sketch has errors.
+        InvalidInputError: if `sketch.json` is damaged, or the sketch has errors.
     """
     path = folder / SKETCH_FILE
     if not path.exists():
@@ -112,7 +112,7 @@ def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...
 
 
 def _differing(sketch: Sketch, xml: Mapping[str, bytes]) -> tuple[str, ...]:
-    """Return the files that differ from those of a sketch; none if the sketch is not sound."""
+    """Return the files that differ from the files for a sketch; empty if the sketch is not sound."""
     if not is_sound(sketch):
         return ()
     try:
@@ -123,7 +123,7 @@ def _differing(sketch: Sketch, xml: Mapping[str, bytes]) -> tuple[str, ...]:
 
 
 def _digest(files: Mapping[str, bytes]) -> str:
-    """Return a digest of the names and contents of files."""
+    """Return a digest of file names and contents."""
     digest = sha256()
     for name in sorted(files):
         path = os.fsencode(name)
@@ -139,7 +139,7 @@ def _checked_team(sketch: Sketch) -> Team:
         )
     try:
         return saved_team(sketch)
-    except ModelError as mistake:  # pragma: no cover - the checks should have found it
+    except ModelError as mistake:  # pragma: no cover - the checks should have found the error
         raise invalid_input(sketch.name, str(mistake), "change the named element") from None
 
 

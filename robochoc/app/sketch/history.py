@@ -11,7 +11,7 @@ MAX_STEPS = 200
 
 
 class History(msgspec.Struct, frozen=True):
-    """A sketch, the earlier ones, and the undone ones; the next one for redo is the last of `after`."""
+    """A sketch, the earlier sketches (`before`), and the undone ones. The last in `after` is the next one for redo."""
 
     now: Sketch
     before: tuple[Sketch, ...] = ()

@@ -1,4 +1,4 @@
-"""Open a team from disk: its folder, an archive of it, or a file of another tool."""
+"""Opens a team from disk: its folder, an archive of the folder, or a file of another tool."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ from robochoc.model.problem import Team
 from robochoc.system.temporary_files import PrivateFolder
 
 MAX_FILES = 2_000
-"""The maximum number of files of a team. Larger teams can be solved by commands."""
+"""The maximum number of files in a team. Larger teams can be solved on the command line."""
 MAX_BYTES = 64 << 20
-"""The maximum number of bytes of all files of a team, or of a file of another tool."""
+"""The maximum number of bytes in all files of a team, or in a file of another tool."""
 _PARTS = re.compile(r"(?:(?!late\d*/)[^/]+/)?((?:late\d*/)?[^/]+\.xml|sketch\.json)")
-"""The files that are unpacked from an archive: those of a team, which may be in a folder."""
+"""The files that are unpacked from an archive: the files of a team, which may be in a folder."""
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError)
-"""The exceptions of reading a damaged archive."""
+"""The exceptions that a damaged archive can cause."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +40,8 @@ class ImportedTeam:
     Attributes:
         path: The opened file or folder.
         team: The team.
-        changed: Of a team that was drawn here, the files that were changed later; else empty.
-        notes: Changes by the import, in sentences.
+        changed: For a team that was drawn here, the files that were changed later; otherwise empty.
+        notes: The changes made by the import, in sentences.
     """
 
     path: Path
@@ -51,12 +51,12 @@ class ImportedTeam:
 
     @property
     def name(self) -> str:
-        """Its name."""
+        """The team's name."""
         return self.team.name
 
     @property
     def robots(self) -> tuple[str, ...]:
-        """The names of its robots."""
+        """The names of the team's robots."""
         return tuple(robot.name for robot in self.team.robots)
 
     @property
@@ -70,16 +70,16 @@ class ImportedTeam:
         return sum(1 for _ in self.team.constraints())
 
     def save(self, folder: Path, *, replace: bool = False) -> None:
-        """Write its XML files into `folder`. Raises `InvalidInputError` as `files.save` does."""
+        """Write the team's XML files into `folder`. Raises `InvalidInputError` as `files.save` does."""
         write_team(self.team, folder, replace=replace)
 
 
 def open_team(path: Path, *more: Path) -> Sketch | ImportedTeam:
-    """Return the team at `path`: the sketch if it was drawn here and is unchanged, or else an imported team.
+    """Return the team at `path`: the sketch if it was drawn here and is unchanged, otherwise an imported team.
 
     Args:
-        path: A team's folder, a ZIP archive of one, or a file that `robochoc import` reads.
-        *more: Further files of the same problem, for formats with several.
+        path: A team's folder, a ZIP archive of such a folder, or a file that `robochoc import` reads.
+        *more: Further files of the same problem, for formats with several files.
 
     Raises:
         InvalidInputError: if the format is unknown, the files are too large, or they have errors.
@@ -109,7 +109,7 @@ def _folder(folder: Path) -> Sketch | ImportedTeam:
 
 
 def _xml_in(folder: Path) -> dict[str, bytes]:
-    """Return the XML files of a team's folder, also those of robots that join later, by their relative paths."""
+    """Return the XML files in a team's folder, including those of robots that join later, by relative path."""
     found: dict[str, bytes] = {}
     total = 0
     for place in [folder, *folder.glob("late*")]:
@@ -118,7 +118,7 @@ def _xml_in(folder: Path) -> dict[str, bytes]:
             total += status.st_size
             if len(found) >= MAX_FILES or total > MAX_BYTES:
                 raise _too_large(folder)
-            if stat.S_ISREG(status.st_mode):  # reading the team reports other kinds of files
+            if stat.S_ISREG(status.st_mode):  # other kinds of files are reported when the team is read
                 found[file.relative_to(folder).as_posix()] = file.read_bytes()
     return found
 
@@ -141,7 +141,7 @@ def _archive(path: Path) -> Sketch | ImportedTeam:
 
 
 def _unpack(path: Path, folder: Path) -> None:
-    """Unpack the team's files of an archive into a folder, within bounds. No path leads out of the folder."""
+    """Unpack a team's files from an archive into a folder, within size limits and never outside the folder."""
     taken: set[str] = set()
     left = MAX_BYTES
     with bounded_archive(path) as archive:
@@ -177,7 +177,7 @@ def _two_teams(path: Path, name: str) -> InvalidInputError:
 
 
 def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
-    """Return the errors with paths in the archive, instead of paths in the temporary folder."""
+    """Return the errors with paths in the archive instead of paths in the temporary folder."""
     inside = f"{place}{os.sep}"
     return [
         replace(one, file=one.file.removeprefix(inside), message=one.message.replace(inside, ""))
@@ -186,14 +186,14 @@ def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
 
 
 MOST_LISTED = 2 << 20
-"""The maximum size of an archive's list of files: enough for ten thousand files. Python reads the list at once."""
+"""The maximum size of an archive's list of files, which Python reads at once: enough for ten thousand files."""
 
 
 class BoundedFile(io.FileIO):
-    """A file with a limit for each read.
+    """A file that limits the size of each read.
 
     Attributes:
-        most: The maximum number of bytes of a read. None: no limit.
+        most: The maximum number of bytes read at once. None: no limit.
     """
 
     most: int | None = MOST_LISTED
@@ -214,9 +214,9 @@ def bounded_archive(path: Path) -> Iterator[zipfile.ZipFile]:
     """Open an untrusted ZIP archive for reading.
 
     Raises:
-        ValueError: if its list of files is too long.
-        OSError: if it cannot be read.
-        zipfile.BadZipFile: if it is damaged; and other exceptions of `zipfile.ZipFile`.
+        ValueError: if the archive's list of files is too long.
+        OSError: if the archive cannot be read.
+        zipfile.BadZipFile: if the archive is damaged; likewise other exceptions of `zipfile.ZipFile`.
     """
     with BoundedFile(path) as file, zipfile.ZipFile(file) as archive:
         file.most = None

@@ -1,9 +1,9 @@
 """The palette: all rules that a user can apply without writing a formula.
 
-A rule of the palette defines the kinds of decisions that it fits, its fields, the robots that it links in the picture,
-and its condition. The condition can be applied to terms of a `robochoc.Model`, to Python text, which the user can copy
-(`python_text`), and to values, for which it is true or false. Its sentence is in the catalogue (`app/texts`) under
-`rule.KEY`.
+A rule in the palette defines the kinds of decisions to which it applies, its fields, the robots that it links in the
+picture, and its condition. The condition can be applied to terms of a `robochoc.Model`, to Python text (`python_text`)
+that the user can copy, and to values, for which it is true or false. The sentence for the rule is in the catalogue
+(`app/texts`) under `rule.KEY`.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ NAMED = ALL_KINDS - NUMBERED
 
 
 class Form(StrEnum):
-    """The form of a rule's field."""
+    """The form of a field in a rule."""
 
     NUMBER = "number"
     """An integer from `least` to `most`."""
@@ -38,7 +38,7 @@ class Form(StrEnum):
 
 
 class Links(StrEnum):
-    """The robots of each link of a rule: each link is one constraint, and one line in the picture."""
+    """The robots in each link of a rule. Each link is one constraint, and one line in the picture."""
 
     EACH = "each"
     """Each robot."""
@@ -47,16 +47,16 @@ class Links(StrEnum):
     NEIGHBOURS = "neighbours"
     """Each pair of robots within the setting `radius`."""
     STAR = "star"
-    """The first robot and each other one."""
+    """The first robot with each other robot."""
     CHAIN = "chain"
-    """Each robot and the next one in the rule's order."""
+    """Each robot with the next robot in the rule's order."""
     GROUP = "group"
     """All robots together."""
 
 
 @dataclass(frozen=True)
 class RuleField:
-    """A field of a rule, which the user fills; `name` is its key in the rule's settings."""
+    """A field in a rule, which the user fills in. `name` is its key in the rule's settings."""
 
     name: str
     form: Form
@@ -110,18 +110,18 @@ class Applied:
 
 @dataclass(frozen=True)
 class PaletteRule:
-    """A rule of the palette.
+    """A rule in the palette.
 
     Attributes:
-        key: Its name.
-        kinds: The kinds of decisions that it fits.
-        links: The robots of its links.
+        key: The rule's name.
+        kinds: The kinds of decisions to which the rule applies.
+        links: The robots in its links.
         openings: Its fields.
-        condition: Returns the condition over the decisions of the robots of one link; for a graded rule, the cost.
+        condition: Returns the condition over the decisions of the robots in one link; for a graded rule, the cost.
         fewest: The minimum number of robots.
         most: The maximum number of robots. None: any number.
-        graded: Whether the rule has graded costs, and cannot be violated.
-        has_order: Whether the order of its robots matters.
+        graded: Whether the rule has graded costs instead of being satisfied or violated.
+        has_order: Whether the order of the robots matters.
     """
 
     key: str
@@ -135,11 +135,11 @@ class PaletteRule:
     has_order: bool = False
 
     def holds(self, given: Applied, values: Sequence[int | str]) -> bool:
-        """Return whether robots with these values, in the order of a link, satisfy the rule (always if graded)."""
+        """Return whether robots with these values, in the order of a link, satisfy the rule; always True if graded."""
         return self.graded or bool(self.condition(given, cast("Sequence[Operand]", values)))
 
     def groups(self, sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, ...]]:
-        """Yield the robots of each link."""
+        """Yield the robots in each link."""
         bound = sketch.bound(rule)
         match self.links:
             case Links.EACH:
@@ -172,7 +172,7 @@ def within(one: Operand, values: list[int | str]) -> Operand:
 
 
 def count(group: Sequence[Operand], value: int | str) -> Operand:
-    """Return the number of decisions that are `value`."""
+    """Return the number of decisions whose value is `value`."""
     if isinstance(group[0], Each):
         return PythonText(f"sum({equal(group[0], value)} for a in {group[0].over})")
     if isinstance(group[0], PythonText):
@@ -191,7 +191,7 @@ def unequal(one: object, other: object) -> Operand:
 
 
 def _neighbours(sketch: Sketch, bound: Sequence[str], radius: object) -> Iterator[tuple[str, str]]:
-    """Yield the pairs of robots within the radius, found by a grid of squares: only adjacent squares are searched."""
+    """Yield the pairs of robots within the radius, using a grid of squares of which only adjacent ones are searched."""
     reach = radius if isinstance(radius, int) else 0
     side = max(1, reach)
     standing = {robot.name: robot.at for robot in sketch.robots}

@@ -18,21 +18,21 @@ from robochoc.app.sketch.sentences import sentence
 from robochoc.app.sketch.sketch import Decision, DecisionKind, Sketch, SketchRule
 
 _WIDE = 110
-"""The maximum length of a line; longer lists are split."""
+"""The maximum length of a line. Longer lists are split."""
 _A, _B = PythonText("a"), PythonText("b")
 
 
 def python_source(sketch: Sketch) -> str:
-    """Return a program that builds and solves the model of a sketch without errors (`checks.troubles`)."""
+    """Return a program that builds and solves the model of a sketch, which must have no errors (`checks.troubles`)."""
     body = [*_lines(sketch)]
     imports = ["import itertools", ""] if any("in itertools." in line for line in body) else []
     return "\n".join([*imports, "import robochoc", "", *body]) + "\n"
 
 
 def names_in_python(sketch: Sketch) -> dict[str, str]:
-    """Return the names of the dictionaries with the variables of decisions.
+    """Return the names of the dictionaries that contain the variables of each decision.
 
-    The names are unique, and differ from keywords of Python and from other names in the program.
+    The names are unique, and differ from Python's keywords and from other names in the program.
     """
     found: dict[str, str] = {}
     for decision in sketch.decisions:
@@ -82,7 +82,7 @@ def _robots(sketch: Sketch) -> Iterator[str]:
 
 
 def _broken(before: str, parts: Sequence[object], after: str) -> Iterator[str]:
-    """Yield a list in one line, or in several lines if it is too long."""
+    """Yield a list on one line, or on several lines if it is too long."""
     texts = [python_literal(part) for part in parts]
     line = f"{before}[{', '.join(texts)}]{after}"
     if len(line) <= _WIDE:
@@ -119,7 +119,7 @@ def _decision(sketch: Sketch, decision: Decision, dictionary: str) -> Iterator[s
 
 
 def _waypoints(sketch: Sketch, names: dict[str, str]) -> Iterator[str]:
-    """Yield the waypoints of robots, in a loop over the robots with the same decisions."""
+    """Yield the waypoints of the robots, in one loop for all robots with the same decisions."""
     groups: dict[tuple[str | None, str | None], list[str]] = {}
     for robot in sketch.robots:
         own: dict[DecisionKind, str] = {}
@@ -143,7 +143,7 @@ def _waypoints(sketch: Sketch, names: dict[str, str]) -> Iterator[str]:
 
 
 class _Loop(NamedTuple):
-    """A loop over the links of a rule: the text before and after a list, the list, and the robots of a link."""
+    """A loop over the links of a rule: the text before and after a list, the list, and the robots in a link."""
 
     before: str
     names: Sequence[object]
@@ -213,7 +213,7 @@ def _statements(
     robots: Sequence[str | PythonText],
     name: list[str | PythonText],
 ) -> Iterator[str]:
-    """Yield the statement that adds a rule for one link; a private rule is added to the link's first robot."""
+    """Yield the statement that adds a rule for one link. A private rule is added to the first robot in the link."""
     entry = PALETTE[rule.kind]
     term = entry.condition(Applied(sketch, rule), terms)
     cost = "" if rule.cost is None else f", cost={rule.cost}"

@@ -1,7 +1,7 @@
-"""Python expressions as text: an operator applied to `PythonText` objects returns the text of the operation.
+"""Python expressions as text: operators on `PythonText` objects return the text of the operation.
 
-So a rule of the palette is defined once: applied to the variables of a model it returns a constraint, and applied to
-`PythonText` it returns the line of Python that defines this constraint.
+So a rule in the palette is defined only once: applied to the variables of a model, it returns a constraint; applied to
+`PythonText`, it returns the line of Python that defines the constraint.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ _PLAIN = re.compile(r"[A-Za-z0-9_. -]*")
 
 
 class Operand(Protocol):
-    """An operand of a rule: a term of a model, or Python text."""
+    """An operand in a rule: a term of a model, or Python text."""
 
     def __add__(self, other: object, /) -> Operand: ...
     def __sub__(self, other: object, /) -> Operand: ...
@@ -30,7 +30,7 @@ class Operand(Protocol):
     def __ge__(self, other: object, /) -> Operand: ...
     def __and__(self, other: object, /) -> Operand: ...
     def is_in(self, values: Iterable[object], /) -> Operand:
-        """Return the condition that this is one of `values`."""
+        """Return the condition that this operand is one of `values`."""
 
 
 class Binding(IntEnum):
@@ -95,7 +95,7 @@ class PythonText:
         return hash(self.text)
 
     def is_in(self, values: Iterable[object]) -> PythonText:
-        """Return the text of the condition that this is one of `values`."""
+        """Return the text of the condition that this expression is one of `values`."""
         return PythonText(f"{self.within(Binding.ATOM)}.is_in({python_literal([*values])})")
 
     @classmethod
@@ -106,16 +106,16 @@ class PythonText:
     def _with(self, operator: str, other: object, binding: Binding) -> PythonText:
         right = other if isinstance(other, PythonText) else PythonText(python_literal(other))
         tighter = Binding(min(binding + 1, Binding.ATOM))
-        left = binding if binding is not Binding.COMPARISON else tighter  # not a chained comparison
+        left = binding if binding is not Binding.COMPARISON else tighter  # avoids a chained comparison
         return PythonText(f"{self.within(left)}{operator}{right.within(tighter)}", binding)
 
     def within(self, least: Binding) -> str:
-        """Return the text for use in an operation of precedence `least`, in parentheses if necessary."""
+        """Return the text for use in an operation with precedence `least`, in parentheses if necessary."""
         return self.text if self.binding >= least else f"({self.text})"
 
 
 class Each(PythonText):
-    """An expression that is evaluated for each `a` in `over`."""
+    """An expression that is evaluated for each element `a` of `over`."""
 
     def __init__(self, text: str, over: str) -> None:
         super().__init__(text)
@@ -123,7 +123,7 @@ class Each(PythonText):
 
 
 def text_with(parts: Sequence[str | PythonText], between: str = ".") -> str:
-    """Return a string literal of several parts; an f-string if some parts are expressions."""
+    """Return a string literal made of several parts; an f-string if some parts are expressions."""
     if not any(isinstance(part, PythonText) for part in parts):
         return python_literal(between.join(map(str, parts)))
     literal = [part for part in parts if isinstance(part, str)]
@@ -135,7 +135,7 @@ def text_with(parts: Sequence[str | PythonText], between: str = ".") -> str:
 
 
 def python_literal(value: object) -> str:
-    """Return a value, or a list of values, as a Python literal. Quotes in texts are escaped."""
+    """Return a value or a list of values as a Python literal. Quotes in texts are escaped."""
     match value:
         case PythonText():
             return value.text

@@ -1,4 +1,4 @@
-"""Checks of the rules of a sketch: their decisions, robots and fields."""
+"""Checks of the rules in a sketch: their decisions, robots and fields."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from robochoc.app.sketch.troubles import About, Trouble, shortened
 from robochoc.app.texts import say
 
 MAX_GROUP = 300
-"""The maximum number of robots of one constraint."""
+"""The maximum number of robots in one constraint."""
 MAX_LINKS = 20_000
-"""The maximum number of constraints of all rules together."""
+"""The maximum number of constraints for all rules together."""
 _PAIR = 2
 
 Named = dict[str, str | int]
 
 
 class SketchFacts:
-    """Facts about a sketch that the checks of many rules use."""
+    """Facts about a sketch that are needed to check several rules."""
 
     def __init__(self, sketch: Sketch) -> None:
         self.sketch = sketch
@@ -33,12 +33,12 @@ class SketchFacts:
         self.sound = [rule for rule in sketch.rules if rule.on and rule.id not in self.unfit]
 
     def bound(self, rule: SketchRule) -> int:
-        """Return the number of robots of a rule, all of which have its decision."""
+        """Return the number of robots in a rule. All of them must have the rule's decision."""
         return len(rule.robots or self.deciders[rule.decision])
 
 
 def _first(facts: SketchFacts, rule: SketchRule) -> Trouble | None:
-    """Return the first error of a rule."""
+    """Return the first error in a rule."""
     return next(_check_rule(facts, rule), None)
 
 
@@ -66,7 +66,7 @@ def _trouble(rule: SketchRule, key: str, **named: str | int) -> Trouble:
 
 
 def _check_robots(facts: SketchFacts, rule: SketchRule, entry: PaletteRule) -> Iterator[Trouble]:
-    """Yield the errors of a rule's robots."""
+    """Yield the errors in a rule's robots."""
     stranger, twice = first_unknown(rule.robots, facts.robots), first_repeated(rule.robots)
     idle = first_unknown(rule.robots, facts.deciders[rule.decision])
     count = facts.bound(rule)
@@ -88,7 +88,7 @@ def _check_robots(facts: SketchFacts, rule: SketchRule, entry: PaletteRule) -> I
 
 
 def _field_error(given: Setting | None, opening: RuleField, values: set[int | str]) -> str | None:
-    """Return the key of the error in a field; None if its value is valid."""
+    """Return the key of the error in a field, or None if its value is valid."""
     match opening.form:
         case Form.NUMBER:
             fits = isinstance(given, int) and opening.least <= given <= opening.most
@@ -117,9 +117,9 @@ def _is_value(given: object, values: set[int | str]) -> bool:
 
 
 def check_private(facts: SketchFacts) -> Iterator[Trouble]:
-    """Yield private rules of two robots in a team with costs: no protocol for costs supports private rules.
+    """Yield private rules between two robots in a team with costs, since no protocol for costs supports private rules.
 
-    Rules of a single robot are never disclosed.
+    Rules for a single robot are never disclosed anyway.
     """
     if any(rule.cost is not None or PALETTE[rule.kind].graded for rule in facts.sound):
         for rule in facts.sound:
@@ -128,7 +128,7 @@ def check_private(facts: SketchFacts) -> Iterator[Trouble]:
 
 
 def why_not_private(sketch: Sketch, rule: SketchRule) -> Trouble | None:
-    """Return the reason why a rule cannot be private in the present team; None if it can be."""
+    """Return the reason why a rule cannot be private in the current team, or None if it can."""
     entry = PALETTE.get(rule.kind)
     if entry is None or entry.links == Links.EACH:
         return None
@@ -140,7 +140,7 @@ def why_not_private(sketch: Sketch, rule: SketchRule) -> Trouble | None:
 
 
 def why_no_cost(sketch: Sketch, rule: SketchRule | None = None) -> Trouble | None:
-    """Return the reason why a rule (None: a new one) cannot have a cost in the present team; None if it can."""
+    """Return the reason why a rule (None: a new one) cannot have a cost in the current team, or None if it can."""
     for other in sketch.rules:
         entry = PALETTE.get(other.kind)
         if other.on and other.private and entry is not None and entry.links != Links.EACH:
@@ -154,7 +154,7 @@ def _is_graded(rule: SketchRule) -> bool:
 
 
 def check_link_count(facts: SketchFacts) -> Iterator[Trouble]:
-    """Yield the first rule with which the number of constraints exceeds the limit."""
+    """Yield the first rule at which the number of constraints exceeds the limit."""
     total = 0
     for rule in facts.sound:
         total += _links(facts, rule)
@@ -164,7 +164,7 @@ def check_link_count(facts: SketchFacts) -> Iterator[Trouble]:
 
 
 def _links(facts: SketchFacts, rule: SketchRule) -> int:
-    """Return the number of constraints of a rule, or an upper bound that is far below the limit."""
+    """Return the number of constraints for a rule, or an upper bound if that is far below the limit."""
     entry, count = PALETTE[rule.kind], facts.bound(rule)
     most = count * (count - 1) // 2
     match entry.links:

@@ -1,4 +1,4 @@
-"""The rules of the palette, in `PALETTE`, in the order of the menu."""
+"""The rules in the palette (`PALETTE`), in the order of the menu."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ Group = Sequence[Operand]
 
 
 def _squared(given: Applied, pair: Group) -> Operand:
-    """Return the squared distance of two cells of the map, or of a cell and a robot's cell."""
+    """Return the squared distance between two cells of the map, or between a cell and a robot's cell."""
     one, other = pair
     columns = given.sketch.area.columns
     across, along = one % columns - other % columns, one // columns - other // columns
@@ -93,7 +93,7 @@ def _rather(given: Applied, alone: Group) -> Operand:
     wish, step = given.value("value"), given.number("step")
     if given.kind != DecisionKind.PLACE or not isinstance(wish, int):
         return abs(alone[0] - wish) * step
-    columns = given.sketch.area.columns  # the number of horizontal and vertical steps on the map
+    columns = given.sketch.area.columns  # to compute the number of horizontal and vertical steps on the map
     return (abs(alone[0] % columns - wish % columns) + abs(alone[0] // columns - wish // columns)) * step
 
 

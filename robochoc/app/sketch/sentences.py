@@ -1,4 +1,4 @@
-"""Rules, values and costs of a sketch in plain words."""
+"""The rules, values and costs in a sketch, in plain words."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from robochoc.app.sketch.sketch import Decision, DecisionKind, Setting, Sketch, 
 from robochoc.app.texts import say
 
 MOST_NAMED = 4
-"""The maximum number of listed robots, or values, in a sentence; others are counted."""
+"""The maximum number of robots or values listed in a sentence; further ones are counted."""
 _OPEN = "…"
 """The text for a missing setting of a rule."""
 
@@ -26,12 +26,12 @@ def sentence(sketch: Sketch, rule: SketchRule) -> str:
 
 
 def short(sketch: Sketch, rule: SketchRule) -> str:
-    """Return the short text of a rule for its links in the picture."""
+    """Return the short text of a rule, which is shown at its links in the picture."""
     return say(f"rule.{rule.kind}.short", **_named(sketch, rule)) if rule.kind in PALETTE else rule.kind
 
 
 def weight_of(rule: SketchRule) -> str:
-    """Return the importance of a rule in words: hard, or its cost; private or not; inactive."""
+    """Return the importance of a rule in words: hard, or its cost; private; inactive."""
     entry = PALETTE.get(rule.kind)
     parts = [] if entry and entry.graded else [_must_or_cost(rule)]
     if rule.private:
@@ -45,12 +45,12 @@ def _must_or_cost(rule: SketchRule) -> str:
 
 
 def robot_words(sketch: Sketch, rule: SketchRule) -> str:
-    """Return the robots of a rule in words: their names, or all robots."""
+    """Return the robots in a rule in words: their names, or all robots."""
     return _everybody(sketch, rule, [*sketch.bound(rule)])
 
 
 def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
-    """Return a value in words: a cell of the map as column and row, from 1; other values are unchanged."""
+    """Return a value in words. A cell of the map becomes column and row, from 1; other values are unchanged."""
     if decision.kind == DecisionKind.PLACE and isinstance(value, int):
         cell = sketch.area.cell(value)
         return say("value.place", column=cell.x + 1, row=cell.y + 1)
@@ -58,7 +58,7 @@ def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
 
 
 def value_in_short(sketch: Sketch, decision: Decision, value: int | str) -> str:
-    """Return a value for pictures: a cell of the map as column and row, from 1; other values are unchanged."""
+    """Return a value for pictures. A cell of the map becomes column and row, from 1; other values are unchanged."""
     if decision.kind == DecisionKind.PLACE and isinstance(value, int):
         cell = sketch.area.cell(value)
         return f"({cell.x + 1}, {cell.y + 1})"

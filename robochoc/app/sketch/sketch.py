@@ -1,6 +1,6 @@
-"""A sketch: a team as the user has drawn it, with the robots' decisions and rules.
+"""A sketch: a team drawn by the user, with the robots' decisions and rules.
 
-A sketch is immutable data: an edit (`edits`) returns another sketch. `building` converts it to a `robochoc.Model`.
+A sketch is immutable: an edit (`edits`) returns a new sketch. `building` converts a sketch to a `robochoc.Model`.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from enum import StrEnum
 import msgspec
 
 MAX_ROBOTS = 1_000
-"""The limit for a picture and for modelling by hand. Make larger teams by `robochoc generate`, or in Python."""
+"""The most robots that can be drawn and modelled by hand. Larger teams: `robochoc generate`, or Python."""
 MAX_SIDE = 60
-"""The maximum number of columns, and of rows, of a map."""
+"""The maximum number of columns or rows of a map."""
 MAX_VALUES = 4_000
 """The maximum number of values of one decision."""
 MAX_RULES = 2_000
@@ -25,7 +25,7 @@ MAX_LABEL = 60
 Value = int | str
 """A value of a decision."""
 Setting = Value | list[Value | list[Value]]
-"""The value of a rule's field: a number or a value, several values, or rows of values."""
+"""The value of a field in a rule: a number or a value, several values, or rows of values."""
 
 
 class DecisionKind(StrEnum):
@@ -46,25 +46,25 @@ class DecisionKind(StrEnum):
 
 
 NUMBERED = frozenset({DecisionKind.LEVEL, DecisionKind.PLACE, DecisionKind.SLOT, DecisionKind.CHANNEL})
-"""Kinds whose values are numbers, which can be compared and subtracted."""
+"""The kinds of decisions whose values are numbers, which can be compared and subtracted."""
 
 
 class Cell(msgspec.Struct, forbid_unknown_fields=True, frozen=True, order=True):
-    """A cell of the map: column and row, from 0. Row 0 is the southernmost."""
+    """A cell of the map: its column and row, from 0. Row 0 is the southernmost row."""
 
     x: int
     y: int
 
 
 class Area(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """The map: its size, and its blocked cells."""
+    """The map: its size and its blocked cells."""
 
     columns: int = 8
     rows: int = 6
     blocked: frozenset[Cell] = frozenset()
 
     def number(self, cell: Cell) -> int:
-        """Return the number of a cell: a value of a decision of kind `place`."""
+        """Return the number of a cell, as used in decisions of kind `place`."""
         return cell.y * self.columns + cell.x
 
     def cell(self, number: int) -> Cell:
@@ -86,10 +86,10 @@ class SketchRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A robot.
 
     Attributes:
-        name: Its name.
-        at: Its cell.
-        weight: The weight of its withdrawal.
-        rank: Its rank; robots with a higher rank have a higher priority.
+        name: The robot's name.
+        at: The robot's cell.
+        weight: The weight of the robot's withdrawal.
+        rank: The robot's rank; robots with a higher rank have a higher priority.
     """
 
     name: str
@@ -102,9 +102,9 @@ class Decision(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A decision of robots.
 
     Attributes:
-        name: Its name, such as `slot`: each robot has a variable with this name.
-        kind: Its kind.
-        values: Its values: all numbers or all names, depending on `kind`. Empty for a place: the map's free cells.
+        name: The name, such as `slot`: each robot has a variable with this name.
+        kind: The kind of decision.
+        values: The values: all numbers or all names, depending on `kind`. Empty, for a place: the map's free cells.
         robots: The robots with this decision. Empty: all robots.
     """
 
@@ -115,17 +115,18 @@ class Decision(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A rule of the palette in a sketch.
+    """A rule from the palette, used in a sketch.
 
     Attributes:
-        id: Its name in the team: `R1`, `R2`, ...
+        id: The rule's name in the team: `R1`, `R2`, ...
         kind: The key of the rule in the palette (`rules.PALETTE`).
         decision: The decision that it restricts.
-        robots: The robots of the rule. Empty: all robots with the decision. In rules with a leader, the first one.
-        settings: The values of the rule's fields, by name: a number, a value, or several values.
+        robots: The robots in the rule. Empty: all robots with the decision. In rules with a leader, it is the first
+            robot.
+        settings: The values of the rule's fields, by name: numbers, values, or lists of values.
         cost: The cost of a violation. None: a hard rule.
-        private: Whether only the rule's owner knows it: of two robots, the first one. (Other robots never learn rules
-            of a single robot.)
+        private: Whether only the rule's owner knows it, which is the first of the two robots. (Rules for a single
+            robot are never disclosed.)
         on: Whether the rule is active.
     """
 
@@ -140,14 +141,14 @@ class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
 
 
 class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
-    """A team as drawn by the user.
+    """A team drawn by the user.
 
     Attributes:
-        name: Its name.
+        name: The team's name.
         area: The map.
         robots: The robots, in the order of their creation.
-        decisions: Their decisions.
-        rules: Their rules.
+        decisions: The robots' decisions.
+        rules: The robots' rules.
         story: A description for the gallery.
     """
 
@@ -181,7 +182,7 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return next((rule for rule in self.rules if rule.id == name), None)
 
     def deciders(self, decision: Decision) -> tuple[str, ...]:
-        """Return the robots with a decision, in the order of the robots."""
+        """Return the robots that have a decision, in the order of the robots."""
         chosen = set(decision.robots)
         return tuple(robot.name for robot in self.robots if not chosen or robot.name in chosen)
 
@@ -190,7 +191,7 @@ class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
         return self.area.free if decision.kind == DecisionKind.PLACE and not decision.values else decision.values
 
     def bound(self, rule: SketchRule) -> tuple[str, ...]:
-        """Return the robots of a rule that have its decision, in the rule's order."""
+        """Return the robots in a rule that have its decision, in the order of the rule."""
         decision = self.decision(rule.decision)
         if decision is None:
             return ()

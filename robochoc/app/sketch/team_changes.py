@@ -1,6 +1,6 @@
-"""Changes of a team during a mission: a robot fails, a cell is blocked, a battery is low, a robot joins.
+"""Changes in a team during a mission: a robot fails, a cell is blocked, a battery is low, a robot joins.
 
-Each change converts a sketch to another one, and has a sentence that describes it.
+Each change converts a sketch to another sketch, and has a sentence that describes the change.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robochoc.app.sketch.sketch import Cell, Decision, DecisionKind, Sketch, Ske
 from robochoc.app.texts import say
 
 LEAST_BATTERY = 20
-"""A robot with a lower charge, in per cent, leaves the team."""
+"""A robot whose battery charge in per cent is lower leaves the team."""
 FULL = 100
 
 
@@ -23,11 +23,11 @@ class TeamChange(msgspec.Struct, frozen=True, tag=True):
     """A change of a team."""
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team after the change. Raises `EditError` if the change is not possible."""
+        """Return the team after the change. Raises `EditError` if the change is impossible."""
         raise NotImplementedError
 
     def words(self, sketch: Sketch) -> str:
-        """Return a sentence that describes the change of this team."""
+        """Return a sentence that describes the change in this team."""
         raise NotImplementedError
 
 
@@ -48,12 +48,12 @@ class RobotFails(TeamChange, frozen=True, tag="Fails"):
 
 
 class CellBlocked(TeamChange, frozen=True, tag="Blocked"):
-    """A cell of the map is blocked: robots cannot choose it any more."""
+    """A cell of the map is blocked, so robots can no longer choose it."""
 
     cell: Cell
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Block the cell, and remove it from listed places. Raises `EditError` if it is the last place."""
+        """Block the cell, and remove it from decisions that list it. Raises `EditError` if no place would remain."""
         number = sketch.area.number(self.cell)
         sketch = edits.with_cell_blocked(sketch, self.cell, blocked=True)
         if any(one.kind == DecisionKind.PLACE and one.values == (number,) for one in sketch.decisions):
@@ -67,14 +67,14 @@ class CellBlocked(TeamChange, frozen=True, tag="Blocked"):
         return msgspec.structs.replace(sketch, decisions=decisions)
 
     def words(self, sketch: Sketch) -> str:
-        """Return the cell; if no robot decides a place, say that the change has no effect."""
+        """Return a sentence with the cell. If no robot decides a place, it says that the change has no effect."""
         matters = any(one.kind == DecisionKind.PLACE for one in sketch.decisions)
         key = "whatif.blocked" if matters else "whatif.blocked-in-vain"
         return say(key, column=self.cell.x + 1, row=self.cell.y + 1)
 
 
 class LowBattery(TeamChange, frozen=True, tag="Battery"):
-    """A robot's battery is low: it reaches only this percentage of the highest level, or leaves the team."""
+    """A robot's battery is low: the robot reaches only this percentage of the highest level, or leaves the team."""
 
     robot: str
     percent: int
@@ -110,13 +110,13 @@ class LowBattery(TeamChange, frozen=True, tag="Battery"):
 
 
 class RobotJoins(TeamChange, frozen=True, tag="Joins"):
-    """A robot joins the team, with the decisions and rules of all robots."""
+    """A robot joins the team, with the decisions and rules that apply to all robots."""
 
     cell: Cell
     name: str | None = None
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team with the robot. If no decision is for all robots, the robot has every decision.
+        """Return the team with the new robot. If no decision applies to all robots, the new robot has every decision.
 
         Raises `EditError` if the cell is blocked.
         """
@@ -141,14 +141,14 @@ AnyTeamChange = RobotFails | CellBlocked | LowBattery | RobotJoins
 
 
 def changed(sketch: Sketch, changes: Sequence[TeamChange]) -> Sketch:
-    """Return the team after these changes in order. Raises `EditError` if a change is not possible."""
+    """Return the team after these changes in order. Raises `EditError` if a change is impossible."""
     for change in changes:
         sketch = change.after(sketch)
     return sketch
 
 
 def sentences_of(sketch: Sketch, changes: Sequence[TeamChange]) -> list[str]:
-    """Return the sentence of each change. Raises `EditError` if a change is not possible."""
+    """Return the sentence for each change. Raises `EditError` if a change is impossible."""
     found = []
     for change in changes:
         found.append(change.words(sketch))
@@ -167,6 +167,6 @@ def _levels(sketch: Sketch, robot: str) -> list[Decision]:
 
 
 def _reached(sketch: Sketch, decision: Decision, percent: int) -> list[int]:
-    """Return the levels up to this percentage of the highest level."""
+    """Return the levels that are at most this percentage of the highest level."""
     levels = sorted(value for value in sketch.values(decision) if isinstance(value, int))
     return [level for level in levels if level * FULL <= levels[-1] * percent]

@@ -1,6 +1,6 @@
-"""A small picture of a sketch: the map, the robots, and the links of rules. An SVG without scripts or styles.
+"""A small picture of a sketch: the map, the robots, and the links between them. An SVG without scripts or styles.
 
-The picture uses the colours of its page (`--paper` and others), and has default colours for use without a page.
+The picture uses the colours of its page (`--paper` and others), and default colours outside a page.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ WIDTH, HEIGHT = 320, 200
 MAX_LINES = 150
 """The maximum number of drawn links, for readability."""
 MAX_DRAWN = 400
-"""The maximum number of drawn robots; of a larger team, the first ones are drawn."""
+"""The maximum number of drawn robots. In a larger team, the first robots are drawn."""
 _NAMED_ELSEWHERE = "trouble.team-name"
-"""The name of an imported team may not be valid for a sketch; the team is drawn nevertheless."""
+"""An error that is ignored: the name of an imported team may not be valid for a sketch."""
 _MARGIN = 14
 _FEW = 8
-"""The maximum number of robots for which names are drawn."""
+"""The maximum number of robots whose names are drawn."""
 _INK, _ACCENT, _PAPER = "var(--ink, #17202b)", "var(--accent, #1f5fbf)", "var(--paper, #ffffff)"
 
 
@@ -34,7 +34,7 @@ def thumbnail(sketch: Sketch, links: Iterable[tuple[str, str]] = ()) -> str:
 
     Args:
         sketch: The sketch.
-        links: Further pairs of linked robots.
+        links: Further pairs of robots that are linked.
     """
     if any(one.key != _NAMED_ELSEWHERE for one in check_bounds(sketch)):
         sketch = Sketch()  # an empty map
@@ -49,7 +49,7 @@ def thumbnail(sketch: Sketch, links: Iterable[tuple[str, str]] = ()) -> str:
 
 
 def _printable(text: str) -> str:
-    """Return a text with spaces in place of characters that are not allowed in XML."""
+    """Return a text with spaces instead of characters that are not allowed in XML."""
     return "".join(letter if letter.isprintable() else " " for letter in text)
 
 
@@ -69,7 +69,7 @@ class _Thumbnail:
         return x + self._scale / 2, y + self._scale / 2
 
     def cells(self) -> Iterator[str]:
-        """Yield the map: its grid, and the blocked cells."""
+        """Yield the map: its grid and the blocked cells."""
         area, size = self._sketch.area, self._scale
         x, y = self._corner(Cell(0, area.rows - 1))
         path = "".join(f"M{x + size * column:.1f} {y:.1f}v{size * area.rows:.1f}" for column in range(area.columns + 1))
@@ -84,7 +84,7 @@ class _Thumbnail:
             yield f'<path d="{blocked}" fill="{_INK}" fill-opacity="0.3"/>'
 
     def links(self, more: Iterable[tuple[str, str]]) -> Iterator[str]:
-        """Yield the lines between robots that are linked by rules, or in `more`; each pair once."""
+        """Yield a line for each pair of robots that are linked by rules or in `more`."""
         standing = {robot.name: robot.at for robot in self._sketch.robots if self._sketch.area.has(robot.at)}
         pairs: dict[tuple[str, str], None] = {}
         pairs |= dict.fromkeys(pair for pair in more if standing.keys() >= {*pair})

@@ -1,4 +1,4 @@
-"""Errors of a sketch and hints, each with its element and a remedy."""
+"""Errors in a sketch and hints, each with its element and a remedy."""
 
 from __future__ import annotations
 
@@ -26,16 +26,16 @@ class Severity(StrEnum):
     ERROR = "error"
     """The sketch cannot be converted to a team."""
     HINT = "hint"
-    """The sketch can be converted, but it is probably not as intended, or cannot be solved."""
+    """The sketch can be converted, but probably differs from what is intended, or cannot be solved."""
 
 
 class Trouble(msgspec.Struct, frozen=True):
     """An error or a hint.
 
     Attributes:
-        about: The kind of its element.
-        element: The element: the name of a robot or a decision, the id of a rule, or `map`, or `team`.
-        key: The key of its text in the catalogue.
+        about: The kind of element.
+        element: The element: the name of a robot or a decision, the id of a rule, `map`, or `team`.
+        key: The key of the text in the catalogue.
         named: The arguments of the text.
         severity: The severity.
     """
@@ -68,16 +68,16 @@ class Trouble(msgspec.Struct, frozen=True):
 
 
 class NotReadyError(RobochocError, ValueError):
-    """A sketch cannot be converted to a team. The message has the error and its remedy."""
+    """The sketch cannot be converted to a team. The message contains the error and a remedy."""
 
     def __init__(self, trouble: Trouble) -> None:
         super().__init__(f"{trouble.text} {trouble.remedy}")
 
 
 def shortened(name: object) -> str:
-    """Return a name from the user or a file, shortened for use in a sentence."""
+    """Return a name given by the user or a file, shortened for use in a sentence."""
     most = 60
     if isinstance(name, int) and abs(name) >= 10**most:
-        return f"{str(name >> name.bit_length() - 60)[:6]}..."  # Python converts no integers with thousands of digits
+        return f"{str(name >> name.bit_length() - 60)[:6]}..."  # Python cannot print integers with thousands of digits
     text = str(name)
     return text if len(text) <= most else f"{text[: most - 3]}..."
