@@ -1,6 +1,6 @@
-"""Unforeseen errors: a sentence on the page, a line in the terminal, and the traceback in the error log.
+"""Unexpected errors: a sentence on the page, a line in the terminal, and the traceback in the error log.
 
-Browsers can send anything to a page, and a disk can be full: neither may print a traceback to the user.
+Browsers can send anything to a page, and a disk can be full: in neither case should users see a traceback.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from robochoc.system.plain_text import on_one_line
 
 ERRORS = "errors.log"
 MOST_BYTES = 1 << 20
-"""The size at which a new error log is started; the previous one is retained."""
+"""The size at which a new error log is started, in bytes; the previous one is kept."""
 MOST_CHARACTERS = 10_000
 """The maximum length of one entry."""
 _OF_SERVERS = ("nicegui", "socketio", "socketio.server", "engineio", "engineio.server", "asyncio", "uvicorn")
@@ -27,7 +27,7 @@ _OF_SERVERS_ALSO = ("uvicorn.error", "uvicorn.access", "uvicorn.asgi")
 
 
 def log_errors_to(folder: Path) -> None:
-    """Write unforeseen errors to the error log in `folder`, and notify the pages where they occur."""
+    """Write unexpected errors to the error log in `folder`, and show them on the pages where they occur."""
     log_file = _LogFile(
         folder / ERRORS, maxBytes=MOST_BYTES, backupCount=1, encoding="utf-8", delay=True, errors="replace"
     )
@@ -50,7 +50,7 @@ def notify(error: Exception) -> None:
 
 
 class _PlainFormatter(logging.Formatter):
-    """Formats an error without control characters, and shortens long ones."""
+    """Formats an error without control characters, and shortens long errors."""
 
     def format(self, record: logging.LogRecord) -> str:
         text = super().format(record)
@@ -60,14 +60,14 @@ class _PlainFormatter(logging.Formatter):
 
 
 class _LogFile(RotatingFileHandler):
-    """The file of the error log. Errors of writing are ignored."""
+    """The file of the error log. Errors while writing are ignored."""
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - of logging
-        """Continue: the disk is full, or the folder does not exist any more."""
+        """Ignore the error: the disk is full, or the folder no longer exists."""
 
 
 class _Terminal(logging.Handler):
-    """Prints the path of the error log, once, and each message of `USER_LOG`."""
+    """Prints the path of the error log once, and each message of `USER_LOG`."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(logging.ERROR)

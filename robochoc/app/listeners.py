@@ -8,13 +8,13 @@ from robochoc.app.log import log_error
 
 
 class Listeners:
-    """Callbacks for one kind of change. Calling the object calls all of them."""
+    """Callbacks for one kind of change. A call of the object calls all of them."""
 
     def __init__(self) -> None:
         self._callbacks: list[Callable[[], None]] = []
 
     def add(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Add a callback; return a function that removes it."""
+        """Add a callback. Returns a function that removes it."""
         self._callbacks.append(callback)
 
         def end() -> None:
@@ -28,9 +28,9 @@ class Listeners:
         return len(self._callbacks)
 
     def __call__(self) -> None:
-        """Call all callbacks that were present at the start of the call.
+        """Call all callbacks that exist when the call starts.
 
-        An error of a callback is written to the error log, and the others are called.
+        An error in a callback is written to the error log; the other callbacks are still called.
         """
         for callback in [*self._callbacks]:
             try:

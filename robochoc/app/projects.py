@@ -1,4 +1,4 @@
-"""The open teams: each is a `Project`, shared by all its pages."""
+"""The open teams: each is a `Project` that all its pages share."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from robochoc.app.store import TeamStore
 from robochoc.app.texts import say
 
 SAVE_S = 0.5
-"""The time from an edit to its saving."""
+"""The time in seconds between an edit and saving it."""
 AGAIN_S = 5.0
-"""The time after which a failed saving is repeated."""
+"""The time in seconds after which a failed attempt to save is repeated."""
 
 
 class Project(PartsOwner):
-    """A team that is edited. Changes are saved automatically, and reported to listeners."""
+    """A team that is being edited. Changes are saved automatically and reported to listeners."""
 
     def __init__(self, store: TeamStore, name: str) -> None:
         super().__init__()
@@ -40,13 +40,13 @@ class Project(PartsOwner):
         self._saving: asyncio.TimerHandle | None = None
         self._writing = Lock()
         self.removed = False
-        """True if the team was removed. Open pages of the team show that."""
+        """True if the team was removed, which its open pages then show."""
         self.unsaved = ""
-        """The error of the last saving; empty if it succeeded."""
+        """The error of the last attempt to save; empty if it succeeded."""
 
     @property
     def sketch(self) -> Sketch:
-        """The present state of the team."""
+        """The current state of the team."""
         return self._history.now
 
     @property
@@ -56,12 +56,12 @@ class Project(PartsOwner):
 
     @property
     def import_folder(self) -> Path | None:
-        """The files of an imported team, which cannot be edited; None if the team was drawn here."""
+        """The files of an imported team, which cannot be edited, or None if the team was drawn here."""
         return self._store.import_folder(self.id)
 
     @property
     def files(self) -> TeamFiles | None:
-        """The files that runs of an imported team use; None if the team was drawn here: runs use its sketch."""
+        """The files with which an imported team runs, or None if the team was drawn here and runs with its sketch."""
         folder = self.import_folder
         return None if folder is None else TeamFiles(folder, flies=self.facts.flies, maximised=self.facts.maximised)
 
@@ -81,7 +81,7 @@ class Project(PartsOwner):
         return bool(self._history.after)
 
     def edit(self, change: Callable[[Sketch], Sketch]) -> None:
-        """Change the sketch. Raises `EditError` for an invalid change, and then leaves the sketch unchanged."""
+        """Change the sketch. Raises `EditError` for an invalid change, which leaves the sketch unchanged."""
         if self.removed:
             raise EditError("app.removed")
         changed = change(self.sketch)
@@ -94,19 +94,19 @@ class Project(PartsOwner):
         self._update(self._history.undone())
 
     def redo(self) -> None:
-        """Repeat the edit that was undone last."""
+        """Redo the edit that was undone last."""
         self._update(self._history.redone())
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` after each change; return a function that removes it."""
+        """Call `callback` after each change. Returns a function that removes the callback."""
         return self._listeners.add(callback)
 
     def save(self) -> None:
-        """Save the team now. `unsaved` has the error if that fails."""
-        self._write()  # a scheduled saving remains scheduled
+        """Save the team now. If this fails, `unsaved` contains the error."""
+        self._write()  # a scheduled save stays scheduled
 
     def mark_removed(self) -> None:
-        """Note that the team was removed, and save nothing any more."""
+        """Mark the team as removed, and do not save it any more."""
         if self._saving is not None:
             self._saving.cancel()
         with self._writing:
@@ -125,7 +125,7 @@ class Project(PartsOwner):
             self._saving = asyncio.get_running_loop().call_later(seconds, self._save_in_thread)
 
     def _save_in_thread(self) -> None:
-        """Save in a thread, so that a slow disk blocks no page."""
+        """Save in a thread, so that a slow disk does not block pages."""
         self._saving = None
         was = self.unsaved
 
@@ -138,7 +138,7 @@ class Project(PartsOwner):
         asyncio.ensure_future(asyncio.get_running_loop().run_in_executor(None, self._write)).add_done_callback(done)
 
     def _write(self) -> None:
-        with self._writing:  # one thread at a time, each with the present state, so that the last file is the newest
+        with self._writing:  # one thread at a time writes the current state, so that the last file is the newest
             if self.removed:
                 return
             try:
@@ -150,14 +150,14 @@ class Project(PartsOwner):
 
 
 class Projects:
-    """All teams of a store. An open team is in memory once."""
+    """All teams in a store. Each open team exists once in memory."""
 
     def __init__(self, store: TeamStore) -> None:
         self.store = store
         self._open: dict[str, Project] = {}
 
     def open(self, name: str) -> Project:
-        """Return the team with this id. Raises `KeyError` if there is none, `ValueError` if its file is damaged."""
+        """Return the team with this id. Raises `KeyError` if it does not exist, `ValueError` if its file is damaged."""
         if name not in self._open:
             self._open[name] = Project(self.store, name)
         return self._open[name]
@@ -171,7 +171,7 @@ class Projects:
 
         Raises:
             KeyError: if the id is not valid.
-            OSError: if the team cannot be removed. Then its jobs are ended, but nothing else has changed.
+            OSError: if the team cannot be removed. Its jobs are ended, but nothing else has changed.
         """
         folder = self.store.path(name)
         ended = end_jobs_in(folder)
@@ -182,11 +182,11 @@ class Projects:
         Job(f"removal of {name}", partial(self._remove_files, name, ended)).start()
 
     def sweep(self) -> None:
-        """Remove, in a thread, the remaining files of teams whose removal was interrupted."""
+        """Remove the remaining files of teams whose removal was interrupted, in a thread."""
         Job("removal", lambda _: self.store.sweep()).start()
 
     def _remove_files(self, name: str, ended: Sequence[Job[Any]], job: Job[None]) -> None:
-        """Remove the files after the ended jobs, which may still write some."""
+        """Remove the files after the ended jobs have finished, since these may still write files."""
         job.wait_for(ended)
         self.store.remove(name)
 

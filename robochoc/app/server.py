@@ -28,12 +28,12 @@ from robochoc.app.texts import LANGUAGE, say
 from robochoc.view.local_address import RedirectFile, loopback_socket, secret_path, url_of
 
 _RECONNECT_S = 30.0
-"""The time for which a disconnected browser finds its page unchanged; later the page is built again."""
+"""The time in seconds for which a disconnected browser can return to its unchanged page; later the page is rebuilt."""
 _LONGEST_END_S = 2.5
-"""The time after a signal at which the process is forced to end."""
+"""The time in seconds after a signal at which the process is forced to end."""
 _LONGEST_SAVE_S = 1.0
 _SIGNALLED = 128
-"""The exit status of a program that a signal has ended is this plus the signal's number (the shells' convention)."""
+"""The exit status of a program ended by a signal is this value plus the signal's number (a convention of shells)."""
 _ICON = Path(__file__).with_name("icon.svg")
 
 
@@ -43,8 +43,8 @@ def serve_app(
     """Serve the application until it is interrupted.
 
     Args:
-        folder: The folder of the teams.
-        port: The port; 0: any free port.
+        folder: The folder with the teams.
+        port: The port. 0: any free port.
         open_browser: Whether to open the user's browser.
         ready: Called with the URL when it can be opened.
 
@@ -84,7 +84,7 @@ def serve_app(
 
 
 class _AppServer(uvicorn.Server):
-    """A server that calls `ready` when it accepts requests, and ends in time after a signal."""
+    """A server that calls `ready` when it accepts requests, and ends within a time limit after a signal."""
 
     ready: Callable[[], None]
     redirect: RedirectFile | None = None
@@ -94,7 +94,7 @@ class _AppServer(uvicorn.Server):
         self._projects = projects
 
     async def startup(self, sockets: list[socket] | None = None) -> None:
-        """Start, and call `ready`."""
+        """Start the server, and call `ready`."""
         await super().startup(sockets)
         self.ready()
 
@@ -105,7 +105,7 @@ class _AppServer(uvicorn.Server):
         threading.Thread(target=self._end_in_time, args=(status,), daemon=True).start()
 
     def _end_in_time(self, status: int) -> None:
-        """End this process after the time limit, if a computation cannot be interrupted."""
+        """End this process after the time limit, even if a computation cannot be interrupted."""
         time.sleep(_LONGEST_END_S)
         end_all(0)
         saving = threading.Thread(target=self._projects.save, daemon=True)
@@ -125,7 +125,7 @@ async def _serve(
         def on_started() -> None:
             if ready:
                 ready(url)
-            if redirect is not None:  # in a thread: a browser for the terminal returns when it is closed
+            if redirect is not None:  # in a thread: a text-mode browser returns only when it is closed
                 threading.Thread(target=webbrowser.open, args=(redirect.url,), daemon=True).start()
 
         server.ready, server.redirect = on_started, redirect

@@ -1,4 +1,4 @@
-"""Teams on disk: each is a folder with its sketch, and is saved atomically.
+"""Stores teams on disk: each team is a folder with its sketch, and is saved atomically.
 
 FOLDER/ID/history.json    the sketch, with undo and redo steps
 FOLDER/ID/team/           the files of an imported team; foreign.json: the facts about it
@@ -32,14 +32,14 @@ from robochoc.system.errors import RobochocError
 
 _HISTORY = "history.json"
 FILES = "team"
-"""The folder with the files of an imported team."""
+"""The folder with an imported team's files."""
 _FACTS = "foreign.json"
 _LOCK = ".lock"
 _REMOVED = ".removed-"
 _NEW = ".new-"
 _ID_BYTES = 6
 MAX_BYTES = 64 << 20
-"""Larger files are rejected. A history that would be larger is saved with fewer undo steps."""
+"""The maximum size of a file in bytes. Of a larger history, fewer undo steps are saved."""
 
 
 class InUseError(RobochocError, OSError):
@@ -47,7 +47,7 @@ class InUseError(RobochocError, OSError):
 
 
 class _Now(msgspec.Struct):
-    """The part of a history that the gallery shows."""
+    """The part of a history that the gallery needs."""
 
     now: Sketch
 
@@ -59,14 +59,14 @@ class TeamStore:
     """The teams in `folder`, which is created if it does not exist."""
 
     def __init__(self, folder: Path) -> None:
-        self.folder = folder = folder.absolute()  # processes of jobs run in folders of their own
+        self.folder = folder = folder.absolute()  # the processes of jobs have other working directories
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Lock the folder: two applications would overwrite each other's edits.
+        """Lock the folder, since two applications would overwrite each other's edits.
 
-        The lock is the kernel's: it ends with the process.
+        The kernel releases the lock when the process ends.
 
         Raises:
             InUseError: if another application has locked the folder.
@@ -84,23 +84,23 @@ class TeamStore:
             os.close(lock)
 
     def ids(self) -> list[str]:
-        """Return the ids of the teams, the last changed one first."""
+        """Return the ids of the teams, the most recently changed first."""
         found: list[tuple[int, str]] = []
         for file in self.folder.glob(f"*/{_HISTORY}"):
-            with suppress(OSError, KeyError):  # the team is being removed, or the folder is not a team's
+            with suppress(OSError, KeyError):  # the team is being removed, or the folder is not a team
                 self.path(file.parent.name)
                 found.append((file.stat().st_mtime_ns, file.parent.name))
         return [name for _, name in sorted(found, reverse=True)]
 
     def add(self, sketch: Sketch) -> str:
-        """Save a sketch as a new team; return its id."""
+        """Save a sketch as a new team, and return its id."""
         with self._new_team() as (name, folder):
             _write(folder / _HISTORY, History(sketch))
         return name
 
     @contextmanager
     def _new_team(self) -> Iterator[tuple[str, Path]]:
-        """Yield the id of a new team and a folder for its files. The team exists once they are complete."""
+        """Yield the id of a new team, and a folder for its files. The team exists once the files are complete."""
         name = secrets.token_hex(_ID_BYTES)
         while (self.folder / name).exists():
             name = secrets.token_hex(_ID_BYTES)
@@ -114,12 +114,12 @@ class TeamStore:
             raise
 
     def import_folder(self, name: str) -> Path | None:
-        """Return the files of an imported team; None if it was drawn here. Raises `KeyError` for an invalid id."""
+        """Return the files of an imported team, or None if it was drawn here. Raises `KeyError` for an invalid id."""
         files = self.path(name) / FILES
         return files if files.is_dir() else None
 
     def add_imported(self, team: ImportedTeam) -> str:
-        """Save an imported team; return its id."""
+        """Save an imported team, and return its id."""
         facts = facts_of(team.team, files=team.changed, notes=team.notes, origin=team.path.name)
         with self._new_team() as (name, folder):
             _write(folder / _HISTORY, History(picture_sketch(team)))
@@ -132,7 +132,7 @@ class TeamStore:
 
         Raises:
             KeyError: if the id is not valid.
-            ValueError: if its files are damaged.
+            ValueError: if the team's files are damaged.
         """
         file = self.path(name) / _FACTS
         try:
@@ -149,11 +149,11 @@ class TeamStore:
         return facts
 
     def load(self, name: str) -> History:
-        """Return a team. Undo steps beyond the bounds of edits are dropped.
+        """Return a team with its history. Undo steps that exceed the bounds for edits are dropped.
 
         Raises:
             KeyError: if there is no team with this id.
-            ValueError: if its file is damaged.
+            ValueError: if the team's file is damaged.
         """
         history = self._read(name, History)
         if all(is_sound(sketch) for sketch in (*history.before, *history.after)):
@@ -161,7 +161,7 @@ class TeamStore:
         return History(history.now)
 
     def now(self, name: str) -> Sketch:
-        """Return a team without its undo steps, which is faster. Raises as `load`."""
+        """Return a team without its undo steps, which is faster. Raises the exceptions of `load`."""
         return self._read(name, _Now).now
 
     def _read(self, name: str, kind: type[_Read]) -> _Read:
@@ -179,7 +179,7 @@ class TeamStore:
         return read
 
     def save(self, name: str, history: History) -> None:
-        """Save the present state of a team."""
+        """Save the current state of a team."""
         _write(self.path(name) / _HISTORY, history)
 
     def remove(self, name: str) -> None:
@@ -188,7 +188,7 @@ class TeamStore:
         self.sweep()
 
     def move_to_removed(self, name: str) -> None:
-        """Remove a team at once; its files, which may be many, are deleted by `sweep`.
+        """Remove a team at once. Its files, of which there may be many, are deleted later by `sweep`.
 
         Raises:
             KeyError: if the id is not valid.
@@ -198,7 +198,7 @@ class TeamStore:
             self.path(name).rename(self.folder / f"{_REMOVED}{name}-{secrets.token_hex(_ID_BYTES)}")
 
     def sweep(self) -> None:
-        """Delete the files of removed teams. Files that cannot be deleted are tried again next time."""
+        """Delete the files of removed teams. Deleting the files that remain is attempted again next time."""
         self._sweep(_REMOVED)
 
     def _sweep(self, prefix: str) -> None:
@@ -227,7 +227,7 @@ def _write(file: Path, history: History) -> None:
 
 
 def _within_bounds(history: History) -> bytes:
-    """Return the JSON of a history, without its oldest steps if it would be too large."""
+    """Return a history as JSON, without its oldest steps if it would be too large."""
     while len(content := msgspec.json.encode(history)) > MAX_BYTES and (history.before or history.after):
         before, after = history.before, history.after
         history = History(history.now, before[(len(before) + 1) // 2 :], after[(len(after) + 1) // 2 :])

@@ -1,6 +1,6 @@
-"""A conflict by CPMpy (https://cpmpy.readthedocs.io): a minimal unsatisfiable subset, with one assumption per rule.
+"""Finds conflicts with CPMpy (https://cpmpy.readthedocs.io): a minimal unsatisfiable subset, one assumption per rule.
 
-Only the process of a search for conflicts imports this module, since CPMpy and its solver need much time and memory.
+Only the process that searches for conflicts imports this module, since CPMpy and its solver need much time and memory.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ def limits_of(team: Team) -> dict[str, Interval]:
 
 
 def can_be_undefined(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
-    """Return whether a constraint may be undefined for some values; the result may be a false positive.
+    """Return whether a constraint may be undefined for some values. The result may be a false positive.
 
     Args:
         constraint: The constraint.
-        limits: The result of `limits_of` for its team. A constraint on a variable without values is defined.
+        limits: The result of `limits_of` for the team. A constraint on a variable without values is always defined.
     """
     definition = constraint.definition
     if isinstance(definition, Relation) or not limits.keys() >= {*constraint.variables}:
@@ -54,24 +54,24 @@ def _can_be(expression: Expression, limits: Mapping[str, Interval]) -> bool:
 
 
 MOST_ROWS = 2_000_000
-"""The maximum number of rows of a table."""
+"""The maximum number of rows in a table."""
 
 
 FEW = 8
-"""Up to this number of rules, each subset is a new model: a solver simplifies more without assumptions. With more
-rules, all are assumptions of one model, and the solver reports which of them it has used."""
+"""With up to this number of rules, each subset is a new model, since a solver simplifies more without assumptions. With
+more rules, all are assumptions in one model, and the solver reports which of them it used."""
 
 
 class UntranslatedError(RobochocError, ValueError):
-    """A rule cannot be translated to CPMpy here."""
+    """The rule cannot be translated to CPMpy."""
 
 
 def minimal_by_cpmpy(sketch: Sketch, rules: Sequence[str]) -> tuple[str, ...] | None:
-    """Return a minimal set of rules that cannot be satisfied together; None if all rules can.
+    """Return a minimal set of rules that cannot be satisfied together, or None if all rules can.
 
     Raises:
         ImportError: if CPMpy or its solver OR-Tools is not installed.
-        UntranslatedError: if a rule cannot be translated.
+        UntranslatedError: if a rule cannot be translated to CPMpy.
     """
     team = model_of(with_only(sketch, rules)).team
     problem = _Problem(team)
@@ -87,16 +87,16 @@ def minimal_by_cpmpy(sketch: Sketch, rules: Sequence[str]) -> tuple[str, ...] | 
 
 
 def minimal_of_team(team: Team, constraints: Mapping[str, Constraint]) -> tuple[str, ...] | None:
-    """Return a minimal set of constraints of a team that cannot be satisfied together, by their names here.
+    """Return a minimal set of a team's constraints that cannot be satisfied together, by their names in `constraints`.
 
-    Raises as `minimal_by_cpmpy`.
+    Raises the exceptions of `minimal_by_cpmpy`.
     """
     problem = _Problem(team)
     return problem.minimal({name: [problem.translated(constraint)] for name, constraint in constraints.items()})
 
 
 class _Problem:
-    """The variables of a team in CPMpy, with their domains."""
+    """A team's variables in CPMpy, with their domains."""
 
     def __init__(self, team: Team) -> None:
         import cpmpy  # noqa: PLC0415 - an extra
@@ -111,13 +111,13 @@ class _Problem:
         self._hard = [cpmpy.InDomain(self.variables[name], values) for name, values in self._domains.items()]
 
     def translated(self, constraint: Constraint) -> Any:  # noqa: ANN401 - CPMpy's
-        """Return a constraint for CPMpy. Raises `UntranslatedError`."""
-        if can_be_undefined(constraint, self._limits):  # undefined values are forbidden here, but not in CPMpy
+        """Return a constraint as a CPMpy constraint. Raises `UntranslatedError`."""
+        if can_be_undefined(constraint, self._limits):  # robochoc forbids undefined values, but CPMpy does not
             return _table(constraint, self.variables, self._domains)
         return _translated_constraint(constraint, self.variables, self._domains)
 
     def minimal(self, rules: Mapping[str, list[Any]]) -> tuple[str, ...] | None:
-        """Return a minimal subset of rules that cannot be satisfied together; None if all rules can."""
+        """Return a minimal subset of rules that cannot be satisfied together, or None if all rules can."""
         import cpmpy  # noqa: PLC0415 - an extra
         from cpmpy.tools.explain import mus  # noqa: PLC0415 - the same
 
@@ -129,7 +129,7 @@ class _Problem:
             )
         if cpmpy.Model(hard, *softs.values()).solve(solver="ortools"):
             return None
-        # Each rule is one Boolean, so that it is used as a whole.
+        # Each rule is a single Boolean, so that it is used as a whole.
         marks = {rule: cpmpy.boolvar(name=f"rule {rule}") for rule in softs}
         hard += [mark.implies(softs[rule]) for rule, mark in marks.items()]
         found = {str(one) for one in mus([*marks.values()], hard=hard, solver="ortools")}
@@ -147,7 +147,7 @@ def _global_constraint(sketch: Sketch, name: str, variables: dict[str, Any]) -> 
 
 
 def _table(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
-    """Return a constraint as the table of allowed values, by enumeration."""
+    """Return a constraint as a table of the allowed values, found by enumeration."""
     import cpmpy  # noqa: PLC0415 - an extra
 
     rows = []

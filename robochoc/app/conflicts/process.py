@@ -1,4 +1,4 @@
-"""The process of a search for a conflict: it reads a sketch from standard input, and writes the conflict as JSON.
+"""The process that searches for a conflict: it reads a sketch from standard input, and writes the conflict as JSON.
 
 python -m robochoc.app.conflicts.process SECONDS < sketch.json
 python -m robochoc.app.conflicts.process SECONDS FOLDER EVENTS      for an imported team, after a number of events
@@ -47,7 +47,7 @@ class OutOfTimeError(RobochocError):
 
 
 def is_satisfiable(team: Team, until: float) -> bool:
-    """Return whether a team has a solution. Raises `OutOfTimeError` at the time `until` (monotonic clock)."""
+    """Return whether a team has a solution. Raises `OutOfTimeError` if the time is `until` (monotonic clock)."""
     left = until - time.monotonic()
     if left <= 0:
         raise OutOfTimeError
@@ -58,9 +58,9 @@ def is_satisfiable(team: Team, until: float) -> bool:
 
 
 def conflict_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
-    """Return the conflict in the team with files in `folder`, after a number of `events` of its scenario.
+    """Return the conflict in the team with files in `folder`, after a number of `events` in its scenario.
 
-    CPMpy is used if it is installed, else robochoc's central solver. Raises `InvalidInputError`.
+    CPMpy is used if it is installed, otherwise robochoc's central solver. Raises `InvalidInputError`.
     """
     team = team_after_events(read_team(folder), events)
     owned = [*_owned_constraints(team)]
@@ -88,7 +88,7 @@ def conflict_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: b
 
 
 def team_with_only(team: Team, kept: Collection[int]) -> Team:
-    """Return a team with only the constraints of these numbers, in the order of `Team.constraints`."""
+    """Return a team with only the constraints with these indices in `Team.constraints`."""
     numbers = iter(range(sum(1 for _ in team.constraints())))
 
     def some(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
@@ -115,7 +115,7 @@ def _words(robot: Robot, constraint: Constraint) -> str:
 
 
 def _forbids(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
-    """Return whether a constraint can be part of a conflict: it forbids values, or is undefined for some values."""
+    """Return whether a constraint can be part of a conflict: it forbids values, or may be undefined."""
     definition = constraint.definition
     if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
         return INFINITE in (*definition.costs, definition.default_cost)
@@ -136,7 +136,7 @@ def main() -> None:
 
 
 def conflict_in(sketch: Sketch, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
-    """Return the conflict in a sketch, by CPMpy if it is installed, else by robochoc's central solver."""
+    """Return the conflict in a sketch, using CPMpy if it is installed, otherwise robochoc's central solver."""
     rules = [rule.id for rule in candidates(sketch)]
     if use_cpmpy:
         try:

@@ -1,4 +1,4 @@
-"""The rules of a sketch that can be in conflict, and the deletion filter that finds a minimal set."""
+"""The rules in a sketch that can be in conflict, and the deletion filter, which finds a minimal set of them."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ def with_only(sketch: Sketch, rules: Collection[str]) -> Sketch:
 
 
 def minimal(rules: Sequence[str], holds_together: Callable[[Sequence[str]], bool]) -> tuple[str, ...] | None:
-    """Return a minimal set of rules that cannot be satisfied together; None if all rules can.
+    """Return a minimal set of rules that cannot be satisfied together, or None if all rules can.
 
     Deletion filter: each rule in turn is dropped if the remaining rules still cannot be satisfied together (Chinneck
     and Dravnieks, Locating minimal infeasible constraint sets in linear programs, 1991).
 
     Args:
         rules: The rules.
-        holds_together: Returns whether some of the rules have a solution.
+        holds_together: Returns whether a subset of the rules can be satisfied together.
     """
     if holds_together(rules):
         return None
@@ -42,6 +42,6 @@ def minimal(rules: Sequence[str], holds_together: Callable[[Sequence[str]], bool
 
 
 def rule_of(constraint: str, rules: Iterable[str]) -> str | None:
-    """Return the rule to which a constraint of `building.model_of` belongs, by the constraint's name."""
+    """Return the rule that a constraint in `building.model_of` belongs to, given the constraint's name."""
     fitting = [rule for rule in rules if constraint == rule or constraint.startswith(f"{rule}.")]
     return max(fitting, key=len, default=None)

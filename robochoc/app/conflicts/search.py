@@ -1,4 +1,4 @@
-"""The search for a conflict between the rules of a team, in a separate process with a time limit."""
+"""Searches for a conflict between the rules of a team, in a separate process with a time limit."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 
 PATIENCE_S = 30.0
-"""The time limit of a search."""
+"""The time limit for a search, in seconds."""
 _GRACE_S = 5.0
-"""The additional time for the start of the process and for its output."""
+"""The additional time for starting the process and for its output, in seconds."""
 _PROCESS = "robochoc.app.conflicts.process"
 
 
 class Finder(StrEnum):
-    """The tool that has found a conflict."""
+    """The tool that found a conflict."""
 
     CPMPY = "cpmpy"
     OWN = "own"
@@ -36,10 +36,10 @@ class Conflict(msgspec.Struct, frozen=True):
 
     Attributes:
         rules: The ids of a minimal set of rules that cannot be satisfied together. Empty: a decision has no values.
-            None: all rules can be satisfied together, or nothing was found in time.
-        finder: The tool that has found the conflict.
+            None: all rules can be satisfied together, or no conflict was found in time.
+        finder: The tool that found the conflict.
         late: Whether the time limit was reached.
-        why: The error of a failed search; else empty.
+        why: The error if the search failed, otherwise empty.
         words: The conflicting constraints of an imported team, in words.
     """
 
@@ -51,7 +51,7 @@ class Conflict(msgspec.Struct, frozen=True):
 
 
 def found_by(conflict: Conflict) -> str:
-    """Return how a conflict was searched for, with advice if CPMpy is not installed."""
+    """Return a sentence about the tool that was used, with advice if CPMpy is not installed."""
     if conflict.finder == Finder.CPMPY:
         return say("decide.by-cpmpy")
     advice = "" if find_spec("cpmpy") else say("decide.without-cpmpy")
@@ -59,7 +59,7 @@ def found_by(conflict: Conflict) -> str:
 
 
 class TeamOfFiles(NamedTuple):
-    """An imported team: the folder of its files, and the number of past events of its scenario."""
+    """An imported team: the folder with its files, and the number of past events in its scenario."""
 
     folder: Path
     events: int = 0
@@ -71,7 +71,7 @@ class ConflictSearch:
     Args:
         asked: The team.
         seconds: The time limit.
-        folder: The team's folder: the search ends when it is removed.
+        folder: The team's folder. The search ends when the folder is removed.
     """
 
     def __init__(self, asked: Sketch | TeamOfFiles, seconds: float = PATIENCE_S, *, folder: Path | None = None) -> None:
@@ -80,15 +80,15 @@ class ConflictSearch:
 
     @property
     def pid(self) -> int | None:
-        """The id of its process, while there is one."""
+        """The id of the search's process, while it runs."""
         return self._job.pid
 
     def result(self) -> Conflict | None:
-        """Wait for the result; None if the search was ended."""
+        """Wait for the result, or return None if the search was ended."""
         return _conflict(self._job.future.result)
 
     async def found(self) -> Conflict | None:
-        """Wait for the result; None if the search was ended."""
+        """Wait for the result, or return None if the search was ended."""
         await asyncio.wait([asyncio.wrap_future(self._job.future)])
         return self.result()
 

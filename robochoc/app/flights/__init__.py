@@ -1,1 +1,1 @@
-"""Builds the outputs of an ended run: flight, conversation, recording, report, saved state."""
+"""Builds the outputs of a finished run: flight, conversation, recording, report, saved state."""

@@ -1,6 +1,6 @@
-"""Check the answer of a run from an opened file, whose claims are untrusted.
+"""Checks the answer of a run from an opened file, whose claims are untrusted.
 
-Claims that no answer is better, or that there is none, are not checked: that would require another run.
+The claim that no better answer, or no answer at all, exists is not checked: that would require another run.
 """
 
 from __future__ import annotations
@@ -24,12 +24,12 @@ from robochoc.modelling.errors import ModelError
 from robochoc.verification.checker import RefutedError, check_user_cost, constraint_cost
 
 CHECK_S = 5.0
-"""The time limit for checking all constraints; after it, the answer counts as not checked."""
+"""The time limit in seconds for checking all constraints, after which the answer counts as unchecked."""
 _UNREADABLE = (ModelError, InvalidInputError, OSError, ValueError, TypeError, LookupError, ArithmeticError)
 
 
 def claim_words(run: Run, claims: str) -> str:
-    """Return the description of a run; for a run from an opened file, say that the claim is the file's, and the check.
+    """Return the description of a run. For a run from an opened file, add that it is the file's claim, and the check.
 
     Args:
         run: The run.
@@ -52,7 +52,7 @@ def _check_words(run: Run, result: RunResult) -> list[str]:
 
 
 def check(run: Run) -> None:
-    """Check the answer of a run from an opened file, and write the finding to its record."""
+    """Check the answer of a run from an opened file, and write the finding into the run's record."""
     record, result = run.record, run.read_result()
     record.checked, record.maximised = None, False
     with suppress(*_UNREADABLE):
@@ -64,11 +64,11 @@ def check(run: Run) -> None:
 
 
 _Code = Callable[[str, Value], int | None]
-"""Returns the code of a variable's value; None for an invalid value."""
+"""Returns the code of a variable's value, or None for an invalid value."""
 
 
 def _team_of_sketch(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
-    """Return the final team of a run of a sketch, and the function that encodes the user's values."""
+    """Return the final team in a run of a sketch, and a function that encodes the user's values."""
     changed = changed_to(run) if result is not None and len(result.epochs) > 1 else None
     sketch = run.sketch if changed is None else changed
     if errors_of(sketch):
@@ -77,14 +77,14 @@ def _team_of_sketch(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
     team, codes = model.team, dict[str, dict[Value, int]]()
     for decision in sketch.decisions:
         names = [f"{robot}.{decision.name}" for robot in sketch.deciders(decision)]
-        if names:  # the robots of a decision have the same values
+        if names:  # all robots with a decision have the same values
             own = {value_of(model, names[0], code): code for code in team.variables[names[0]].domain}
             codes |= dict.fromkeys(names, own)
     return team, lambda name, value: codes.get(name, {}).get(value)
 
 
 def _team_of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
-    """Return the final team of a run of files, and the function that encodes the files' values."""
+    """Return the final team in a run of files, and a function that encodes the values in the files."""
     events = max(0, len(result.epochs) - 1) if result is not None else 0
     team = team_after_events(read_team(run.team), events)
     named = {name for name, variable in team.variables.items() if variable.domain.symbols}
@@ -100,7 +100,7 @@ def _team_of_files(run: Run, result: RunResult | None) -> tuple[Team, _Code]:
 
 
 def _checked(team: Team, code: _Code, result: RunResult) -> Checked | None:
-    """Check an answer for a team. None: the time limit was reached."""
+    """Check an answer for a team, or return None if the time limit was reached."""
     aside = frozenset(result.withdrawn)
     flying = {name: one.domain for name, one in team.variables.items() if team.owner[name] not in aside}
     values = {name: known for name, value in result.values.items() if (known := code(name, value)) is not None}

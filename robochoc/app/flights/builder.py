@@ -1,4 +1,4 @@
-"""Build the flight and the conversation of a run with robochoc's commands, each in a separate process.
+"""Builds the flight and the conversation of a run with robochoc's commands, each in a separate process.
 
 map.json             the map of the ground, where the flight begins
 flight.html          the scene of the simulated flight
@@ -6,7 +6,7 @@ flight.json          the result of the flight, or the reason why there was none
 conversation.html    all messages, as shown by the sniffer
 flight.mcap          a recording, on request
 
-The files are stored in the run's folder. The work ends when no page requests them any more.
+The files are stored in the run's folder. The work is ended when no page requests the files any more.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ FLIGHT = "flight.html"
 CONVERSATION = "conversation.html"
 RECORDING = "flight.mcap"
 CAPTIONED = "told.json"
-"""The result, with its events in words."""
+"""The file with the run's result and its events in words."""
 MOST_MESSAGES = 100_000
-"""The maximum number of shown messages: a page with more would open slowly."""
+"""The maximum number of messages shown, since a page with more would open slowly."""
 _NOT_AS_PLANNED = 4
-"""The exit status of `robochoc fly` if a drone has not arrived: the flight can be shown nevertheless."""
+"""The exit status of `robochoc fly` if a drone did not arrive: the flight can still be shown."""
 _MAX_MESSAGE = 600
 _REFUSAL = "the result cannot be flown: "
-"""The text of `robochoc fly` before the reason."""
+"""The text that `robochoc fly` prints before the reason for a refusal."""
 
 
 class BuildStage(StrEnum):
@@ -63,11 +63,11 @@ class BuildStage(StrEnum):
 
 
 class BuildError(RobochocError):
-    """A command has failed, with its error text."""
+    """A command failed. The message is its error text."""
 
 
 def flies(run: Run) -> bool:
-    """Return whether there is a flight: whether some decisions are positions of robots.
+    """Return whether there is a flight: whether some decisions are robots' positions.
 
     A sketch without decisions is the picture of an imported team, which flies according to its files.
     """
@@ -83,7 +83,7 @@ def can_record() -> bool:
 
 
 class FlightBuilder:
-    """Builds the files of one run. `builder_of` returns the object of a run."""
+    """Builds the files for one run. `builder_of` returns the object for a run."""
 
     def __init__(self, run: Run) -> None:
         self.run = run
@@ -99,12 +99,12 @@ class FlightBuilder:
 
     @property
     def has_answer(self) -> bool:
-        """True if the team has an answer that can be flown: at the end, or before an event."""
+        """True if the team has an answer that can be flown, at the end or before an event."""
         return self.run.result is not None and self.run.result.has_decided
 
     @property
     def has_flight(self) -> bool:
-        """True if there is a flight to show, when it is built."""
+        """True if there is a flight to show once it is built."""
         return self.has_answer and flies(self.run) and BuildStage.FLIGHT not in self.troubles
 
     @property
@@ -114,17 +114,17 @@ class FlightBuilder:
 
     @property
     def flight(self) -> Path | None:
-        """The page of the scene, if it exists."""
+        """The page with the scene, if it exists."""
         return self.run.artefact(FLIGHT)
 
     @property
     def conversation(self) -> Path | None:
-        """The page of the messages, if it exists."""
+        """The page with the messages, if it exists."""
         return self.run.artefact(CONVERSATION)
 
     @property
     def seconds(self) -> float:
-        """The elapsed time of the work."""
+        """The elapsed time of the work in seconds."""
         return time.monotonic() - self._began
 
     @property
@@ -133,7 +133,7 @@ class FlightBuilder:
         return self.run.result is not None and self.run.result.messages > MOST_MESSAGES
 
     def request(self, on_stage: Callable[[], None]) -> Callable[[], None]:
-        """Start the work if necessary, and call `on_stage` at each stage; return a function that ends the request."""
+        """Start the work if necessary, and call `on_stage` at each stage. Returns a function that ends the request."""
         leave = self._requests.add(on_stage)
         if self.stage == BuildStage.WAITING:
             self._start()
@@ -146,7 +146,7 @@ class FlightBuilder:
         return release
 
     def retry(self) -> None:
-        """Repeat the failed stages, and a flight that was rejected. Raises `OSError`."""
+        """Repeat the failed stages, or a flight that was refused. Raises `OSError`."""
         if self.stage != BuildStage.DONE:
             return
         flown = flight_result_of(self.run)
@@ -157,14 +157,14 @@ class FlightBuilder:
             self._start()
 
     def cancel(self) -> None:
-        """End the work. Existing files remain."""
+        """End the work. Existing files are kept."""
         if self._job is not None:
             self._job.end()
             self._before, self._job = self._job, None
             self._set_stage(BuildStage.WAITING)
 
     async def recording(self) -> Path:
-        """Return a recording of the flight, which is created if it does not exist. Raises `BuildError`."""
+        """Return a recording of the flight, which is made if it does not exist. Raises `BuildError`."""
         async with self._recording:
             file = self.run.artefact(RECORDING)
             if file is None:
@@ -218,7 +218,7 @@ class FlightBuilder:
         given = [self._result(), "--team", self.run.team.name, *self._map()]
         try:
             result = self._run(job, "fly", *given, "--json", "--html", FLIGHT)
-        except BuildError as why:  # for example, drones too near to each other: show the goals nevertheless
+        except BuildError as why:  # for example, two drones are too close: the goals are shown nevertheless
             self._run(job, "animate", *given, "--html", FLIGHT)
             result = refused(str(why).rpartition(_REFUSAL)[2])
         write_atomically(self.run.folder / FLOWN, result)
@@ -228,7 +228,7 @@ class FlightBuilder:
         self._run(job, "journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
 
     def _map(self) -> list[str]:
-        """Write the map of the ground, if there is one; return the options that name it."""
+        """Write the map of the ground, if there is one, and return the options for using it."""
         ground = ground_of(self.run)
         if ground is None:
             return []
@@ -236,7 +236,7 @@ class FlightBuilder:
         return ["--map", MAP]
 
     def _result(self) -> str:
-        """Return the file of the run's result, with its events in words if there are any."""
+        """Return the file with the run's result, including its events in words if there are any."""
         result = captioned(self.run)
         if result is None:
             return RESULT
@@ -251,7 +251,7 @@ class FlightBuilder:
         return (self.run.folder / fresh).replace(self.run.folder / RECORDING)
 
     def _write_team(self) -> None:
-        """Write the team's files, if they do not exist: an opened state does not contain them."""
+        """Write the team's files if they do not exist, since an opened state does not contain them."""
         run = self.run
         if run.team.is_dir():
             return
@@ -261,7 +261,7 @@ class FlightBuilder:
             raise BuildError(str(mistake)) from None
 
     def _run(self, job: Job[None] | Job[Path], *arguments: str) -> bytes:
-        """Run a command of robochoc in the run's folder; return its output."""
+        """Run a robochoc command in the run's folder, and return its output."""
         finished = job.run(Command(arguments, self.run.folder))
         if finished.status not in {0, _NOT_AS_PLANNED}:
             raise BuildError(finished.why[-_MAX_MESSAGE:])
@@ -280,12 +280,12 @@ class FlightBuilder:
 
 
 def builder_of(run: Run) -> FlightBuilder:
-    """Return the builder of a run; the same object for all pages."""
+    """Return the builder for a run, which is the same object for all pages."""
     return run.part(FlightBuilder)
 
 
 def captioned(run: Run) -> bytes | None:
-    """Return the result of a run with its events in words; None if there are none, or they are not known."""
+    """Return the result of a run with its events in words, or None if there are no events, or they are unknown."""
     with suppress(OSError, ValueError, TypeError, LookupError, msgspec.MsgspecError, RecursionError, InvalidInputError):
         happened = _events(run)
         file = run.folder / RESULT

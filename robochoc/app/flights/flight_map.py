@@ -1,4 +1,4 @@
-"""The map of a team for its flight (`robochoc fly --map`): positions of robots, and blocked cells."""
+"""The map for a team's flight (`robochoc fly --map`): the robots' positions and blocked cells."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ MAP = "map.json"
 
 
 _MOST_TOLD = 100_000
-"""The maximum number of characters in the texts of a change."""
+"""The maximum number of characters in the texts for a change."""
 
 
 class RunChange(msgspec.Struct):
-    """The content of `change.json`: the team after the events, and the reason if it decided from scratch (`anew`)."""
+    """The content of `change.json`: the team after the events, and why it decided from scratch, if it did (`anew`)."""
 
     after: Sketch
     happened: list[str] = []
@@ -28,12 +28,12 @@ class RunChange(msgspec.Struct):
 
     @property
     def is_sound(self) -> bool:
-        """True if the change is within the limits, since its file may be untrusted."""
+        """True if the change, whose file may be untrusted, is within the limits."""
         return is_sound(self.after) and len(self.anew) + sum(map(len, self.happened)) <= _MOST_TOLD
 
 
 def ground_of(run: Run) -> GroundMap | None:
-    """Return the map of a run's team; None for an imported team. Raises as `Run.sketch`."""
+    """Return the map for a run's team, or None for an imported team. Raises the exceptions of `Run.sketch`."""
     sketch = run.sketch
     if not sketch.decisions:
         return None
@@ -51,13 +51,13 @@ def ground_of(run: Run) -> GroundMap | None:
 
 
 def changed_to(run: Run) -> Sketch | None:
-    """Return the team after the events during a run, for which it decided again; None if there were none."""
+    """Return the team after the events in a run, for which it decided again, or None if there were no events."""
     change = _change(run)
     return change.after if change else None
 
 
 def happened_in(run: Run) -> list[str]:
-    """Return the events during a run, in sentences."""
+    """Return the events in a run as sentences."""
     change = _change(run)
     return change.happened if change else []
 
@@ -70,7 +70,7 @@ def _change(run: Run) -> RunChange | None:
 
 
 def _blocked(before: Sketch, after: Sketch) -> Iterator[BlockedCell]:
-    """Yield all blocked cells; cells blocked by an event are blocked from the second epoch on."""
+    """Yield all blocked cells. Cells blocked by an event are blocked from the second epoch on."""
     for cell in sorted(before.area.blocked | after.area.blocked):
         if before.area.has(cell):
             yield BlockedCell(cell.x + 1, cell.y + 1, 0 if cell in before.area.blocked else 1)

@@ -1,4 +1,4 @@
-"""A flight in words: the robots that fly, the others, and the result (the output of `robochoc fly --json`)."""
+"""Describes a flight in words: the flying robots, the others, and the result (the output of `robochoc fly --json`)."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from robochoc.app.sketch.sketch import DecisionKind, Sketch
 from robochoc.app.texts import say
 
 SENT_BY = frozenset({DecisionKind.LEVEL, DecisionKind.PLACE})
-"""The kinds of decisions that are positions of robots."""
+"""The kinds of decisions that are robots' positions."""
 
 
 def flying_robots_words(run: Run) -> list[str]:
-    """Return sentences on the number of flying robots, and on the others; none if no robot flies, or it is not known.
+    """Return sentences about the flying robots and the others; empty if no robot flies, or this is unknown.
 
-    Raises as `Run.sketch`.
+    Raises the exceptions of `Run.sketch`.
     """
     before = run.sketch
     after = changed_to(run) or before
@@ -52,7 +52,7 @@ def _sentences(before: Sketch, after: Sketch, result: RunResult) -> Iterator[str
 
 FLOWN = "flight.json"
 _ARRIVED_M = 0.1
-"""The tolerance of `robochoc fly`: a drone farther from its goal has not arrived."""
+"""The tolerance of `robochoc fly` in metres: a drone farther from its goal has not arrived."""
 _MOST_TOLD = 6
 _MAX_BYTES = 64 << 20
 
@@ -72,10 +72,10 @@ class FlightResult(msgspec.Struct, frozen=True):
     """The result of a flight.
 
     Attributes:
-        as_planned: Whether all drones have arrived and kept their distance.
-        refused: The reason why there was no flight. Empty: there was one.
-        drones: The drones at the end.
-        happenings: Events during the flight.
+        as_planned: Whether all drones arrived and kept their distances.
+        refused: The reason why there was no flight. Empty: there was a flight.
+        drones: The drones at the end of the flight.
+        happenings: The events during the flight.
     """
 
     as_planned: bool = True
@@ -85,12 +85,12 @@ class FlightResult(msgspec.Struct, frozen=True):
 
 
 def refused(why: str) -> bytes:
-    """Return the content of a result file with the reason why there was no flight."""
+    """Return the content of a result file that contains only the reason why there was no flight."""
     return msgspec.json.encode({"as_planned": False, "refused": why})
 
 
 def flight_result_of(run: Run) -> FlightResult | None:
-    """Return the result of a run's flight; None if it is not known."""
+    """Return the result of a run's flight, or None if it is unknown."""
     file = run.artefact(FLOWN)
     try:
         if file is None or file.stat().st_size > _MAX_BYTES:
@@ -101,7 +101,7 @@ def flight_result_of(run: Run) -> FlightResult | None:
 
 
 def flight_words(flown: FlightResult) -> list[str]:
-    """Return the problems of a flight in sentences; none if it went as planned."""
+    """Return the problems of a flight in sentences; empty if the flight went as planned."""
     return [*_words(flown)]
 
 

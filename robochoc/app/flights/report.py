@@ -1,7 +1,7 @@
 """The report of a run: one self-contained HTML file.
 
-Names are untrusted input: they are escaped, and the page's Content-Security-Policy allows only the scripts of the scene
-and the conversation, which are in frames.
+Names are untrusted input: they are escaped, and the page's Content-Security-Policy allows only the scripts in the
+frames with the scene and the conversation.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from robochoc.model.cost_units import cost_shown
 from robochoc.system.plain_text import printable
 
 _MOST_VALUES = 12
-"""The maximum number of listed values of a decision."""
+"""The maximum number of values listed for a decision."""
 _MOST_LINKS = 4
 _SCRIPTS = re.compile(rb"script-src ([^;]*);")
 _HEAD_BYTES = 4096
@@ -51,7 +51,7 @@ class Pages:
 
 @dataclass(frozen=True)
 class ViolatedRule:
-    """A rule that an answer violates, the robots of each violation, and the cost (None for a hard rule)."""
+    """A violated rule, the robots in each violation, and the cost (None for a hard rule)."""
 
     rule: SketchRule
     links: tuple[tuple[str, ...], ...]
@@ -59,12 +59,12 @@ class ViolatedRule:
 
 
 def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
-    """Return the report of a run, UTF-8.
+    """Return the report on a run in UTF-8.
 
     Args:
-        sketch: The sketch of the run.
+        sketch: The sketch that was solved.
         run: The run.
-        pages: The pages in the report.
+        pages: The pages to include in the report.
         version: The version of robochoc.
     """
     after = changed_to(run) or sketch
@@ -91,11 +91,11 @@ def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
 
 
 def summary(sketch: Sketch, run: Run) -> str:
-    """Return the outcome of a run, in a sentence."""
+    """Return the outcome of a run in one sentence."""
     result = run.result
     if result is None:
         return say("report.no-answer")
-    if result.epochs and not sketch.decisions:  # an imported team, whose robots may change
+    if result.epochs and not sketch.decisions:  # an imported team, whose robots may change between epochs
         there = len(result.epochs[-1].robots)
     else:
         there = len((changed_to(run) or sketch).robots)
@@ -104,7 +104,7 @@ def summary(sketch: Sketch, run: Run) -> str:
     worth = run.record.maximised
     verdict = "most" if worth and verdict == "optimal" else verdict
     words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
-    if result.withdrawn and not flying_robots_words(run):  # which mention withdrawn robots, too
+    if result.withdrawn and not flying_robots_words(run):  # those words would also mention withdrawn robots
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))
     if result.cost:
         words.append(say("report.worth" if worth else "report.cost", cost=cost_shown(result.cost)))
@@ -112,7 +112,7 @@ def summary(sketch: Sketch, run: Run) -> str:
 
 
 def _story(run: Run) -> list[str]:
-    """Return sentences on events, on the flying robots, and on problems of the flight."""
+    """Return sentences about events, the flying robots, and problems during the flight."""
     happened = happened_in(run)
     flown = flight_result_of(run)
     return [
@@ -127,7 +127,7 @@ _VERDICTS = frozenset({"solution", "optimal", "most", "fewest", "no-solution", "
 
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
-    """Return the values of an answer by robot and decision."""
+    """Return the values in an answer by robot and decision."""
     return values_by_robot(sketch, run.result.values) if run.result else {}
 
 
@@ -171,14 +171,14 @@ def _rules(sketch: Sketch, run: Run) -> str:
 
 
 def violated_rules(sketch: Sketch, values: Decided) -> Iterator[ViolatedRule]:
-    """Yield the rules that an answer violates. Withdrawn robots violate none."""
+    """Yield the rules that an answer violates. Withdrawn robots violate no rules."""
     for rule in sketch.rules:
         if rule.on and rule.kind in PALETTE and (links := violated_links(sketch, rule, values)):
             yield ViolatedRule(rule, links, None if rule.cost is None else rule.cost * len(links))
 
 
 def _graded_costs(sketch: Sketch, values: Decided) -> dict[str, int]:
-    """Return the costs of graded rules, by their ids."""
+    """Return the costs of graded rules by rule id."""
     graded = (rule for rule in rules_with_costs(sketch) if values and PALETTE[rule.kind].graded)
     return {rule.id: rule_cost(sketch, rule, values) for rule in graded}
 
@@ -233,7 +233,7 @@ def _again(run: Run, version: str) -> str:
 
 
 def _types(run: Run) -> dict[str, int]:
-    """Return the number of messages of each type, if the result has them."""
+    """Return the number of messages of each type, if the result contains them."""
     with suppress(OSError, msgspec.MsgspecError, LookupError, TypeError, ValueError, OverflowError):
         result: dict[str, Any] = msgspec.json.decode((run.folder / RESULT).read_bytes().splitlines()[0])
         return {str(kind): int(count) for kind, count in result["metrics"]["messages_by_type"].items()}
@@ -250,7 +250,7 @@ def _frame(key: str, page: bytes | None) -> str:
 
 
 def _policy(pages: Pages) -> str:
-    """Return the report's policy. It also applies to the frames, so it lists their scripts."""
+    """Return the report's policy, which lists the scripts in the frames because it also applies to frames."""
     found = [_SCRIPTS.search(page[:_HEAD_BYTES]) for page in (pages.flight, pages.conversation) if page]
     scripts = " ".join(match[1].decode() for match in found if match) or "'none'"
     return (
@@ -275,7 +275,7 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[object]], *, fold: b
 
 
 def _when(run: Run) -> str:
-    with suppress(OverflowError, ValueError, OSError):  # an opened file may contain any number
+    with suppress(OverflowError, ValueError, OSError):  # a file from elsewhere may contain any number
         return datetime.fromtimestamp(run.record.started, UTC).strftime("%Y-%m-%d %H:%M UTC")
     return ""
 

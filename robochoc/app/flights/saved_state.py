@@ -1,6 +1,6 @@
-"""The state of a team as one file: the team and one run, which can be opened elsewhere.
+"""The state of a team as one file, which can be opened elsewhere: the team and one run.
 
-The file is the archive of the team (`sketch.files.zipped`), which all versions can open, with the run in addition:
+The file is the team's archive (`sketch.files.zipped`), which all versions can open, with the run added:
 
 TEAM/...             the team's files, and its sketch
 TEAM/run/1/...       the run: record, result and journal
@@ -31,19 +31,19 @@ from robochoc.app.store import FILES
 MAX_BYTES = 256 << 20
 """The maximum number of bytes of an unpacked run."""
 MAX_JOURNAL_BYTES = open_from_disk.MAX_BYTES * 3 // 4
-"""The maximum number of bytes of a packed journal. A larger one is left out, so that the file can be opened again."""
+"""The maximum size of a packed journal in bytes. A larger journal is left out, so that the file can be opened again."""
 MOST_AT_ONCE = {RECORD: MAX_SKETCH, SKETCH: MAX_SKETCH, CHANGE: MAX_SKETCH, RESULT: MAX_RESULT}
-"""The maximum number of bytes of files that are read at once. Larger files are rejected."""
+"""The maximum size in bytes of files that are read as a whole. Larger files are rejected."""
 _FILES = (RECORD, SKETCH, RESULT, JOURNAL, CHANGE)
 _AT_ONCE = 1 << 20
 _PLACE = "run/1"
 _FIRST = "00001"
 _FRESH = "new"
-"""The folder of a run that is being written."""
+"""The name of the folder in which a run is being written."""
 
 
 def team_archive(run: Run) -> bytes:
-    """Return the team of a run as a ZIP archive of its folder, with its sketch unless it is an imported team.
+    """Return the team in a run as a ZIP archive of its folder, with the sketch unless the team is imported.
 
     Raises:
         InvalidInputError: if the sketch has errors.
@@ -63,7 +63,7 @@ def files_archive(folder: Path, name: str) -> bytes:
 
 
 def packed(run: Run) -> bytes:
-    """Return a run and its team as one file, without its messages if `is_too_long`. Raises as `team_archive`."""
+    """Return a run and its team as one file, without messages if `is_too_long`. Raises the errors of `team_archive`."""
     content = io.BytesIO(team_archive(run))
     left_out = {JOURNAL} if is_too_long(run) else set()
     with zipfile.ZipFile(content, "a", zipfile.ZIP_DEFLATED) as archive:
@@ -74,13 +74,13 @@ def packed(run: Run) -> bytes:
 
 
 def is_too_long(run: Run) -> bool:
-    """Return whether the journal of a run is too long to be packed."""
+    """Return whether the journal of a run is too large to be packed."""
     journal = run.artefact(JOURNAL)
     return journal is not None and journal.stat().st_size > MAX_JOURNAL_BYTES
 
 
 def _add(archive: zipfile.ZipFile, name: str, file: Path) -> None:
-    """Add a file without its time, so that equal contents give equal archives."""
+    """Add a file without its modification time, so that equal contents give equal archives."""
     entry = zipfile.ZipInfo(name)
     entry.compress_type = zipfile.ZIP_DEFLATED
     with file.open("rb") as source, archive.open(entry, "w") as packed_file:
@@ -88,14 +88,14 @@ def _add(archive: zipfile.ZipFile, name: str, file: Path) -> None:
 
 
 def unpack_run(file: Path, folder: Path) -> bool:
-    """Unpack the run of a packed state into the folder of a team without runs.
+    """Unpack the run from a packed state into the folder of a team without runs.
 
     Args:
-        file: A file with the content of `packed`. Nothing is done for other files.
+        file: A file that `packed` has made. Other files are ignored.
         folder: The team's folder.
 
     Returns:
-        Whether there was a complete run.
+        Whether the file contained a complete run.
 
     Raises:
         OSError: if the run cannot be written.
@@ -112,7 +112,7 @@ def unpack_run(file: Path, folder: Path) -> bool:
     record.opened, record.checked = True, None
     found[RECORD] = msgspec.json.encode(record)
     run = Run(_written(found, folder / "runs"), record, sketch)
-    if (folder / FILES).is_dir():  # the files of a sketch are written when they are needed
+    if (folder / FILES).is_dir():  # for a sketch, the files are written when they are needed
         shutil.copytree(folder / FILES, run.team)
     check(run)
     run.save()
@@ -126,14 +126,14 @@ def _written(found: dict[str, bytes], runs: Path) -> Path:
     try:
         for name, piece in found.items():
             (fresh / name).write_bytes(piece)
-        return fresh.rename(runs / _FIRST)  # only now it is visible: folders without a record are removed
+        return fresh.rename(runs / _FIRST)  # makes the run visible: folders without a record are removed
     except BaseException:
         shutil.rmtree(fresh, ignore_errors=True)
         raise
 
 
 def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:
-    """Return the files of the run; none if a file is too large. Names are compared, never used as paths."""
+    """Return the files of the run; empty if a file is too large. Names are compared, but never used as paths."""
     found: dict[str, bytes] = {}
     left = MAX_BYTES
     for entry in archive.infolist():
@@ -159,14 +159,14 @@ def _is_sound(found: dict[str, bytes]) -> bool:
         return False
     if not is_sound(sketch) or (change is not None and not change.is_sound):
         return False
-    return not (sketch.decisions and errors_of(sketch))  # a sketch without decisions is the picture of an imported team
+    return not (sketch.decisions and errors_of(sketch))  # without decisions, it is the picture of an imported team
 
 
 _OTHERS = re.compile(r"[^A-Za-z0-9_-]+")
 _LONGEST = 60
 _USUAL = "team"
 _RESERVED = re.compile(r"(?i)(con|prn|aux|nul|com[0-9]|lpt[0-9])")
-"""Names of devices on Windows."""
+"""Device names on Windows, which cannot be file names."""
 
 
 def file_name(name: str, ending: str = "") -> str:

@@ -1,1 +1,1 @@
-"""Runs: a team of the application solves its problem in a separate process, and the outcome is saved."""
+"""Runs: a team in the application solves its problem in a separate process, and the outcome is saved."""

@@ -1,4 +1,4 @@
-"""The protocols that suit a team, and the choice of `auto` with its reasons."""
+"""The protocols that are suitable for a team, and the choice of `auto` with its reasons."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from robochoc.run.registry import installed_protocols
 
 
 class Fitting(msgspec.Struct, frozen=True):
-    """The protocols that suit a team.
+    """The protocols that are suitable for a team.
 
     Attributes:
-        protocols: The protocols that accept the team, complete ones first, and whether each is complete.
+        protocols: The protocols that accept the team, complete ones first, each with whether it is complete.
         chosen: The protocol that `auto` chooses.
         why: The reason for the choice, in words.
         facts: Facts about the team, in words.
-        rejected: The reasons against better known protocols, by name.
+        rejected: The reasons for rejecting better known protocols, by name.
     """
 
     protocols: tuple[tuple[str, bool], ...]
@@ -35,10 +35,10 @@ class Fitting(msgspec.Struct, frozen=True):
 
 
 def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
-    """Return the team of a sketch, or of files if there are some.
+    """Return the team given by files, or by a sketch if there are no files.
 
     Raises:
-        NotReadyError: for an incomplete sketch.
+        NotReadyError: if the sketch is incomplete.
         InvalidInputError: if the files are damaged.
     """
     if files:
@@ -49,18 +49,18 @@ def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
 
 
 def fitting_protocols(team: Team, options: Options) -> tuple[tuple[str, bool], ...]:
-    """Return the protocols that accept a team, complete ones first, and whether each is complete."""
+    """Return the protocols that accept a team, complete ones first, each with whether it is complete."""
     known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
     fit = [(name, complete) for name, complete in known if accepts(name, team, options)]
     return tuple(sorted(fit, key=lambda one: (not one[1], one[0])))
 
 
 def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runtime.SIMULATOR) -> Fitting:
-    """Return the protocols that suit the team of a sketch, or of files.
+    """Return the protocols that are suitable for the team given by a sketch or by files.
 
     Raises:
-        NotReadyError: for an incomplete sketch.
-        UnsupportedError: for a team that no protocol can solve.
+        NotReadyError: if the sketch is incomplete.
+        UnsupportedError: if no protocol can solve the team's problem.
         InvalidInputError: if the files are damaged.
     """
     team = team_of(sketch, files)

@@ -20,17 +20,17 @@ from robochoc.sniffer.sentences import JournalSentences, ValueLabel
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0
-"""The time for which a message is shown."""
+"""The time for which a message is shown, in seconds."""
 SETTLED_S = 1.0
-"""The time after which an unchanged value counts as settled."""
+"""The time after which an unchanged value counts as settled, in seconds."""
 AT_ONCE = 5_000
-"""The number of entries that are read at once."""
+"""The number of entries read at once."""
 READ_S = 0.1
-"""The time for reading entries before other work is done."""
+"""The time for reading entries before other work is done, in seconds."""
 LAST = 8
-"""The number of last messages that are available in words."""
+"""The number of last messages available in words."""
 MOST_COSTS = 300
-"""The maximum number of points of the cost curve."""
+"""The maximum number of points on the cost curve."""
 
 
 @dataclass
@@ -39,12 +39,12 @@ class Live:
 
     Attributes:
         messages: The number of sent messages.
-        values: Each robot's present values, by `ROBOT.DECISION`.
-        since: The time of each robot's last change of values, on the monotonic clock.
-        costs: The decreasing costs of the answers so far: seconds since the start, and the cost.
-        bound: The lower bound of the cost. None: not known.
+        values: The current values of each robot, by `ROBOT.DECISION`.
+        since: The time at which each robot last changed its values, on the monotonic clock.
+        costs: The decreasing costs of the answers so far: pairs of seconds since the start and cost.
+        bound: The lower bound on the cost. None: unknown.
         recent: The number of messages in the last second, by sender and receiver.
-        is_cut: Whether the last messages were skipped, since there were too many after the end of the run.
+        is_cut: Whether the last messages were skipped because too many remained after the end of the run.
         last_messages: The last messages in words, the last one first.
     """
 
@@ -63,14 +63,14 @@ class Live:
 
 
 class LiveReader:
-    """Follows the journal at `file`, which need not exist yet, and updates `live`. Memory is bounded.
+    """Follows the journal in `file`, which need not exist yet, and updates `live`. Memory use is bounded.
 
     Args:
         file: The journal.
         live: The state to update.
-        label: Converts the code of a variable to the user's value.
-        objective: The cost of assignments. None: nothing is minimised, or the problem changes.
-        called: The names of values in messages.
+        label: Converts a variable's code to the user's value.
+        objective: The cost function of assignments. None: nothing is minimised, or the problem changes.
+        called: Returns the names for values in messages.
     """
 
     def __init__(
@@ -94,7 +94,7 @@ class LiveReader:
         self._bunches: deque[tuple[float, Counter[tuple[str, str]]]] = deque()
 
     def advance(self) -> bool:
-        """Read new entries for a short time; return whether there were any."""
+        """Read new entries for a short time, and return whether there were any."""
         if self._follower is None and self._file.is_file():
             self._open = self._file.open("rb")
             self._follower = Follower(self._open)
@@ -107,7 +107,7 @@ class LiveReader:
         return anything
 
     def _read(self, follower: Follower) -> bool:
-        """Read a few entries; return whether there were any."""
+        """Read a few entries, and return whether there were any."""
         try:
             entries = follower.read(AT_ONCE)
         except JournalError:  # the header is incomplete: the run reports the error
@@ -166,11 +166,11 @@ class LiveReader:
             return
         costs = self._live.costs
         costs.append((now - self._began, self._known.best))
-        if len(costs) > MOST_COSTS:  # drop every other point except the last
+        if len(costs) > MOST_COSTS:  # drop every other point but the last
             del costs[1:-1:2]
 
     def _forget_old(self, now: float) -> None:
-        """Drop messages older than a second, and count the others."""
+        """Drop messages older than a second, and count the remaining ones."""
         while self._bunches and now - self._bunches[0][0] > RECENT_S:
             self._bunches.popleft()
         recent: Counter[tuple[str, str]] = Counter()

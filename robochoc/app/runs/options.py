@@ -16,18 +16,18 @@ RESULT = "result.json"
 JOURNAL = "run.journal"
 MAX_SEED = 2**31 - 1
 MAX_TIMEOUT_S = 1e9
-"""The longest valid time limit."""
+"""The maximum time limit in seconds."""
 
 
 class RunOptions(msgspec.Struct, frozen=True):
     """The options of a run.
 
     Attributes:
-        protocol: The protocol; `auto`: chosen by the team's problem.
+        protocol: The protocol; `auto`: chosen to suit the team's problem.
         runtime: `simulator` or `processes`.
         seed: The random seed.
         timeout: The time limit in seconds. None: no limit.
-        withdraw: Whether robots withdraw if there is no solution: the least total weight.
+        withdraw: Whether robots withdraw if there is no solution, with the least total weight.
         more: Further arguments of `robochoc solve`.
     """
 
@@ -39,9 +39,9 @@ class RunOptions(msgspec.Struct, frozen=True):
     more: tuple[str, ...] = ()
 
     def arguments(self, team: str, *, ranked: bool = False) -> list[str]:
-        """Return the arguments of `robochoc` that solve the team in the folder `team`, in the folder of a run.
+        """Return the arguments for `robochoc` that solve the team in the folder `team`, inside the folder of a run.
 
-        In a `ranked` team, the order of the robots is that of the files.
+        If the team is `ranked`, the order of the robots is the order in the files.
         """
         arguments = ["solve", team, "--json", "--journal", JOURNAL]
         arguments += ["--protocol", self.protocol, "--runtime", self.runtime, "--seed", str(self.seed)]
@@ -49,12 +49,12 @@ class RunOptions(msgspec.Struct, frozen=True):
             arguments += ["--order", Order.GIVEN]
         if self.timeout is not None:
             arguments += ["--timeout", f"{self.timeout:g}"]
-        arguments.append("--withdraw" if self.withdraw else "--bounds")  # costs of a withdrawal are not the user's
+        arguments.append("--withdraw" if self.withdraw else "--bounds")  # the costs of withdrawals are not the user's
         return [*arguments, *self.more]
 
     @property
     def are_known(self) -> bool:
-        """True if the application could have set these options: an opened file may have any others."""
+        """True if the application could have set these options; an opened file may contain any options."""
         return (
             self.protocol in {AUTO, *protocol_names()}
             and self.runtime in {Runtime.SIMULATOR, Runtime.PROCESSES}
@@ -65,5 +65,5 @@ class RunOptions(msgspec.Struct, frozen=True):
 
 
 def command_line(arguments: Sequence[str]) -> str:
-    """Return the shell command line for arguments of `robochoc`."""
+    """Return the shell command for arguments of `robochoc`."""
     return shlex.join(["robochoc", *arguments])

@@ -1,23 +1,23 @@
-"""The position and speed of a conversation that is played back."""
+"""The position and speed at which a conversation is played back."""
 
 from __future__ import annotations
 
 from math import isnan
 
 LEAST_S, MOST_S, PER_MOMENT_S = 3.0, 10.0, 0.15
-"""The limits of the playing time of a conversation, and the time for one moment."""
+"""The limits on the playing time of a conversation, and the time for one moment, in seconds."""
 SPEEDS = (0.25, 0.5, 1.0, 2.0)
 LARGE_S = 1.0
-"""The interval at which the picture of a large team is drawn, which is slow."""
+"""The interval in seconds at which the picture of a large team is drawn, since drawing is slow."""
 
 
 class Player:
-    """Plays `count` moments, at least one.
+    """Plays `count` moments. There is at least one.
 
     Attributes:
         count: The number of moments.
         playing: Whether the player is running.
-        speed: The speed, relative to the usual one.
+        speed: The speed, relative to the normal speed.
     """
 
     def __init__(self, count: int) -> None:
@@ -28,12 +28,12 @@ class Player:
 
     @property
     def moment(self) -> int:
-        """The moment that is shown, from 0."""
+        """The index of the shown moment, from 0."""
         return min(int(self._at), self.count - 1)
 
     @property
     def seconds(self) -> float:
-        """The playing time at the usual speed."""
+        """The playing time at the normal speed, in seconds."""
         return min(max(self.count * PER_MOMENT_S, LEAST_S), MOST_S)
 
     @property
@@ -42,13 +42,13 @@ class Player:
         return self.moment == self.count - 1
 
     def toggle(self) -> None:
-        """Pause or continue; at the end, play again from the start."""
+        """Pause or continue. At the end, start again from the beginning."""
         if not self.playing and self.ended:
             self._at = 0.0
         self.playing = not self.playing
 
     def advance(self, seconds: float) -> None:
-        """Advance by a time in seconds."""
+        """Advance by a number of seconds."""
         if not self.playing:
             return
         self._at = min(self._at + max(seconds, 0.0) * self.speed * self.count / self.seconds, float(self.count))
@@ -59,7 +59,7 @@ class Player:
         self.seek(self.moment + by)
 
     def seek(self, moment: object) -> None:
-        """Pause at a moment; an invalid value, which a browser can send, changes nothing."""
+        """Pause at a moment. An invalid value, which a browser could send, is ignored."""
         if isinstance(moment, (int, float)) and not (isinstance(moment, float) and isnan(moment)):
             self.playing = False
             self._at = float(min(max(moment, 0), self.count - 1))
@@ -71,7 +71,7 @@ class Player:
 
 
 class Frames:
-    """Decides when the picture of a conversation is drawn again."""
+    """Decides when the picture of a conversation must be drawn again."""
 
     def __init__(self) -> None:
         self._drawn = -LARGE_S
@@ -82,7 +82,7 @@ class Frames:
         Args:
             now: A time in seconds.
             large: Whether the team is large.
-            playing: Whether the player is running; if not, the picture is always drawn, since it remains visible.
+            playing: Whether the player is running. If not, the picture is always drawn, since it stays visible.
         """
         if large and playing and now - self._drawn < LARGE_S:
             return False

@@ -1,4 +1,4 @@
-"""Preparation of a run: the team's files in the run's folder, and the conversion of values for the user."""
+"""Prepares a run: writes the team's files into the run's folder, and converts values for the user."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class PreparedTeam:
 
     Attributes:
         team: The team.
-        label: Converts the code of a variable to the user's value.
-        labels: The user's values with another spelling in files, by that spelling.
-        called: Converts the code of a variable to the short text in messages.
+        label: Converts a variable's code to the user's value.
+        labels: The user's values that are spelled differently in files, by the spelling in files.
+        called: Converts a variable's code to the short text used in messages.
     """
 
     team: Team
@@ -36,7 +36,7 @@ class PreparedTeam:
 
     @property
     def robots(self) -> list[str]:
-        """The names of all robots, also of robots that join later."""
+        """The names of all robots, including robots that join later."""
         return [robot.name for robot in _robots(self.team)]
 
 
@@ -45,10 +45,10 @@ class TeamFiles:
     """The files of an imported team.
 
     Attributes:
-        folder: Their folder.
-        flies: Whether its decisions are positions of robots.
-        maximised: Whether its costs are utilities, whose sum is maximised.
-        then: Changes of the team after the problem of its files, and its scenario, are solved.
+        folder: The folder with the files.
+        flies: Whether the team's decisions are robots' positions.
+        maximised: Whether the costs are utilities, whose sum is maximised.
+        then: Changes in the team after the problem in the files and its scenario have been solved.
     """
 
     folder: Path
@@ -58,7 +58,7 @@ class TeamFiles:
 
 
 def prepare_sketch(run: Run, model: Callable[[Sketch], Model]) -> PreparedTeam:
-    """Write the files of a run's sketch, converted by `model`. Raises as `model`, and `OSError`."""
+    """Write the files for a run's sketch, converted by `model`. Raises the exceptions of `model`, and `OSError`."""
     converted = model(run.sketch)
     converted.save(run.team)
     return _of_model(converted, run.sketch)
@@ -67,7 +67,7 @@ def prepare_sketch(run: Run, model: Callable[[Sketch], Model]) -> PreparedTeam:
 def prepare_files(run: Run, files: TeamFiles) -> PreparedTeam:
     """Write the files of a run's team, unchanged or with later changes. Raises `InvalidInputError`, `OSError`.
 
-    Values have the spelling of the files.
+    Values are spelled as in the files.
     """
     team = read_team(files.folder)
     if files.then:
@@ -79,7 +79,7 @@ def prepare_files(run: Run, files: TeamFiles) -> PreparedTeam:
 
 
 def from_run(run: Run) -> PreparedTeam:
-    """Return the team of an earlier run, from its folder. Raises as `prepare_sketch` and `prepare_files`."""
+    """Return the team in an earlier run, from its folder. Raises as `prepare_sketch` and `prepare_files` do."""
     if run.record.flies is not None:  # an imported team
         return _of_files(read_team(run.team))
     return _of_model(model_of(run.sketch), run.sketch)
@@ -104,19 +104,19 @@ def _label(domains: Mapping[str, Domain], name: str, code: int) -> Value:
 
 
 def value_of(model: Model, variable: str, code: int) -> Value:
-    """Return the user's value of a variable's code."""
+    """Return the user's value for a variable's code."""
     user_values = model.variables[variable].codes.user_values or {}
     value = user_values.get(code, code)
     return value if isinstance(value, (int, str)) else str(value)
 
 
 def label_of(model: Model, variable: str, code: int) -> Value:
-    """Return the user's value of a variable's code; the code itself, if the team has no such variable."""
+    """Return the user's value for a variable's code, or the code itself if the team has no such variable."""
     return value_of(model, variable, code) if variable in model.variables else code
 
 
 def labels_of(model: Model) -> dict[str, str]:
-    """Return the user's values with another spelling in files, such as `two words`, by that spelling: `two_words`."""
+    """Return the user's values that are spelled differently in files: `two words` by `two_words`."""
     found: dict[str, str] = {}
     for name, variable in model.team.variables.items():
         if not variable.domain.symbols or name not in model.variables:

@@ -29,12 +29,12 @@ class RunResult(Outcome):
 
     @property
     def has_decided(self) -> bool:
-        """Whether there is an answer in the end, or was one in an epoch before."""
+        """Whether there is an answer at the end, or was an answer in an earlier epoch."""
         return bool(self.assignment) or self.ends_unsolved
 
     @property
     def ends_unsolved(self) -> bool:
-        """Whether there was an answer before something happened, but is none any more."""
+        """Whether there was an answer before an event, but is none at the end."""
         return not self.assignment and any(
             epoch.assignment and epoch.verdict != Verdict.NO_SOLUTION for epoch in self.epochs
         )
@@ -50,12 +50,12 @@ class RunResult(Outcome):
         return {name: self.labels.get(str(value), value) for name, value in named.items()}
 
     def value(self, robot: str, decision: str) -> Value | None:
-        """Return the value of a decision of a robot."""
+        """Return the value that a robot chose for a decision."""
         return self.values.get(f"{robot}.{decision}")
 
 
 def decoded(content: bytes, labels: Mapping[str, str] = MappingProxyType({})) -> RunResult | None:
-    """Return the result in the output of a run. None: there is no result, or it is not complete yet.
+    """Return the result in the output of a run, or None if there is no result or it is still incomplete.
 
     Args:
         content: The output.

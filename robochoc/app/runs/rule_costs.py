@@ -1,4 +1,4 @@
-"""The violated rules of an answer, and the cost of each rule, computed from the values without a model."""
+"""The violated rules in an answer, and the cost of each rule, computed from the values without a model."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ def rules_with_costs(sketch: Sketch) -> tuple[SketchRule, ...]:
 
 
 def values_by_robot(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[tuple[str, str], Value]:
-    """Return the values of an answer by robot and decision. Invalid values are left out.
+    """Return the values in an answer by robot and decision. Invalid values are left out.
 
     Args:
-        sketch: The sketch of the run.
+        sketch: The sketch that was solved.
         assignment: The user's values, by `ROBOT.DECISION`.
     """
     found: dict[tuple[str, str], Value] = {}
@@ -38,12 +38,12 @@ def values_by_robot(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[tup
 
 
 def rule_costs(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, int]:
-    """Return the cost of each rule with costs, by its id; 0 for a satisfied rule.
+    """Return the cost of each rule with costs, by rule id; 0 for a satisfied rule.
 
-    Rules of withdrawn robots have no cost.
+    The rules of withdrawn robots cost nothing.
 
     Args:
-        sketch: The sketch of the run.
+        sketch: The sketch that was solved.
         assignment: The user's values, by `ROBOT.DECISION`.
     """
     rules = rules_with_costs(sketch)
@@ -52,21 +52,21 @@ def rule_costs(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, int
 
 
 def rule_cost(sketch: Sketch, rule: SketchRule, values: Decided) -> int:
-    """Return the cost of a rule in an answer; 0 for a hard rule."""
+    """Return the cost of a rule in an answer, which is 0 for a hard rule."""
     if not PALETTE[rule.kind].graded:
         return (rule.cost or 0) * len(violated_links(sketch, rule, values))
     return sum(cost for _, cost in _link_values(sketch, rule, values))
 
 
 def violated_links(sketch: Sketch, rule: SketchRule, values: Decided) -> tuple[tuple[str, ...], ...]:
-    """Return the robots of each link that violates a rule; none for a graded rule, or if a robot has no value."""
+    """Return the robots in each link that violates a rule; empty if the rule is graded, or a robot has no value."""
     if PALETTE[rule.kind].graded:
         return ()
     return tuple(robots for robots, holds in _link_values(sketch, rule, values) if not holds)
 
 
 def _link_values(sketch: Sketch, rule: SketchRule, values: Decided) -> Iterator[tuple[tuple[str, ...], int]]:
-    """Yield each link whose robots all have values, and whether it is satisfied, or its cost."""
+    """Yield each link whose robots all have values, with whether it is satisfied, or with its cost."""
     entry, given = PALETTE[rule.kind], Applied(sketch, rule)
     for robots in entry.groups(sketch, rule):
         if all((robot, rule.decision) in values for robot in robots):

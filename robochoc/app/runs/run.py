@@ -35,7 +35,7 @@ SKETCH = "sketch.json"
 CHANGE = "change.json"
 ERRORS = "errors.txt"
 MAX_RESULT = 64 << 20
-"""Larger results are rejected."""
+"""The maximum size of a result in bytes. Larger results are rejected."""
 _MAX_MESSAGE = 2_000
 
 
@@ -46,13 +46,13 @@ class RunState(StrEnum):
     ENDED = "ended"
     """The run has an answer, or a limit was reached."""
     STOPPED = "stopped"
-    """The user stopped the run. There may be an answer: the best so far."""
+    """The user stopped the run. The best answer found so far may exist."""
     FAILED = "failed"
-    """The run failed; `Run.message` has the error."""
+    """The run failed. `Run.message` contains the error."""
 
 
 class Checked(StrEnum):
-    """The result of checking an answer from an opened file."""
+    """The result of checking the answer in an opened file."""
 
     KEPT = "kept"
     """All hard constraints are satisfied, and the cost is correct."""
@@ -63,11 +63,11 @@ class Checked(StrEnum):
 
 
 class Record(msgspec.Struct):
-    """The record of a run (run.json). Times are Unix times; `message` has the error of a failed run.
+    """The record of a run (run.json). Times are Unix times. `message` contains the error of a failed run.
 
-    `labels`: the user's values with another spelling in files, by that spelling. `opened`: whether the run is from an
-    opened file; `checked`: the result of checking its answer (None: not possible). `flies`: of an imported team,
-    whether its decisions are positions of robots; `maximised`: whether its costs are utilities.
+    `labels`: the user's values that are spelled differently in files, by the spelling in files. `opened`: whether the
+    run comes from an opened file; `checked`: the result of checking its answer (None: could not be checked). For an
+    imported team, `flies`: whether its decisions are robots' positions; `maximised`: whether its costs are utilities.
     """
 
     options: RunOptions
@@ -89,7 +89,7 @@ class Watcher(Protocol):
 
     @property
     def pid(self) -> int | None:
-        """The id of the process and its group; None if there is none (yet)."""
+        """The id of the process and its group, or None if there is no process (yet)."""
 
     def stop(self) -> None:
         """Request a stop."""
@@ -99,7 +99,7 @@ class Watcher(Protocol):
 
 
 class Run(PartsOwner):
-    """A run. `Runs` starts them; pages listen to them."""
+    """A run. `Runs` starts runs, and pages listen to them."""
 
     def __init__(self, folder: Path, record: Record, sketch: Sketch | None = None) -> None:
         super().__init__()
@@ -109,7 +109,7 @@ class Run(PartsOwner):
         self.live = Live()
         """The live state during the run."""
         self.result: RunResult | None = None
-        """The answer, as soon as there is one; of a stopped run, the best so far."""
+        """The answer, as soon as there is one. For a stopped run, the best answer so far."""
         self._sketch = sketch
         self._listeners = Listeners()
         self._call: Call = lambda does: does()
@@ -122,33 +122,33 @@ class Run(PartsOwner):
 
     @property
     def message(self) -> str:
-        """The error of a failed run, or an error besides the answer of an ended one, in one line; else empty."""
+        """The error of a failed run, or an error in addition to an ended run's answer, on one line; else empty."""
         return self.record.message
 
     @property
     def command(self) -> str:
-        """The equivalent command line, in the run's folder; empty if there is none.
+        """The equivalent command line in the run's folder; empty if there is none.
 
-        An opened file may contain any command. For a run from such a file, the command line is made from its options,
-        if the application could have set them.
+        An opened file may contain any command. So for a run from such a file, the command line is rebuilt from the
+        options, provided that the application could have set them.
         """
         record = self.record
         if not record.opened:
             return command_line(record.arguments)
         try:
             ranked = self.sketch.is_ranked
-        except (OSError, ValueError):  # its files are damaged
+        except (OSError, ValueError):  # the run's files are damaged
             return ""
         return command_line(record.options.arguments(self.team.name, ranked=ranked)) if record.options.are_known else ""
 
     @property
     def seconds(self) -> float:
-        """The elapsed time of the run."""
+        """The elapsed time of the run in seconds."""
         return max(0.0, (self.record.ended or time.time()) - self.record.started)
 
     @property
     def sketch(self) -> Sketch:
-        """The sketch of the team. Raises `ValueError` if its file is damaged, `OSError` if it cannot be read."""
+        """The team's sketch. Raises `ValueError` if its file is damaged, `OSError` if the file cannot be read."""
         if self._sketch is None:
             try:
                 self._sketch = msgspec.json.decode((self.folder / SKETCH).read_bytes(), type=Sketch)
@@ -158,7 +158,7 @@ class Run(PartsOwner):
 
     @property
     def team(self) -> Path:
-        """The folder of the team's files. Its name is the team's, if that is a valid name."""
+        """The folder with the team's files. Its name is the team's name, if that is a valid folder name."""
         name = self.sketch.name
         return self.folder / (name if is_name(name) and len(name) <= MAX_LABEL else "team")
 
@@ -169,20 +169,20 @@ class Run(PartsOwner):
 
     @property
     def pid(self) -> int | None:
-        """The id of its process and group, while there is one."""
+        """The id of the run's process and its group, while there is a process."""
         return self.watched_by.pid if self.watched_by else None
 
     def artefact(self, name: str) -> Path | None:
-        """Return a file of the run, such as `run.journal`, if it exists."""
+        """Return a file in the run's folder, such as `run.journal`, if it exists."""
         file = self.folder / Path(name).name
         return file if file.is_file() else None
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` after each change, in the event loop of the run; return a function that removes it."""
+        """Call `callback` after each change, in the run's event loop. Returns a function that removes the callback."""
         return self._listeners.add(callback)
 
     def call_listeners_by(self, call: Call) -> None:
-        """Call listeners by `call`, for example from a thread in an event loop."""
+        """Call listeners through `call`, for example to move the calls from a thread to an event loop."""
         self._call = call
 
     def notify(self) -> None:
@@ -201,7 +201,7 @@ class Run(PartsOwner):
     def save(self) -> None:
         """Save the record atomically."""
         fresh = self.folder / f"{RECORD}.{os.getpid()}.new"
-        with suppress(OSError):  # the disk is full, or the team was removed: the run continues
+        with suppress(OSError):  # if the disk is full or the team was removed, the run continues
             fresh.write_bytes(msgspec.json.encode(self.record))
             fresh.replace(self.folder / RECORD)
 
@@ -216,7 +216,7 @@ class Run(PartsOwner):
 
 
 def run_of(folder: Path) -> Run:
-    """Return an earlier run. A damaged run has failed, and so has a run whose process has disappeared."""
+    """Return an earlier run. A damaged run counts as failed, and so does a run whose process has disappeared."""
     try:
         record = msgspec.json.decode((folder / RECORD).read_bytes(), type=Record)
     except (OSError, msgspec.DecodeError, RecursionError):

@@ -1,4 +1,4 @@
-"""The runs of a team: started, watched, stopped, and found again after a restart of the server."""
+"""The runs of a team: starts, watches and stops them, and finds them again after a restart of the server."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ from robochoc.run.recording import objective_to_record
 from robochoc.system.stopping import STOP
 
 MAX_RUNS = 30
-"""The maximum number of runs of a team. Older ones are removed."""
+"""The maximum number of runs stored for a team. Older ones are removed."""
 _USUAL = RunOptions()
 
 
@@ -41,15 +41,15 @@ class RunsOwner(Protocol):
 
     @property
     def sketch(self) -> Sketch:
-        """The present state of the team."""
+        """The current state of the team."""
 
     @property
     def folder(self) -> Path:
-        """The folder with the subfolder `runs`."""
+        """The folder that contains the subfolder `runs`."""
 
 
 class Runs:
-    """The runs of one team. `runs_of` returns the object of an open team."""
+    """The runs of one team. `runs_of` returns the object for an open team."""
 
     def __init__(self, project: RunsOwner) -> None:
         self._project = project
@@ -60,11 +60,11 @@ class Runs:
 
     @property
     def latest(self) -> Run | None:
-        """The last started run."""
+        """The run that was started last."""
         return self._runs[-1] if self._runs else None
 
     def latest_for(self, purpose: str) -> Run | None:
-        """Return the last started run for a purpose, such as `decide`."""
+        """Return the run that was started last for a purpose, such as `decide`."""
         return next((run for run in self.all() if run.record.purpose == purpose), None)
 
     def all(self) -> list[Run]:
@@ -84,19 +84,19 @@ class Runs:
         files: TeamFiles | None = None,
         purpose: str = "decide",
     ) -> Run:
-        """Start a run, and return it; all work is done in a thread and a process.
+        """Start a run and return it. All work is done in a thread and a process.
 
         Args:
             options: The options.
-            sketch: The team. None: its present state.
+            sketch: The team. None: the team's current state.
             model: Converts the sketch to a model.
-            files: The files of an imported team, used instead of the sketch, which is only its picture.
-            purpose: The purpose, for `latest_for`. There is one run at a time for each purpose: an earlier one that is
-                still running is ended.
+            files: The files of an imported team. They are used instead of the sketch, which is only the team's picture.
+            purpose: The purpose, for `latest_for`. There is one run at a time for each purpose: if an earlier run is
+                still in progress, it is ended.
 
         Raises:
             EditError: if the team was removed.
-            OSError: if a file cannot be written, for example. Nothing has changed then.
+            OSError: for example, if a file cannot be written. In this case nothing has changed.
         """
         chosen = self._project.sketch if sketch is None else sketch
         record = Record(options, purpose=purpose, started=time.time())
@@ -114,7 +114,7 @@ class Runs:
         return run
 
     def on_start(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` when a run is started; return a function that removes it."""
+        """Call `callback` when a run is started. Returns a function that removes the callback."""
         return self._listeners.add(callback)
 
     def _new_run(self, record: Record, sketch: Sketch) -> Run:
@@ -153,14 +153,14 @@ class Runs:
         ended = [run for run in self._runs if run.state != RunState.RUNNING]
         for run in ended[: max(0, len(self._runs) - MAX_RUNS)]:
             self._runs.remove(run)
-            with suppress(OSError):  # without its record, the folder is not a run any more if this process dies now
+            with suppress(OSError):  # without a record, this is not a run, even if the process dies now
                 (run.folder / RECORD).unlink()
             self._remove(run.folder, end_jobs_in(run.folder))
 
     def _sweep(self) -> None:
-        """Remove folders that are not runs: their start failed, or their removal was interrupted.
+        """Remove folders that are not runs, because starting the run failed, or because its removal was interrupted.
 
-        No other process writes there: the folder of all teams is locked (`Store.locked`), no run of this team has
+        No other process writes there: the folder with all teams is locked (`Store.locked`), no run of this team has
         started yet, and work on the files of earlier runs is done in jobs.
         """
         if not self._folder.is_dir():
@@ -171,7 +171,7 @@ class Runs:
                 self._remove(folder)
 
     def _remove(self, folder: Path, ended: Sequence[Job[Any]] = ()) -> None:
-        """Remove a folder, in a thread, after the end of its jobs `ended`, which may write until then."""
+        """Remove a folder in a thread, after its jobs `ended` have finished, since these may still write files."""
 
         def remove(job: Job[None]) -> None:
             job.wait_for(ended)
@@ -181,21 +181,21 @@ class Runs:
 
 
 def runs_of(project: Project) -> Runs:
-    """Return the runs of a team; the same object for all pages."""
+    """Return the runs of a team, which are the same object for all pages."""
     return project.part(Runs)
 
 
 PATIENCE_S = 4.0
-"""The time for a stopped run to report its best answer; then SIGTERM is sent, and later SIGKILL."""
+"""The time in seconds for a stopped run to report its best answer, before SIGTERM and later SIGKILL are sent."""
 _STOPPING = ((0.0, STOP), (PATIENCE_S, signal.SIGTERM), (2 * PATIENCE_S, signal.SIGKILL))
 _LIMIT = 3
-"""The exit status when a limit was reached."""
+"""The exit status of a run that reached a limit."""
 READ_ON_S = 1.0
-"""The time for reading the rest of the journal of an ended run. Later entries are skipped: `Live.is_cut`."""
+"""The time in seconds for reading the rest of an ended run's journal. Later entries are skipped: `Live.is_cut`."""
 
 
 def run_job(run: Run, prepare: Callable[[Run], PreparedTeam]) -> Job[None]:
-    """Return the job of a run. `prepare` writes the files of the run's team."""
+    """Return the job for a run. `prepare` writes the files of the run's team."""
     return Job(
         f"run {run.folder}",
         partial(_work, run, prepare),
@@ -223,9 +223,9 @@ def _work(run: Run, prepare: Callable[[Run], PreparedTeam], job: Job[None]) -> N
 
 
 def _reader(run: Run, prepare: Callable[[Run], PreparedTeam]) -> LiveReader:
-    """Write the team's files; return the reader of the journal."""
+    """Write the team's files, and return the reader for the journal."""
     ready = prepare(run)
-    # with withdrawals, the objective includes the price of a withdrawal, which is not a cost of the user
+    # with withdrawals, the objective includes the price of a withdrawal, which is not one of the user's costs
     objective = None if run.record.options.withdraw else objective_to_record(ready.team, Options())
     run.record.labels = ready.labels
     weighed = objective() if objective else None
@@ -239,12 +239,12 @@ def _command(run: Run) -> Command:
 
 def _update(run: Run, reader: LiveReader) -> None:
     reader.advance()
-    run.read_result()  # the result may be there before the process ends
+    run.read_result()  # the result may exist before the process ends
     run.notify()
 
 
 def _read_rest(run: Run, reader: LiveReader, job: Job[None]) -> None:
-    """Read the rest of the journal within a time limit."""
+    """Read the rest of the journal, within a time limit."""
     until = time.monotonic() + READ_ON_S
     while reader.advance():
         job.check()
@@ -254,11 +254,11 @@ def _read_rest(run: Run, reader: LiveReader, job: Job[None]) -> None:
 
 
 def _set_result(run: Run, finished: Finished, *, stopped: bool) -> None:
-    """Set the state of the run after the end of its process."""
+    """Set the state of the run after its process has ended."""
     run.read_result()
     if stopped and (run.result is None or run.result.verdict == "unknown"):
         _finish(run, RunState.STOPPED)
-    elif run.result is not None:  # but, for example, its journal may not have been written
+    elif run.result is not None:  # there is a result, but, for example, the journal could not be written
         _finish(run, RunState.ENDED, "" if finished.status in {0, _LIMIT} else finished.why)
     else:
         _finish(run, RunState.FAILED, finished.why)

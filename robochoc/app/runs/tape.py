@@ -1,4 +1,4 @@
-"""The conversation of an ended run, summarised in a few moments that the page plays back."""
+"""The conversation in an ended run, summarised as a small number of moments that the page plays back."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from robochoc.sniffer.live_trace import entries_of, next_entries, sorted_by_time
 from robochoc.sniffer.sentences import JournalSentences, ValueLabel
 
 MOST_MOMENTS = 200
-"""With twice as many moments, pairs of moments are joined."""
+"""If there are twice as many moments, pairs of moments are joined."""
 MOST_READ = 300_000
-"""The maximum number of messages and decisions that are played: more are slow to read and sort, and unreadable."""
+"""The maximum number of messages and decisions played. More would be slow to read and sort, and unreadable."""
 MOST_BYTES = 32 << 20
-"""The maximum number of bytes that are read of the journal."""
+"""The maximum number of bytes read from the journal."""
 WORDS_SAVED = 3
-"""The number of messages of a moment that are available in words."""
+"""The number of messages in a moment that are available in words."""
 MOST_LETTERS = 300
 MOST_LINKS = 200
 """The maximum number of pairs of robots in one moment, for readability."""
@@ -42,7 +42,7 @@ class MessageWords(NamedTuple):
 
 
 def in_words(sent: Sent, spoken: JournalSentences) -> MessageWords:
-    """Return a message in words for everyone, without the name of its sender; long texts are shortened."""
+    """Return a message as words to everyone, without its sender's name. Long texts are shortened."""
     if (key := f"message.{sent.type}") in catalogue():
         return MessageWords(sent.sender, sent.receiver, sent.type, say(key))
     words = spoken.sentence(sent).removeprefix(f"{sent.sender} says: ").removeprefix(f"{sent.sender} says ")
@@ -57,9 +57,9 @@ class Moment:
     Attributes:
         count: The number of messages.
         last_messages: The last messages, in words.
-        links: The number of messages by sender and receiver.
-        values: The values that have changed since the previous moment, by robot and `ROBOT.DECISION`.
-        begins: Whether a run or an epoch begins in this moment: earlier decisions are void.
+        links: The number of messages, by sender and receiver.
+        values: The values that changed since the previous moment, by robot and `ROBOT.DECISION`.
+        begins: Whether a run or an epoch begins at this moment, so that earlier decisions are void.
     """
 
     count: int = 0
@@ -76,22 +76,22 @@ class Moment:
         return Moment(self.count + later.count, last_messages, links, values, begins=self.begins or later.begins)
 
     def after(self, before: Mapping[str, Mapping[str, Value]]) -> dict[str, Mapping[str, Value]]:
-        """Return the values of all robots at its end, given the values `before` it."""
+        """Return the values of all robots at the end of this moment, given the values `before` it."""
         return dict(self.values) if self.begins else {**before, **self.values}
 
 
 class Tape:
-    """The moments of a conversation: at most `2 * MOST_MOMENTS`, for any number of messages.
+    """The moments in a conversation: at most `2 * MOST_MOMENTS`, for any number of messages.
 
     Args:
-        robots: The robots of the team. Events of others are ignored.
-        label: Converts the code of a variable to the user's value.
-        called: The names of values in messages.
+        robots: The robots in the team. Events of other robots are ignored.
+        label: Converts a variable's code to the user's value.
+        called: Returns the names for values in messages.
 
     Attributes:
         moments: The moments, in order.
         messages: The total number of messages.
-        is_whole: Whether these are all messages; otherwise they are the first ones.
+        is_whole: Whether all messages are included; otherwise only the first ones are.
     """
 
     def __init__(self, robots: Collection[str], label: Callable[[str, int], Value], called: ValueLabel) -> None:
@@ -147,7 +147,7 @@ class Tape:
         self.messages += 1
 
     def _close(self) -> None:
-        """Convert the last messages to words, while the context of the messages is available."""
+        """Convert the last messages to words, while their context is available."""
         if self._last:
             moment = self.moments[-1]
             last_messages = (*moment.last_messages, *(in_words(sent, self._spoken) for sent in self._last))
@@ -164,7 +164,7 @@ class Tape:
         self.moments.append(Moment())
 
     def values_at(self, number: int) -> dict[str, Value]:
-        """Return all values at the end of a moment."""
+        """Return all values at the end of the moment `number`."""
         now: dict[str, Mapping[str, Value]] = {}
         begun = max((place for place in range(number + 1) if self.moments[place].begins), default=0)
         for moment in self.moments[begun : number + 1]:
@@ -172,15 +172,15 @@ class Tape:
         return {name: value for values in now.values() for name, value in values.items()}
 
     def unsettled_at(self, number: int) -> frozenset[str]:
-        """Return the robots whose values change after a moment; `end` must have been called."""
+        """Return the robots whose values change after the moment `number`. Call `end` first."""
         return frozenset(robot for robot, last in self._settled.items() if last > number)
 
     def messages_at(self, number: int) -> int:
-        """Return the number of messages up to the end of a moment."""
+        """Return the number of messages up to the end of the moment `number`."""
         return sum(moment.count for moment in self.moments[: number + 1])
 
     def words_at(self, number: int, most: int) -> list[MessageWords]:
-        """Return the last messages in words at the end of a moment, the last one first."""
+        """Return the last messages at the end of the moment `number`, in words, the last one first."""
         last_messages: list[MessageWords] = []
         for moment in reversed(self.moments[: number + 1]):
             last_messages += reversed(moment.last_messages)
@@ -190,12 +190,12 @@ class Tape:
 
 
 def recorded(file: Path, tape: Tape, is_needed: Callable[[], bool] = lambda: True) -> Tape:
-    """Return `tape` with the conversation of a complete or interrupted journal, ordered by time.
+    """Fill `tape` with the conversation in a complete or interrupted journal, ordered by time, and return it.
 
     Args:
         file: The journal.
         tape: The tape to fill.
-        is_needed: Returns whether the result is still needed; called from time to time.
+        is_needed: Returns whether the result is still needed. Called from time to time.
 
     Raises:
         OSError: if the journal cannot be read.
@@ -226,7 +226,7 @@ def _read(file: GrowingFile, tape: Tape, is_needed: Callable[[], bool]) -> None:
 
 
 def _first(file: GrowingFile, tape: Tape) -> Iterator[Sequence[JournalEntry]]:
-    """Yield the entries of a file that are played, up to a bound."""
+    """Yield the entries in a file that are played, up to a maximum number."""
     read = 0
     for piece in entries_of(file):
         if read >= MOST_READ:

@@ -49,7 +49,7 @@ class RuleLink:
 
     @cached_property
     def meaning(self) -> tuple[object, ...]:
-        """The content of the constraint. Links with equal contents are the same constraint, even for different rules."""
+        """The content of the constraint. Links with equal contents are the same constraint, even of several rules."""
         rule = self.rule
         settings = {name: value for name, value in rule.settings.items() if name != "radius"}
         encoded = msgspec.json.encode(settings, order="sorted")

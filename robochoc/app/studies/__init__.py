@@ -1,1 +1,1 @@
-"""Studies: comparisons of protocols on a team or on a similar family of problems, in a separate process."""
+"""Studies: compare protocols on a team, or on a similar family of problems, in a separate process."""

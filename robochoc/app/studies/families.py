@@ -1,4 +1,4 @@
-"""The family of random problems that is most similar to a sketch: equal numbers of robots, values and links."""
+"""Finds the family of random problems most similar to a sketch: equal numbers of robots, values and links."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
 
 Option = int | float | str | list[int] | list[float]
 _MOST_SAMPLED = 60
-"""The maximum number of values whose pairs are all checked; of more values, this number of values is sampled evenly."""
+"""The maximum number of values whose pairs are all checked. Of more values, this many are sampled evenly."""
 _COLOURINGS = frozenset({"different", "neighbours-different"})
 _STEP = 0.1
 _LEAST, _MOST = 0.02, 0.9
@@ -22,14 +22,14 @@ _PAIR = 2
 
 
 class Family(msgspec.Struct, frozen=True):
-    """A family of `robochoc generate`.
+    """A family of problems for `robochoc generate`.
 
     Attributes:
-        name: Its name.
-        options: Its options in the form of a study; a list means each of its values.
-        key: The key of its description in the catalogue.
+        name: The family's name.
+        options: The options, as in a study's file: a list means each of its values.
+        key: The key of the family's description in the catalogue.
         named: The arguments of the description.
-        points: The number of combinations of its options.
+        points: The number of combinations of the options.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Family(msgspec.Struct, frozen=True):
 
 
 def family_of(sketch: Sketch) -> Family | None:
-    """Return the family that is most similar to a sketch; None if there is none, for example without links."""
+    """Return the family that is most similar to a sketch, or None if there is none, for instance without links."""
     if len(sketch.decisions) != 1 or len(sketch.robots) < _PAIR:
         return None
     (decision,) = sketch.decisions
@@ -89,7 +89,7 @@ def _random(sketch: Sketch, values: tuple[Value, ...], linked: dict[frozenset[st
 
 
 _Turned = tuple[SketchRule, bool]
-"""A rule of two robots, and whether their order in the rule is the reverse of that of their names."""
+"""A rule between two robots, and whether their order in the rule is the reverse of their names' order."""
 
 
 def _linked(sketch: Sketch, rules: list[SketchRule]) -> dict[frozenset[str], list[_Turned]]:
@@ -108,7 +108,7 @@ def _pairs(sketch: Sketch, rules: list[SketchRule]) -> Iterator[tuple[SketchRule
 
 
 def _forbidden(sketch: Sketch, values: list[Value], said: list[_Turned]) -> float:
-    """Return the share of pairs of values that hard rules forbid."""
+    """Return the share of pairs of values forbidden by hard rules."""
     hard = [(PALETTE[rule.kind], Applied(sketch, rule), turned) for rule, turned in said if rule.cost is None]
     kept = sum(
         all(entry.holds(given, pair[::-1] if turned else pair) for entry, given, turned in hard)

@@ -20,7 +20,7 @@ from robochoc.run.options import Options, Runtime
 MOST_RUNS = 100
 MOST_SECONDS = 600
 _COMMON = ("afc-ng", "abt", "sfb", "dpop", "afb")
-"""The candidates for the second protocol, besides the choice of `auto`."""
+"""The candidates for the second protocol, in addition to the protocol chosen by `auto`."""
 
 
 class StudyQuestion(msgspec.Struct, frozen=True):
@@ -28,10 +28,11 @@ class StudyQuestion(msgspec.Struct, frozen=True):
 
     Attributes:
         protocols: The protocols, at least two.
-        family: Whether the problems are of the most similar family, or the team's problem.
+        family: Whether the problems are from the most similar family, instead of the team's own problem.
         runs: The number of runs of each protocol, or of problems of each kind.
-        timeout: The time limit of a run in seconds.
-        ordered: Whether the team's order is used: a partially known constraint determines which of two robots asks.
+        timeout: The time limit for a run in seconds.
+        ordered: Whether the team's order is used: for a partially known constraint, the order determines which of the
+            two robots asks the other.
     """
 
     protocols: tuple[str, ...]
@@ -45,8 +46,8 @@ class PossibleQuestions(msgspec.Struct, frozen=True):
     """The possible questions for a team.
 
     Attributes:
-        protocols: The suitable protocols, complete ones first, and whether each is complete.
-        usual: Two of them, chosen at first.
+        protocols: The suitable protocols, complete ones first, each with whether it is complete.
+        usual: The two protocols that are selected at first.
         costs: Whether there are costs.
         family: The most similar family, if there is one.
         ordered: Whether the team's order is fixed.
@@ -60,10 +61,10 @@ class PossibleQuestions(msgspec.Struct, frozen=True):
 
 
 def possible(sketch: Sketch, files: TeamFiles | None = None) -> PossibleQuestions:
-    """Return the possible questions for the team of a sketch, or of files.
+    """Return the possible questions for the team given by a sketch or by files.
 
     Raises:
-        NotReadyError: for an incomplete sketch.
+        NotReadyError: if the sketch is incomplete.
         InvalidInputError: if the files are damaged.
     """
     team = team_of(sketch, files)
@@ -79,7 +80,7 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> PossibleQuestion
 
 
 def folder_of(sketch: Sketch) -> str:
-    """Return the name of the team's folder in the folder of a study."""
+    """Return the name of the team's folder inside a study's folder."""
     return sketch.name if is_name(sketch.name) and len(sketch.name) <= MAX_LABEL else "team"
 
 

@@ -1,4 +1,4 @@
-"""The execution of a study: processes of `robochoc experiment run` and `report`, in a folder of the team."""
+"""Executes a study: runs `robochoc experiment run` and `report` as processes, in a folder of the team."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ ENDED = frozenset({StudyStage.DONE, StudyStage.STOPPED, StudyStage.FAILED})
 
 
 class Line(msgspec.Struct, frozen=True):
-    """The results of a protocol: medians of its runs, and the number of runs that ended in time."""
+    """The results of one protocol: the medians over its runs, and the number of runs that ended in time."""
 
     protocol: str
     runs: int
@@ -75,7 +75,7 @@ class StudyState(msgspec.Struct):
 
 
 class TeamStudy:
-    """The study of a team: one at a time; the last one is saved."""
+    """The study of a team. There is one study at a time, and the last one is saved."""
 
     def __init__(self, project: Project) -> None:
         self._folder = project.folder / "study"
@@ -96,7 +96,7 @@ class TeamStudy:
         return file if self.facts and self.facts.stage == StudyStage.DONE and file.is_file() else None
 
     def start(self, sketch: Sketch, question: StudyQuestion, files: TeamFiles | None = None) -> None:
-        """Start a study of the team of a sketch or of files. Results of equal earlier runs are reused."""
+        """Start a study of the team given by a sketch or by files. Results of equal earlier runs are reused."""
         if self.running:
             return
         family = family_of(sketch) if question.family else None
@@ -113,12 +113,12 @@ class TeamStudy:
         self._notify()
 
     def stop(self) -> None:
-        """Request a stop. Existing results are retained."""
+        """Request a stop. The results so far are kept."""
         if self._job:
             self._job.stop()
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` after each change; return a function that removes it."""
+        """Call `callback` after each change. Returns a function that removes the callback."""
         return self._listeners.add(callback)
 
     def _work(self, sketch: Sketch, files: TeamFiles | None, facts: StudyState, job: Job[None]) -> None:
@@ -146,7 +146,7 @@ class TeamStudy:
             self._set_stage(facts, StudyStage.DONE, _error_of(reported) if reported.status else "")
 
     def _is_stopped(self, job: Job[None], facts: StudyState) -> bool:
-        """Return whether the study was stopped; if so, set its stage."""
+        """Return whether the study was stopped, and if so, set its stage."""
         stopped = job.stopped_at is not None
         if stopped:
             self._set_stage(facts, StudyStage.STOPPED)
@@ -156,7 +156,7 @@ class TeamStudy:
         self._set_stage(facts, StudyStage.FAILED if why else StudyStage.STOPPED, why)
 
     def _prepare(self, sketch: Sketch, files: TeamFiles | None, facts: StudyState) -> None:
-        self._folder.mkdir(mode=0o700, exist_ok=True)  # without parents: if they do not exist, the team was removed
+        self._folder.mkdir(mode=0o700, exist_ok=True)  # not its parents: if they do not exist, the team was removed
         if files:
             write_team(read_team(files.folder), self._folder / folder_of(sketch), replace=True)
         elif not facts.question.family:
@@ -234,5 +234,5 @@ def _opened(file: Path) -> Iterator[sqlite3.Connection]:
 
 
 def study_on(project: Project) -> TeamStudy:
-    """Return the study of a team; the same object for all pages."""
+    """Return the study of a team, which is the same object for all pages."""
     return project.part(TeamStudy)

@@ -1,6 +1,6 @@
-"""The texts of the application: a catalogue in the files of the folder `en`, which can be translated.
+"""The texts of the application: a catalogue in the folder `en`, which can be translated.
 
-`say("gallery.title")` returns a text; `{name}` in it is replaced by an argument.
+`say("gallery.title")` returns a text in which each `{name}` is replaced by an argument.
 """
 
 from __future__ import annotations
@@ -16,17 +16,17 @@ _HOLE = re.compile(r"\{([a-z_]+)\}")
 
 
 def say(key: str, **named: object) -> str:
-    """Return the text of a key, with names in braces replaced by the arguments. Braces in arguments are not replaced.
+    """Return the text for a key, with names in braces replaced by arguments. Braces in arguments are not replaced.
 
     Raises:
-        KeyError: if there is no such text.
+        KeyError: if there is no text for this key.
     """
     return _HOLE.sub(lambda hole: str(named.get(hole[1], hole[0])), catalogue()[key])
 
 
 @cache
 def catalogue(language: str = LANGUAGE) -> dict[str, str]:
-    """Return all texts of a language, by dotted keys."""
+    """Return all texts in a language, by dotted keys."""
     texts: dict[str, str] = {}
     for file in sorted((files(__package__) / language).iterdir(), key=lambda file: file.name):
         texts |= _flat("", toml_tables(file.read_text(encoding="utf-8")))
