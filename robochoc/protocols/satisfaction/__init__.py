@@ -1,1 +1,1 @@
-"""Protocols that find values that satisfy every constraint, or prove that there are none: one file each."""
+"""Protocols that find values that satisfy all constraints, or prove that there are none, one file each."""

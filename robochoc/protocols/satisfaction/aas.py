@@ -6,34 +6,35 @@ all robots remain a Cartesian product of solutions, a robot has values in reserv
 
 - **When to use**: no costs, hard problems over numbers, with constraints such as x + 2 <= y, or times that must not
   overlap. On constraints without such a structure, and on easy problems, ABT does as well or better; it nearly always
-  makes fewer constraint checks, as AAS checks whole sets (docs/explanation/replications/satisfaction.md has figures).
+  makes fewer constraint checks, because AAS checks whole sets (docs/explanation/replications/satisfaction.md has
+  figures).
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. At the end every
-  combination of the robots' aggregates is a solution; each robot takes the first value of its own. Space is polynomial:
-  one nogood for each value.
+  combination of values from the robots' aggregates is a solution; each robot takes the first value of its aggregate.
+  Space is polynomial: one nogood for each value.
 - **Parameters (`--set`)**: `largest` (the maximum number of values in an aggregate; default 4). With 1 it sends the
   same messages as ABT.
 - **Reference**: Silaghi, Sam-Haroud, Faltings: "Asynchronous search with aggregations", AAAI 2000. Only an abstract and
   a digest of the paper were available. Methods not listed here have the names of ABT's (`abt.py`).
 
-Where its rules are:
+Where the rules are implemented:
 
     aggregates consistent with all of the view      `_choose_aggregate`, `_gaps`
     the largest Cartesian product                   `_best_part`, `_wanted`
     nogoods over aggregates                         `AggregateStore`, `_backtrack`, `_resolve_conflict`
     add-link                                        `_check_add_link`, `_set_link`
 
-Differences from the paper: there robots own constraints and share variables, and a robot narrows other robots'
+Differences from the paper: there, robots own constraints and share variables, and a robot narrows other robots'
 variables by itself, with a history of the robots that did so. Here each robot owns one variable, and others ask the
 owner to narrow it:
 
 - If a constraint excludes a value with every combination of the sets in its scope, a nogood over these sets rules the
   value out. A robot all of whose values are ruled out sends the resolvent: no solution has one of the receiver's values
-  while the others keep to their sets. This is true for any proposals, so the end of the search is sound. The nogood
-  applies as long as the sets cover the proposals.
-- If no value is consistent with the whole view, but some are with a part of it, the robot takes the value with the
-  largest part, asks the robots that propose too much to propose no more than that part (`Narrow`), and assumes that
-  they do. They keep the rest for later; nothing is ruled out. Of an n-ary constraint the lowest robot with a choice is
-  asked.
+  while the others keep to their sets. This is true for any proposals, so the conclusion that there is no solution is
+  sound. The nogood applies as long as the sets cover the proposals.
+- If no value is consistent with the whole view, but some values are consistent with a part of it, the robot takes the
+  value with the largest part, asks the robots that propose too much to propose no more than that part (`Narrow`), and
+  assumes that they do. They keep the rest for later; nothing is ruled out. In an n-ary constraint the lowest robot with
+  a choice is asked.
 - A robot keeps the values of its aggregate that are still consistent with the view; it chooses a new aggregate only
   when none is left.
 
@@ -42,8 +43,8 @@ follows a value that is ruled out for good; both happen finitely often. Then the
 and so on. A robot that sends a request, or forgets an aggregate after a nogood, always receives the next aggregate: the
 receiver either does as asked and sends its aggregate, or had sent a different one before the request arrived.
 
-Choices that ABT's paper leaves open are made as in `abt.py`: n-ary constraints, packets, the choice among nogoods,
-interchangeable values. Partially known constraints are refused: a higher robot would need the sets of lower ones.
+Choices that ABT's paper leaves open are made as in `abt.py`: n-ary constraints, batches, the choice among nogoods,
+interchangeable values. Partially known constraints are refused: a higher robot would need the sets of lower robots.
 
 >>> from robochoc.generators.meetings import meetings
 >>> from robochoc.run import Options, Runtime, solve
@@ -80,7 +81,7 @@ from robochoc.solver.shared_constraint import Gap
 from robochoc.system.plain_text import listed
 
 Aggregate = tuple[Value, ...]
-"""Values of one robot, each once; in nogoods None where a variable does not matter."""
+"""Distinct values of one robot; in nogoods, None if a variable does not matter."""
 
 LeftSide = Mapping[str, Aggregate]
 
@@ -106,7 +107,7 @@ def matching(patterns: Iterable[Value], values: Iterable[Value]) -> Aggregate:
 
 
 def left_side(conflicts: Sequence[Mapping[str, Value]]) -> LeftSide:
-    """Return the aggregates of which all combinations are `conflicts`."""
+    """Return the aggregates whose combinations are exactly `conflicts`."""
     return {agent: tuple(dict.fromkeys(one[agent] for one in conflicts)) for agent in conflicts[0]}
 
 
@@ -127,7 +128,7 @@ class AggregateStore:
     def add(self, index: int, lhs: LeftSide) -> None:
         """Store `lhs` against the value at `index`, unless a better nogood is stored there.
 
-        Better: the higher lowest variable (Hirayama and Yokoo 2000), or shorter.
+        A nogood is better if its lowest variable is higher (Hirayama and Yokoo 2000), or if it is shorter.
         """
         present = self._by_value[index]
         if present is None or self._weakness(lhs) < self._weakness(present):
@@ -142,8 +143,7 @@ class AggregateStore:
     def resolve(self, view: Mapping[str, Aggregate]) -> dict[str, Aggregate]:
         """Return the conjunction of all left sides: the resolvent, if every value has a nogood.
 
-        Where an intersection of sets in different variables would be larger than both, values outside `view` are left
-        out.
+        If an intersection of sets in different variables would be larger than both, values outside `view` are left out.
         """
         found: dict[str, Aggregate] = {}
         for lhs in {id(lhs): lhs for lhs in self._by_value if lhs is not None}.values():
@@ -169,7 +169,7 @@ class AASSettings(Settings, frozen=True):
 
 
 MOST_PROVEN = 256
-"""A nogood with more combinations than these gives no proofs."""
+"""A nogood with more combinations than this gives no proofs."""
 
 
 class Ok(Message, frozen=True):
@@ -189,7 +189,7 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """No solution has a value of `values` while all in `lhs` have one of theirs: a nogood over sets (`nogood`)."""
+    """No solution has a value in `values` while all robots in `lhs` have values in their sets (`nogood`)."""
 
     lhs: dict[str, tuple[Value, ...]]
     values: tuple[Value, ...]
@@ -229,7 +229,7 @@ class Narrow(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """A request of a lower-priority robot to be sent the receiver's aggregates from now on (`add-link`)."""
+    """A lower-priority robot's request to be sent the receiver's aggregates from now on (`add-link`)."""
 
     act = acts.ADD_LINK
     proves_nothing = True
@@ -251,8 +251,8 @@ def _one_of(words: Wording, robot: str, values: Sequence[Value]) -> str:
 class AAS(Protocol):
     """One agent of AAS.
 
-    `aggregate` are the places of the values that it proposes; `sent` those that it last sent. `sets` are the aggregates
-    of higher robots (the view), `store` the nogoods. `asked` are requests not yet sent.
+    `aggregate` contains the indices of the proposed values; `sent` the indices that were last sent. `sets` are the
+    aggregates of higher robots (the view), `store` the nogoods. `asked` are requests not yet sent.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | Narrow | AddLink
@@ -305,7 +305,7 @@ class AAS(Protocol):
         self._update(sender, values)
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about values of the aggregate that agrees with the view; others are obsolete."""
+        """Accept a nogood about values in the aggregate that agrees with the view; all other nogoods are obsolete."""
         self._validate(sender, nogood)
         left = [index for index in self.aggregate if not self._is_in(nogood.values, index)]
         if len(left) == len(self.aggregate):
@@ -319,7 +319,7 @@ class AAS(Protocol):
             if not left:
                 self.sent = []
         else:
-            # The sender's view was outdated, and it has forgotten this robot's aggregate: send it again.
+            # The sender's view was outdated, and the sender has forgotten this robot's aggregate: send it again.
             self.send(sender, self._ok())
 
     def _validate(self, sender: str, nogood: Nogood) -> None:
@@ -330,7 +330,7 @@ class AAS(Protocol):
             raise ValueError(f"a nogood of {sender} names a robot that is not above {self.problem.agent}")
 
     def _narrow_down(self, values: Aggregate) -> None:
-        """Keep no more than `values`; if none of the aggregate is among them, the request is obsolete."""
+        """Keep no more than `values`; if the aggregate contains none of them, the request is obsolete."""
         remaining = [index for index in self.aggregate if self._is_in(values, index)]
         if remaining:
             self._propose(remaining)
@@ -344,7 +344,7 @@ class AAS(Protocol):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep what the view allows of the aggregate; otherwise choose another, ask, or backtrack."""
+        """Keep the part of the aggregate that the view allows; otherwise choose another, ask, or backtrack."""
         while self.verdict is None:
             remaining = [index for index in self.aggregate if self._is_consistent(index)]
             if not remaining:
@@ -364,7 +364,7 @@ class AAS(Protocol):
         self._ask()
 
     def _is_consistent(self, index: int) -> bool:
-        """Return whether the value at `index` is consistent with every combination of the view."""
+        """Return whether the value at `index` is consistent with every combination in the view."""
         return self.store[index] is None and self._gaps(index) == []
 
     def _choose_aggregate(self) -> tuple[list[int], dict[int, list[Gap]]]:
@@ -399,7 +399,7 @@ class AAS(Protocol):
         return max(partly.values(), key=_share)
 
     def _assume_less(self, gaps: Iterable[Gap]) -> None:
-        """Assume that robots of violated constraints propose only consistent values; note the requests to send."""
+        """Assume that robots in violated constraints propose only consistent values; note the requests to send."""
         for gap in gaps:
             agent, wanted = self._wanted(gap)
             less = matching(wanted, self.sets[agent])
@@ -408,10 +408,10 @@ class AAS(Protocol):
                 self.asked[agent] = less
 
     def _wanted(self, gap: Gap) -> tuple[str, Sequence[Value]]:
-        """Return the lowest robot of a violated constraint that has a choice, and the values that it should keep.
+        """Return the lowest robot in a violated constraint that has a choice, and the values that it should keep.
 
-        They are all values that are consistent with every combination of the others; if there are none, the one that is
-        consistent with most.
+        These are all values that are consistent with every combination of the others; if there are none, the value that
+        is consistent with most combinations.
         """
         combinations = [*gap.allowed, *gap.broken]
         choices = left_side(combinations)
@@ -435,7 +435,7 @@ class AAS(Protocol):
             self.send(neighbour, ok)
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
+        """Resolve the stored nogoods, one for each value, and send the result to the lowest-priority robot in it."""
         lhs = self.store.resolve(self.sets)
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -475,7 +475,7 @@ class AAS(Protocol):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Request links to robots of the nogood that send nothing yet; assume the nogood's values for now."""
+        """Request links to robots in the nogood that send nothing yet; assume the nogood's values for now."""
         for agent, values in nogood.lhs.items():
             known = self.sets.get(agent)
             more = values if known is None else met(known, values)

@@ -8,32 +8,32 @@ neighbours. A robot without a value left sends a nogood to the lowest-priority r
   nogood for each value.
 - **Parameters**: none.
 - **References**: Yokoo, Durfee, Ishida, Kuwabara: "Distributed constraint satisfaction for formalizing distributed
-  problem solving", ICDCS 1992. This is the ABT kernel with links added during search of Bessiere, Maestre, Brito,
+  problem solving", ICDCS 1992. This is the ABT kernel that adds links during search, from Bessiere, Maestre, Brito,
   Meseguer: "Asynchronous backtracking without adding links: a new member in the ABT family", AIJ 161 (2005), Figure 1.
 
-The methods have the names of its procedures:
+The methods have the names of the paper's procedures:
 
     CheckAgentView   `_check_agent_view`     ProcessInfo      `_process_info`
     ChooseValue      `_choose_value`         ResolveConflict  `_resolve_conflict`
     Backtrack        `_backtrack`            SetLink          `_set_link`
     CheckAddLink     `_check_add_link`       Update           `_update`
 
-`_choose_value` and `_update` are in `backtracking.py`, as they are shared with ABT's variants.
+`_choose_value` and `_update` are in `backtracking.py`, because ABT's variants also use them.
 
 Choices that the paper leaves open:
 
-- Constraints may be n-ary. The lowest-priority robot of the scope checks them, once it knows the values of all others.
+- Constraints may be n-ary. The lowest-priority robot in the scope checks them, once it knows the values of all others.
 - Of several nogoods for a value, the one with the highest possible lowest variable is kept (Hirayama and Yokoo 2000).
-- Messages are read in packets; the view is checked when the inbox has been drained.
-- A nogood contains only the variables that matter. So it rules out all values of a robot that are interchangeable in
-  these variables (neighbourhood partial interchangeability).
+- Messages are read in batches; the view is checked when the inbox has been drained.
+- A nogood contains only the relevant variables. So it rules out all values of a robot that are interchangeable in these
+  variables (neighbourhood partial interchangeability).
 - The runtime detects quiescence, and so a solution (`communication/quiescence.py`).
 
-Partially known constraints (PKC): each robot holds a part of the constraint that it never shows. This is ABT in a
-single phase of Brito, Meisels, Meseguer, Zivan: "Distributed constraint satisfaction with partially known constraints",
-Constraints 14 (2009). The lower-priority robot also sends its value up; the higher one sends a nogood against pairs
-that its own part forbids (`_refuse_below`). It then forgets that value, as a new `ok?` is sure to follow. Without a PKC
-nothing changes.
+Partially known constraints (PKC): each robot has a part of the constraint that it never reveals. This is the
+single-phase ABT of Brito, Meisels, Meseguer, Zivan: "Distributed constraint satisfaction with partially known
+constraints", Constraints 14 (2009). The lower-priority robot also sends its value up; the higher one sends a nogood
+against pairs that its own part forbids (`_refuse_below`). It then forgets that value, because a new `ok?` is sure to
+follow. Without a PKC nothing changes.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -62,8 +62,8 @@ from robochoc.system.compiling import mypyc_attr
 class ABT(Backtracking):
     """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+.
 
-    For lower-priority robots that share a PKC, `below` holds the values they sent. `allowed` holds, for each of them,
-    this robot's value with which its part of the PKC was last found to allow that value.
+    `below` contains the values sent by lower-priority robots that share a PKC with this robot. `allowed` contains, for
+    each of these robots, the value of this robot with which its part of the PKC was last found to allow that value.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | AddLink
@@ -114,7 +114,7 @@ class ABT(Backtracking):
             self._update(sender, value)
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the current value that agrees with the view; others are obsolete."""
+        """Accept a nogood about the current value that agrees with the view; all other nogoods are obsolete."""
         current = self._current()
         if current is None or contradicts(nogood.value, current):
             return
@@ -123,7 +123,7 @@ class ABT(Backtracking):
             self._learn(nogood)
             self.value = None
         else:
-            # The sender's view was outdated, and it has forgotten this robot's value: send it again.
+            # The sender's view was outdated, and the sender has forgotten this robot's value: send it again.
             self.send(sender, Ok(current))
 
     def _set_link(self, sender: str) -> None:
@@ -136,7 +136,7 @@ class ABT(Backtracking):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it; otherwise choose another, or backtrack until there is one."""
+        """Keep the value if the view allows it; otherwise choose another value, or backtrack until there is one."""
         while self.verdict is None:
             if self.value is not None and self._consistent(self.value, self.view):
                 return
@@ -154,7 +154,7 @@ class ABT(Backtracking):
             self.send(neighbour, ok)
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
+        """Resolve the stored nogoods, one for each value, and send the result to the lowest-priority robot in it."""
         lhs = self.store.resolve()
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -202,6 +202,6 @@ class ABT(Backtracking):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Request links to robots of the nogood that send no values yet; assume the nogood's values for now."""
+        """Request links to robots in the nogood that send no values yet; assume the nogood's values for now."""
         for agent in self._assume(nogood.lhs):
             self.send(agent, AddLink())

@@ -12,38 +12,38 @@ The methods have the names of ABT's procedures, and these:
 
     Current_order   `order`      choose_new_order   `_choose_new_order`      received (order, ...)   `_adopt`
 
-The order: a robot that accepts a nogood makes a new order, in which the nogood's sender moves up to right below the
-receiver (the nogood-triggered heuristic). It moves on past the receiver and other robots while these have more values
-left than the sender (min-domain), but never past a robot of the nogood. So it stops at the latest right behind the
-second-last robot of the nogood, or at the top if there is none.
+The order: a robot that accepts a nogood makes a new order, in which the nogood's sender moves up to just below the
+receiver (the nogood-triggered heuristic). The sender moves further, past the receiver and other robots, while these
+have more values left than the sender (min-domain), but never past another robot in the nogood. So it stops at the
+latest right behind the second-last robot in the nogood, or at the top if there is none.
 
-Orders have counters, which are compared lexicographically; the larger order is newer. The counter of place i is the
+Orders have counters, which are compared lexicographically; the larger order is newer. The counter of position i is the
 number of times that robots from i on were reordered while those before i stayed. A new order increments one counter and
-resets those after it. It is sent to all robots from that place on; for robots before it nothing has changed. A robot
+resets those after it. It is sent to all robots from that position on; for robots before it nothing has changed. A robot
 that adopts an order drops the nogoods with robots that are now lower, and sends its value to neighbours that are newly
 lower.
 
-Termination: suppose the robots before place i have settled, with their values and counters, and all robots know it
+Termination: suppose the robots before position i have settled, with their values and counters, and all robots know this
 (true for i = 0). Counter i then rises only when a lower robot accepts a nogood with these robots alone. That nogood
-stays stored, as its left side holds and stays higher, and only a nogood with robots as high may replace it. So its
-value is not taken again, and counter i rises finitely often. Then the robot at place i is fixed, and its value changes
-finitely often for the same reason; and so on downwards.
+stays stored, because its left side holds and stays higher, and only a nogood with robots as high may replace it. So its
+value is not taken again, and counter i rises finitely often. Then the robot at position i is fixed, and its value
+changes finitely often for the same reason; and so on downwards.
 
-Correctness: at quiescence each robot knows the robots above it in the newest order, and those of their values that it
-needs, as a robot that forgot or never received a value is sent it again. So no constraint is violated.
+Correctness: at quiescence each robot knows the robots above it in the newest order, and all their values that it needs,
+because a robot that forgot or never received a value is sent it again. So no constraint is violated.
 
 Choices that the papers leave open, and differences:
 
-- The receiver makes the order for the place that the sender moves to, and stores the nogood. So the moved robot need
+- The receiver makes the order for the position that the sender moves to, and stores the nogood. So the moved robot need
   not store it.
-- Two robots may increment one counter at a time, so each counter also names the robot that did it last. Every order is
-  unique.
-- Remaining values are those without a stored nogood. A robot whose number of remaining values is unknown is not
-  passed.
-- A nogood that does not fit the receiver's order is answered with `ok?`, not passed on: one of the two robots will
+- Two robots may increment the same counter at the same time, so each counter also names the robot that did it last.
+  Every order is unique.
+- Remaining values are those without a stored nogood. A robot is never moved past a robot whose number of remaining
+  values is unknown.
+- A nogood that does not match the receiver's order is answered with `ok?`, not passed on: one of the two robots will
   receive a newer order.
-- As in ABT, constraints may be n-ary (the robot of the scope that is lowest at present checks them, so all must know
-  them), messages are read in packets, nogoods contain only the variables that matter, and the runtime detects the
+- As in ABT, constraints may be n-ary (the robot in the scope that is lowest at present checks them, so all must know
+  them), messages are read in batches, nogoods contain only the relevant variables, and the runtime detects the
   solution.
 
 >>> from robochoc.generators.queens3d import queens3d
@@ -83,7 +83,7 @@ class CurrentOrder(PriorityOrder):
         self.counters = order.counters
 
     def moved(self, agent: str, place: int, by: str) -> Order:
-        """Return a newer order, made by robot `by`: `agent` moves up to `place`; robots before it stay."""
+        """Return a newer order, made by robot `by`: `agent` moves up to `place`; robots before this position stay."""
         names = [name for name in self.names if name != agent]
         names.insert(place, agent)
         kept = self.counters[:place] + ((0, ""),) * (place - len(self.counters))
@@ -95,10 +95,10 @@ class CurrentOrder(PriorityOrder):
 class ABTDORetro(Backtracking):
     """One agent of ABT_DO-Retro. State: `view` (Agent_view), `store`, `order`, and `left`.
 
-    - `left`: the numbers of remaining values that other robots sent.
-    - `higher`: robots that send this one their values while they have higher priority.
+    - `left`: the numbers of remaining values that other robots have sent.
+    - `higher`: robots that send their values to this one while they have higher priority.
     - `listeners`: robots to which this one sends its value while they have lower priority.
-    - `owed`: robots that must be sent the value after the packet, even if it has not changed.
+    - `owed`: robots that must be sent the value after the current batch of messages, even if it has not changed.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | Order | AddLink
@@ -148,12 +148,12 @@ class ABTDORetro(Backtracking):
     # Messages
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the current value that agrees with view and order; others are obsolete."""
+        """Accept a nogood about the current value that agrees with view and order; all other nogoods are obsolete."""
         current = self._current()
         if current is not None and contradicts(nogood.value, current):
             return
         if current is None or not self._coherent(nogood):
-            self.owed.add(sender)  # it has forgotten the value
+            self.owed.add(sender)  # the sender has forgotten this robot's value
             return
         self._check_add_link(nogood)
         for index in self.problem.interchangeable(nogood.value):
@@ -193,7 +193,7 @@ class ABTDORetro(Backtracking):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it; otherwise choose another, or backtrack until there is one."""
+        """Keep the value if the view allows it; otherwise choose another value, or backtrack until there is one."""
         while self.verdict is None:
             higher = {agent: value for agent, value in self.view.items() if self._is_higher(agent)}
             if self.value is not None and (higher == self._checked or self._consistent(self.value, higher)):
@@ -208,7 +208,7 @@ class ABTDORetro(Backtracking):
             return
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
+        """Resolve the stored nogoods, one for each value, and send the result to the lowest-priority robot in it."""
         lhs = self.store.resolve()
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -232,7 +232,7 @@ class ABTDORetro(Backtracking):
     # The view
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Return whether all robots of the left side are higher and the view does not contradict it."""
+        """Return whether all robots in the left side are higher and the view does not contradict it."""
         return all(
             self._is_higher(agent)
             and (agent not in self.higher or (agent in self.view and not contradicts(value, self.view[agent])))
@@ -240,7 +240,7 @@ class ABTDORetro(Backtracking):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Request links to robots of the nogood that send no values yet; assume its values for now."""
+        """Request links to robots in the nogood that send no values yet; assume the nogood's values for now."""
         for agent in self._assume(nogood.lhs):
             self.send(agent, AddLink())
 
@@ -248,7 +248,7 @@ class ABTDORetro(Backtracking):
         return self.order.rank[agent] < self.order.rank[self.problem.agent]
 
     def _lower(self) -> list[str]:
-        """Return the robots that are sent the value under the current order."""
+        """Return the robots that must receive the value under the current order."""
         return [name for name in self.listeners if not self._is_higher(name)]
 
     def _left(self) -> int:

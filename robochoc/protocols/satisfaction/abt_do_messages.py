@@ -1,4 +1,4 @@
-"""Messages of ABT with dynamic ordering: apart from `abt_do.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of ABT with dynamic ordering, separate from `abt_do.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robochoc.protocols.wording import Wording
 from robochoc.system.plain_text import listed
 
 Counters = tuple[tuple[int, str], ...]
-"""For each place: how often the robots from there on were reordered, and by whom last; trailing zeros are omitted."""
+"""For each position: how often the robots from there on were reordered, and who did it last; no trailing zeros."""
 
 
 class Ok(Message, frozen=True):
@@ -42,7 +42,7 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
-    # The nogood may follow from any robot's constraints.
+    # The nogood may follow from the constraints of any robot.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:

@@ -1,7 +1,7 @@
 """Hybrid Asynchronous Backtracking (ABT-Hyb).
 
-ABT that waits after a nogood. A robot of ABT without a value left sends a nogood, assumes that its receiver changes
-the value, and takes a new value at once, which often conflicts with messages in transit. A robot of ABT-Hyb sends
+ABT that waits after a nogood. In ABT, a robot without a value left sends a nogood, assumes that the receiver changes
+its value, and takes a new value at once, which often conflicts with messages in transit. In ABT-Hyb, the robot sends
 nothing until it knows that the conflict is over. So fewer values and nogoods are obsolete on arrival.
 
 - **When to use**: no costs, and the number of messages matters most.
@@ -10,7 +10,7 @@ nothing until it knows that the conflict is over. So fewer values and nogoods ar
 - **Reference**: Brito, Meseguer: "Synchronous, asynchronous and hybrid algorithms for DisCSP", CP 2004. Only a digest
   of the paper was available. All other methods are inherited from ABT (`abt.py`).
 
-The rules of waiting, and where they are:
+The rules of waiting, and where they are implemented:
 
     a robot waits once it has sent a nogood         `_after_backtrack`
     it waits until a value is consistent again      `_check_agent_view`
@@ -18,19 +18,19 @@ The rules of waiting, and where they are:
     while it waits it refuses nogoods               `_resolve_conflict` (ABT's: it has no value to be ruled out)
 
 While it waits, a robot keeps its view as it is: it does not forget the value of the nogood's receiver. So the stored
-nogoods, one for each value, stay as well, and the wait ends only with a change that matters.
+nogoods, one for each value, stay as well, and the wait ends only with a relevant change.
 
 No robot waits for ever. If a nogood is about another value than the receiver's current one, the receiver has sent its
 current value later, so that value is in transit. If the nogood is about the current value but otherwise outdated, the
-receiver sends its value again. This ends the wait although the value is the same: the sender's view is newer by then,
-or it sends the nogood again. If the receiver accepts the nogood, it sends its next value. It may have to wait first,
-but only for a robot of higher priority, and the highest waiting robot is answered by a robot that does not wait. A
-robot without a value drops nogoods, and sends its next value to all robots with a link to it, the nogood's sender among
-them.
+receiver sends its value again. This ends the wait although the value is the same: either the sender's view is newer by
+then, or the sender repeats the nogood. If the receiver accepts the nogood, it sends its next value. It may have to wait
+first, but only for a robot of higher priority, and the highest waiting robot is answered by a robot that does not wait.
+A robot without a value drops nogoods, and sends its next value to all robots with a link to it, including the sender of
+the nogood.
 
-Choices that the paper leaves open are made as in ABT: n-ary constraints, packets, the choice among nogoods,
-interchangeable values, partially known constraints. A waiting robot tests no pairs of partially known constraints, as
-it has no value; it tests all of them once it has one.
+Choices that the paper leaves open are made as in ABT: n-ary constraints, batches, the choice among nogoods,
+interchangeable values, partially known constraints. A waiting robot tests no pairs of partially known constraints,
+because it has no value; it tests all of them once it has a value.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -72,7 +72,7 @@ class ABTHyb(ABT):
             self.awaited = None
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it; otherwise choose another, backtrack, or continue to wait."""
+        """Keep the value if the view allows it; otherwise choose another value, backtrack, or continue to wait."""
         if self.value is not None and self._consistent(self.value, self.view):
             return
         self.value = self._choose_value(self.view)
@@ -83,5 +83,5 @@ class ABTHyb(ABT):
             self._backtrack()
 
     def _after_backtrack(self, culprit: str) -> None:
-        """Wait after a nogood to `culprit`, and keep the view and the stored nogoods."""
+        """Wait after sending a nogood to `culprit`; keep the view and the stored nogoods."""
         self.awaited = culprit

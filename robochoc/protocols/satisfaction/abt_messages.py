@@ -1,4 +1,4 @@
-"""Messages of Asynchronous Backtracking: apart from `abt.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of Asynchronous Backtracking, separate from `abt.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Ok(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """A request of a lower-priority robot to be sent the receiver's value from now on (`adl`)."""
+    """A lower-priority robot's request to be sent the receiver's value from now on (`adl`)."""
 
     act = acts.ADD_LINK
     proves_nothing = True

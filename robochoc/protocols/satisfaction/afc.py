@@ -5,33 +5,33 @@ order. A robot that adds a value sends copies to all lower robots, which filter 
 whose domain becomes empty sends `Not_OK` to the others; the holder of the CPA then sends it back to the last robot of
 the inconsistent part.
 
-- **When to use**: to compare with AFC-ng, which needs fewer messages.
+- **When to use**: for comparison with AFC-ng, which needs fewer messages.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Only forward checking is
   asynchronous.
 - **Parameters**: none.
 - **Reference**: Meisels, Zivan: "Asynchronous forward-checking for DisCSPs", Constraints 12(1), 2007, with a static
   order.
 
-The methods have the names of its procedures:
+The methods have the names of the paper's procedures:
 
     receive_CPA    `_receive_cpa`      forward_check      `_forward_check`
     assign_CPA     `_assign_cpa`       process_Not_OK     `_process_not_ok`
     backtrack      `_backtrack`        update_AgentView   `_update_agent_view`
 
-Correctness under delays: there is one CPA, and its step counter (SC) grows with every value that is added; it travels
-back with the CPA. So no robot knows a later step than the CPA that reaches it, each step has a new CPA, and a CPA that
-contradicts a later one never returns. The statement of a `NotOk` stays true, however late it arrives.
+Correctness under delays: there is one CPA, and its step counter (SC) grows with every added value; it travels back with
+the CPA. So no robot knows a later step than the CPA that reaches it, each step has a new CPA, and a CPA that
+contradicts a later one never returns. The content of a `NotOk` stays true, however late it arrives.
 
 Choices that the paper leaves open:
 
-- Constraints may be n-ary. The lowest-priority robot of the scope checks them, once the CPA contains all others.
-- Messages are read in packets. The view is updated with each message; the domain is filtered, or the CPA handled, when
+- Constraints may be n-ary. The lowest-priority robot in the scope checks them, once the CPA contains all others.
+- Messages are read in batches. The view is updated with each message; the domain is filtered, or the CPA handled, when
   the inbox has been drained.
-- `NotOk` goes to all robots without a value in its inconsistent assignment.
+- `NotOk` goes to all robots that have no value in the inconsistent assignment.
 - If one known inconsistent assignment is a prefix of another, the shorter one is kept.
 - Filtering is incremental: a prefix that a new CPA shares with the last one is not checked again.
 - A robot with an empty domain reports it at once.
-- The last robot concludes with a solution, as all others still hold the values in the CPA.
+- The last robot concludes with a solution, because all others still have the values in the CPA.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -128,7 +128,7 @@ class AFC(Protocol):
             self._assign_cpa(self.value + 1)
 
     def _assign_cpa(self, first: int) -> None:
-        """Add the first remaining value from place `first` on, and send the CPA to all lower robots."""
+        """Add the first remaining value from index `first` on, and send the CPA to all lower robots."""
         self.value = self.domain.first(first)
         if self.value is None:
             self._backtrack(self.view)
@@ -158,7 +158,7 @@ class AFC(Protocol):
         if sc <= self.sc:
             return
         self.sc = sc
-        self.value = None  # a robot above has taken another value since
+        self.value = None  # a robot above has taken another value in the meantime
         if self.consistent or not is_prefix(self.view, assignments):
             self.view, self.consistent = assignments, True
 
@@ -174,7 +174,7 @@ class AFC(Protocol):
                 self.send(robot, NotOk(inconsistent, self.sc))
 
     def _process_not_ok(self, inconsistent: Assignments, sc: int) -> None:
-        """Accept a `NotOk` about the view or about a CPA of the same or a later step; others are obsolete."""
+        """Accept a `NotOk` about the view or about a CPA of the same or a later step; all others are obsolete."""
         if self.consistent or not is_prefix(self.view, inconsistent):
             if sc < self.sc and not is_prefix(inconsistent, self.view):
                 return
@@ -182,16 +182,16 @@ class AFC(Protocol):
         self.sc = max(self.sc, sc)
 
     def tried(self, index: int) -> bool:
-        """Return whether the value at `index` has been tried: values are taken in their order."""
+        """Return whether the value at `index` has been tried: values are tried in order."""
         return self.value is not None and index < self.value
 
 
 class FilteredDomain:
     """This robot's domain, filtered by a partial assignment, without repeated checks.
 
-    For each value that is ruled out, it stores the length of the shortest prefix that rules the value out. For a new
-    partial assignment with a common prefix, values that this prefix rules out are not checked again. For the others,
-    only constraints with robots after the prefix are checked.
+    For each value that is ruled out, the length of the shortest prefix that rules it out is stored. When a new partial
+    assignment has a common prefix with the last one, values that this prefix rules out are not checked again. For the
+    others, only constraints with robots after the prefix are checked.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -213,7 +213,7 @@ class FilteredDomain:
                 self._ruled_out[index] = None if conflict is None else self._order.depth(conflict) + 1
 
     def first(self, place: int) -> int | None:
-        """Return the first remaining value from `place` on; None if there is none."""
+        """Return the first remaining value from index `place` on; None if there is none."""
         return next((index for index in range(place, len(self._ruled_out)) if self._ruled_out[index] is None), None)
 
     def inconsistent(self) -> Assignments | None:

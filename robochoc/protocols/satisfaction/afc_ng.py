@@ -1,8 +1,8 @@
 """Nogood-based Asynchronous Forward Checking (AFC-ng).
 
-Complete search for satisfaction. A current partial assignment (CPA) grows along the priority order, and its copies let
-lower robots check forward. A robot without a value left sends a nogood to the lowest-priority robot among the causes,
-wherever the CPA is. So several robots may backtrack at once; of the CPAs that follow, the strongest wins.
+Complete search for satisfaction. A current partial assignment (CPA) grows along the priority order, and lower robots
+check forward with its copies. A robot without a value left sends a nogood to the lowest-priority robot among the
+causes, wherever the CPA is. So several robots may backtrack at once; the strongest of the resulting CPAs wins.
 
 - **When to use**: no costs, a hard problem: few messages and checks.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial: one
@@ -12,7 +12,7 @@ wherever the CPA is. So several robots may backtrack at once; of the CPAs that f
   DisCSPs", CP 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms",
   Constraints 18(3), 2013, Section 3.
 
-The methods have the names of its procedures:
+The methods have the names of the paper's procedures:
 
     Assign          `_assign`              Revise       `_revise`
     SendCPA         `_send_cpa`            Backtrack    `_backtrack`
@@ -22,20 +22,21 @@ The methods have the names of its procedures:
 
 Choices that the paper leaves open, and differences:
 
-- In the paper a CPA goes to all lower robots. Here it goes to the next one and to those that share a constraint with
-  its sender, which saves more than half of all messages where constraints are few. This is sufficient: no other robot
-  can check anything with it; its values of higher robots are also in later CPAs, which are compared by all counters;
-  and the next robot, the only one that may continue, receives every CPA.
-- Messages are read in packets; the view is revised when the inbox has been drained, so weak CPAs in a packet cost no
+- In the paper a CPA goes to all lower robots. Here it goes to the next robot and to those that share a constraint with
+  its sender, which saves more than half of all messages if there are few constraints. This is sufficient: no other
+  robot can check anything with it; its values of higher robots are also in later CPAs, which are compared by all
+  counters; and the next robot, the only one that may continue, receives every CPA.
+- Messages are read in batches; the view is revised when the inbox has been drained, so weak CPAs in a batch cost no
   checks.
-- A CPA with exactly the counters of the view is not stronger: a late copy would erase later assignments.
-- A value with a nogood is not checked again, nor is a constraint whose robots are all above the first changed value.
+- A CPA with exactly the counters in the view is not stronger: otherwise a late copy would erase later assignments.
+- A value with a nogood is not checked again; a constraint whose robots are all above the first changed value is not
+  checked again either.
 - Constraints may be n-ary, and a nogood contains only the variables that matter (see `abt`).
 - A robot with an empty domain reports it at the start.
 
-Correctness: the last robot's CPA is a solution, and all robots hold its values at that moment. The first robot changes
-its value only for a nogood without a left side, which no value of a solution can get; the second one only for that or a
-new CPA of the first, and so on. `Solved` ends the search.
+Correctness: the last robot's CPA is a solution, and all robots have its values at that moment. The first robot changes
+its value only for a nogood without a left side, which no value in a solution can get; the second robot only for such a
+nogood or a new CPA from the first, and so on. `Solved` ends the search.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -64,9 +65,9 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 _NEVER: Final = sys.maxsize
-"""Below all places in the order."""
+"""Less than all ranks in the order."""
 _FEW: Final = 32
-"""The number of assignments that are compared one by one; longer ranges are halved."""
+"""The maximum number of assignments that are compared one by one; longer ranges are halved."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -75,13 +76,14 @@ class AFCng(Protocol):
 
     - `view`: the values of the robots whose values a CPA contains, or of the highest of them.
     - `successors`: the robots that may assign a value after this one.
-    - `cpa_receivers`: all robots that are sent its CPAs.
-    - `checked`: for each value of this robot, the place in the order up to which all constraints were known to hold in
-      the view when the values were last checked.
+    - `cpa_receivers`: all robots that receive its CPAs.
+    - `checked`: for each value of this robot, the rank up to which all constraints were known to hold in the view when
+      the values were last checked.
     - `_known`: the content of `view`, as received.
-    - `_changed`: the place of the highest robot that has changed in the view since then.
+    - `_changed`: the rank of the highest robot that has changed in the view since then.
     - `_forgotten`: the counters of robots that are no longer in the view.
-    - `_seen`: the part of the view in the scopes of constraints; `_near`: its robots, with their places in a CPA.
+    - `_seen`: the part of the view in the scopes of constraints; `_near`: the robots in it, with their positions in a
+      CPA.
     """
 
     messages: ClassVar[Any] = CPA | Nogood | Solved
@@ -116,7 +118,7 @@ class AFCng(Protocol):
     def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - a CPA says itself who has sent it
         if self.solved or self.verdict is not None:
             return
-        if isinstance(message, CPA):  # before `match`, which is slower: most messages are CPAs
+        if isinstance(message, CPA):  # checked before `match`, which is slower: most messages are CPAs
             self._process_cpa(message.assignments)
             return
         match cast("Nogood | Solved", message):
@@ -135,7 +137,7 @@ class AFCng(Protocol):
 
     @property
     def over(self) -> bool:
-        """Whether this robot knows the result of the search and sends no more messages."""
+        """Whether this robot knows the result of the search, and so sends no more messages."""
         return self.solved or self.verdict is not None
 
     @property
@@ -164,7 +166,7 @@ class AFCng(Protocol):
         self.value = None
 
     def _process_nogood(self, nogood: Nogood) -> None:
-        """Accept a nogood that agrees with the view; otherwise it is obsolete."""
+        """Accept a nogood that agrees with the view; all other nogoods are obsolete."""
         if not self._compatible(nogood.lhs):
             return
         for index in self.problem.interchangeable(nogood.value):
@@ -179,7 +181,7 @@ class AFCng(Protocol):
     # The search
 
     def _check_assign(self) -> None:
-        """Backtrack if no value is left; assign a value if this robot holds the CPA without one."""
+        """Backtrack if no value is left; assign a value if this robot holds the CPA and has no value."""
         if not self.store.open:
             self._backtrack()
         elif self.value is None and len(self._known) == self._above:
@@ -213,7 +215,7 @@ class AFCng(Protocol):
                 self.send(robot, solved)
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, send the result to its lowest-priority robot, and wait for that robot."""
+        """Resolve the stored nogoods, send the result to the lowest-priority robot in it, and wait for that robot."""
         lhs = self.store.resolve()
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -227,7 +229,7 @@ class AFCng(Protocol):
         self.value = None
 
     def _revise(self) -> None:
-        """Store a nogood for each value that the view forbids, with the highest possible lowest robot.
+        """Store a nogood for each value that the view forbids; its lowest robot is as high as possible.
 
         Values that were checked against the same part of the view are processed together.
         """
@@ -251,7 +253,7 @@ class AFCng(Protocol):
     # The view
 
     def _update_agent_view(self, assignments: tuple[Assignment, ...], first: int) -> None:
-        """Replace the view by `assignments`, which differ from `first` on; drop nogoods with other values."""
+        """Replace the view by `assignments`, which differ from index `first` on; drop nogoods with other values."""
         known = self._known
         self._known = self.view.assignments = assignments
         known_size, size = len(known), len(assignments)
@@ -274,17 +276,17 @@ class AFCng(Protocol):
         return True
 
     def _depth(self) -> int:
-        """Return the place in the order of the first robot outside the view; this robot's if the view is complete."""
+        """Return the rank of the first robot outside the view; this robot's rank if the view is complete."""
         known = len(self._known)
         return self.order.rank[self._line[known]] if known < self._above else self._rank
 
     def _place_above(self, name: str) -> int | None:
-        """Return the place of `name` in a CPA; None if the robot is below this one."""
+        """Return the position of `name` in a CPA; None if the robot is below this one."""
         place = self._places.get(name)
         return None if place is None or place >= self._above else place
 
     def _cpa_order(self) -> tuple[Sequence[str], Mapping[str, int], int]:
-        """Return a sequence of robots, their places, and the number of its first robots with values in a CPA."""
+        """Return a sequence of robots, their positions, and how many of its first robots have values in a CPA."""
         return self.order.names, self.order.rank, self._rank
 
     def _successors(self) -> Sequence[str]:
@@ -292,7 +294,7 @@ class AFCng(Protocol):
 
 
 def first_difference(left: tuple[object, ...], right: tuple[object, ...]) -> int:
-    """Return the first place at which two partial assignments differ; the length of the shorter one if at none."""
+    """Return the first index at which two partial assignments differ; the shorter length if there is none."""
     first, last = 0, min(len(left), len(right))
     while last - first > _FEW:  # slices are compared faster than their items
         middle = (first + last) // 2
@@ -313,8 +315,8 @@ def _counters(assignments: tuple[Assignment, ...]) -> list[int]:
 
 
 def _grouped(indices: list[int], places: Sequence[int]) -> list[tuple[int, list[int]]]:
-    """Return `indices` by their `places`, the first place first."""
+    """Return `indices`, grouped by their `places`, in ascending order of these."""
     found = {places[index] for index in indices}
-    if len(found) == 1:  # the usual case
+    if len(found) == 1:  # the most common case
         return [(found.pop(), indices)]
     return [(place, [index for index in indices if places[index] == place]) for place in sorted(found)]

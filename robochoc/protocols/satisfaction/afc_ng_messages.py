@@ -1,4 +1,4 @@
-"""Messages of AFC-ng: apart from `afc_ng.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of AFC-ng, separate from `afc_ng.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class CPA(Message, frozen=True):
 
 
 class Solved(Message, frozen=True):
-    """The end of the search: a solution was found (`stp`). Its receivers only read it."""
+    """The end of the search: a solution was found (`stp`). Receivers do not modify the message."""
 
     solution: dict[str, Value]
 

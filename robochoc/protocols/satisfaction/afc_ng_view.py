@@ -1,4 +1,4 @@
-"""The agent view of AFC-ng, a mapping of the current partial assignment: apart, as mypyc cannot compile its base."""
+"""The agent view of AFC-ng, a mapping of the current partial assignment; separate, as mypyc cannot compile its base."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from robochoc.protocols.satisfaction.afc_ng_messages import Assignment
 
 
 class AgentView(Mapping[str, Value]):
-    """The values in `assignments`, by robot: they belong to the first robots of `line`, whose places are `places`.
+    """The values in `assignments`, by robot: they belong to the first robots in `line`, whose indices are `places`.
 
-    All robots of a process share `line`; `assignments` is the tuple of the received message itself.
+    All robots in a process share `line`; `assignments` is the tuple in the received message itself.
     """
 
     def __init__(self, line: Sequence[str], places: Mapping[str, int]) -> None:

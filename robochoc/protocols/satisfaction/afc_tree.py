@@ -1,10 +1,10 @@
 """Asynchronous Forward Checking Tree (AFC-tree): AFC-ng on a pseudo-tree.
 
-Complete search for satisfaction. A CPA holds the values along one branch, from the root to its sender. It goes to the
-sender's tree children and to lower robots that share a constraint with it. All tree children may then continue at the
-same time, each in its own subtree. Nogoods contain ancestors only, as all robots of a constraint are on one branch.
-`Accept` goes up when a whole subtree has accepted a CPA. A root with the accepts of all children knows a solution of
-its component, and sends it to all robots there.
+Complete search for satisfaction. A CPA contains the values along one branch, from the root to its sender. It goes to
+the sender's tree children and to lower robots that share a constraint with the sender. All tree children may then
+continue at the same time, each in its own subtree. Nogoods contain ancestors only, because all robots in a constraint
+are on one branch. `Accept` goes up when a whole subtree has accepted a CPA. Once all children of a root have sent
+accepts, the root knows a solution of its component, and sends it to all robots there.
 
 - **When to use**: as AFC-ng, on sparse graphs: branches are searched at the same time.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
@@ -12,23 +12,23 @@ its component, and sends it to all robots there.
 - **Reference**: Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms",
   Constraints 18(3), 2013, Section 4.
 
-The methods beyond AFC-ng (`afc_ng`) have the names of its procedures:
+The methods beyond AFC-ng (`afc_ng`) have the names of the paper's procedures:
 
     ProcessAccept `_process_accept`     SolutionDetection `_detect_solution`     BuildPA `_build_pa`
 
 Choices that the paper leaves open, besides those in `afc_ng`:
 
-- The pseudo-tree is the one induced by the priority order.
-- Each connected component has its own root and is searched separately. A component without a solution ends the search;
-  all are solved at quiescence.
+- The pseudo-tree is induced by the priority order.
+- Each connected component has its own root and is searched separately. A component without a solution ends the whole
+  search; at quiescence all components are solved.
 - An accept identifies the CPA by its counters.
 
 Correctness does not depend on accepts. At quiescence each root has a value. Suppose all ancestors of a robot have
-values, each chosen for the current ones above it. The CPA of its parent then holds the highest counters, so the robot
-has accepted it. Without a value left, it would have sent a nogood to an ancestor. No value above has changed since, so
-that ancestor had the nogood's value and a compatible view, and has taken another value: a contradiction. So the robot
-has a value, chosen for the current ones above it. Accepts exist because they inform a root that its component is
-solved; they cost at least one message for each robot.
+values, each chosen for the current values above it. The CPA of its parent then has the highest counters, so the robot
+has accepted it. If the robot had no value left, it would have sent a nogood to an ancestor. No value above has changed
+since, so that ancestor had the nogood's value and a compatible view, and has taken another value: a contradiction. So
+the robot has a value, chosen for the current values above it. Accepts exist because they inform a root that its
+component is solved; they cost at least one message for each robot.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -56,7 +56,7 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class AFCTree(AFCng):
-    """One agent of AFC-tree. State besides AFC-ng's: `accepts`, the values of each child's subtree that accepted."""
+    """One agent of AFC-tree. State besides that of AFC-ng: `accepts`, the values of each accepting child's subtree."""
 
     messages: ClassVar[Any] = CPA | Nogood | Accept | Solved
     traits: ClassVar[Traits] = Traits(
@@ -82,7 +82,7 @@ class AFCTree(AFCng):
                 assert_never(never)
 
     def _process_accept(self, sender: str, counters: Sequence[int], subtree: Mapping[str, Value]) -> None:
-        """Store an accept of the current CPA; others are obsolete."""
+        """Store an accept of the current CPA; all other accepts are obsolete."""
         if self.over or self.value is None or counters != [*self.counters, self.counter]:
             return
         self.accepts[sender] = subtree
@@ -93,7 +93,7 @@ class AFCTree(AFCng):
         super()._assign()
 
     def _detect_solution(self) -> None:
-        """Report the subtree's values to the parent, or to all as the root, once all children have accepted."""
+        """Once all children have accepted, report the subtree's values to the parent, or to all robots as the root."""
         subtree = self._build_pa()
         if subtree is None:
             return
@@ -103,7 +103,7 @@ class AFCTree(AFCng):
             self.send(self.parent, Accept(self.counters, subtree))
 
     def _build_pa(self) -> dict[str, Value] | None:
-        """Return the values of this robot's subtree; None while a child has not accepted."""
+        """Return the values of this robot's subtree; None if a child has not accepted yet."""
         if self.value is None or len(self.accepts) < len(self.successors):
             return None
         own = {self.problem.agent: self.problem.values[self.value]}

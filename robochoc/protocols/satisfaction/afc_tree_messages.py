@@ -1,4 +1,4 @@
-"""The message that AFC-tree adds to AFC-ng's: apart, as mypyc cannot compile msgspec's classes."""
+"""The message that AFC-tree adds to AFC-ng; separate, because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from robochoc.protocols.wording import Wording
 
 
 class Accept(Message, frozen=True):
-    """A message that the sender's whole subtree accepts the receiver's CPA (`accept`).
+    """The sender's whole subtree accepts the receiver's CPA (`accept`).
 
-    `counters` are those of the CPA, from the root down to the receiver; `subtree` holds the values of the subtree.
+    `counters` are those in the CPA, from the root down to the receiver; `subtree` contains the values in the subtree.
     """
 
     counters: list[int]

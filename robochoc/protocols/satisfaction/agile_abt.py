@@ -19,26 +19,26 @@ It follows the paper's ideas (explanations, termination vectors, orders that onl
     UpdateExplanations   `agile_order.updated`     choose an order   `_choose_order`
     ComputeOrder         `agile_order.ordered`     adopt an order    `_check_order`
 
-Termination: each order that a robot makes or adopts is stronger than the one before, and there are finitely many, since
-numbers of remaining values are between 0 and the domain's size, or unknown. So changes of order cease, however inexact
-the numbers are. All robots then hold the strongest order ever made, since each order was sent to all. From then on the
-protocol is ABT.
+Termination: each order that a robot makes or adopts is stronger than the one before, and there are finitely many
+orders, because numbers of remaining values are between 0 and the domain's size, or unknown. So changes of order cease,
+however inexact the numbers are. All robots then have the strongest order ever made, because each order was sent to all.
+From then on the protocol is ABT.
 
-Correctness: nogoods follow from the constraints in any order, so the empty one proves that there is no solution. At
+Correctness: nogoods follow from the constraints in any order, so the empty nogood proves that there is no solution. At
 quiescence all orders are equal, and each robot's value agrees with its view of higher robots. The view is complete:
-each robot stores the last value it sent to each robot (`sent_values`), and sends its value to lower robots that have
-another one, or that dropped it when they sent a nogood.
+each robot stores the last value that it sent to each robot (`sent_values`), and sends its value to lower robots that
+have another one, or that dropped it when they sent a nogood.
 
 Choices that the paper leaves open, and differences:
 
-- Constraints may be n-ary. The robot of the scope that is lowest at present checks them.
-- An order is sent only in messages of its own, not with each Ok and Nogood. A nogood that arrives before its order is
-  dropped as obsolete, and its sender is sent the value again if it is lower.
-- A value is dated by its place in its channel, not by a counter.
-- A robot whose domain size is unknown counts as having `UNKNOWN` values left, more than any other.
-- Values are checked one by one until one fits, so remaining values are those without a nogood so far.
-- Messages are read in packets. As in `abt.py`, of several nogoods for a value the one with the highest possible lowest
-  variable is kept, and a nogood contains only the variables that matter.
+- Constraints may be n-ary. The robot in the scope that is lowest at present checks them.
+- An order is sent only in separate messages, not with each Ok and Nogood. A nogood that arrives before its order is
+  dropped as obsolete, and its sender receives the value again if it is lower.
+- The age of a value is its position in its channel, not a counter.
+- A robot whose domain size is unknown counts as having `UNKNOWN` values left, more than any other robot.
+- Values are checked one by one until one is consistent, so the remaining values are those without a nogood so far.
+- Messages are read in batches. As in `abt.py`, of several nogoods for a value the one with the highest possible lowest
+  variable is kept, and a nogood contains only the relevant variables.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -78,9 +78,9 @@ class AgileABT(Backtracking):
     """One agent of Agile-ABT.
 
     State: `present` (o_i) and `termination` (TV_i), `view` (AgentView), `store` (NogoodStore), `explanations` (E_i),
-    and the received domain `sizes`. `higher` are robots that send this one their values while they have higher
-    priority. It sends its own value to `listeners` while they have lower priority; `sent_values` are the last values it
-    sent them.
+    and the received domain `sizes`. `higher` are robots that send their values to this one while they have higher
+    priority. It sends its own value to `listeners` while they have lower priority; `sent_values` are the last values
+    sent to them.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | Order | AddLink
@@ -135,10 +135,10 @@ class AgileABT(Backtracking):
         self.explanations[sender] = Explanation(ok.lhs, ok.left)
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the current value that agrees with order and view; others are obsolete."""
+        """Accept a nogood about the current value that agrees with order and view; all other nogoods are obsolete."""
         last = self.sent_values.get(sender)
         if last is not None and not contradicts(nogood.value, last):
-            del self.sent_values[sender]  # it has forgotten the value; a newer one would be in transit
+            del self.sent_values[sender]  # the sender has forgotten it; a newer value would be in transit
         current = self._current()
         if current is None or contradicts(nogood.value, current) or not self._coherent(nogood):
             return
@@ -159,7 +159,7 @@ class AgileABT(Backtracking):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it; else choose another or backtrack; then send it."""
+        """Keep the value if the view allows it; otherwise choose another value or backtrack; then send it."""
         while self.verdict is None:
             above = self._above()
             if self.value is None or not self._consistent(self.value, above):
@@ -170,7 +170,7 @@ class AgileABT(Backtracking):
             self._backtrack()
 
     def _send_value(self, value: Value) -> None:
-        """Send the value to all lower listeners that were last sent another one, or none."""
+        """Send the value to all lower listeners that were last sent another value, or none."""
         rank = self.present.rank
         below = [
             name for name in self.listeners if rank[name] > rank[self.name] and self.sent_values.get(name) != value
@@ -197,7 +197,7 @@ class AgileABT(Backtracking):
     def _choose_order(self, conflict: LeftSide) -> str:
         """Return the robot to send `conflict` to; adopt and send a smaller order if there is one.
 
-        Without a smaller order it is the lowest-priority robot of the conflict.
+        Without a smaller order, it is the lowest-priority robot in the conflict.
         """
         held = self._held_explanations()
         best = min(
@@ -259,7 +259,7 @@ class AgileABT(Backtracking):
         return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Return whether all robots of the left side are higher and their values do not contradict it."""
+        """Return whether all robots in the left side are higher and their values do not contradict it."""
         return compatible(self.present, self.name, nogood.lhs) and all(
             agent in self.view and not contradicts(value, self.view[agent])
             for agent, value in nogood.lhs.items()
@@ -267,7 +267,7 @@ class AgileABT(Backtracking):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Request links to robots of the nogood that send no values yet; assume its values for now."""
+        """Request links to robots in the nogood that send no values yet; assume the nogood's values for now."""
         for agent in self._assume(nogood.lhs):
             self.send(agent, AddLink())
 

@@ -1,4 +1,4 @@
-"""Messages of Agile-ABT: apart from `agile_abt.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of Agile-ABT, separate from `agile_abt.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Ok(Message, frozen=True):
 
 
 class Order(Message, frozen=True):
-    """A new order (`order`): the robots by their places in the first one, and its termination vector."""
+    """A new order (`order`): the robots by their positions in the first order, and the termination vector."""
 
     places: tuple[int, ...]
     termination: TerminationVector

@@ -4,7 +4,7 @@ Bessiere, Bouyakhf, Mechqrane, Wahbi: "Agile asynchronous backtracking for distr
 problems", ICTAI 2011. Pure functions; the protocol is in `agile_abt.py`.
 
 An explanation contains the number of values that a robot's nogoods leave it, and the condition of these nogoods: all
-robots of their left sides have higher priority. A termination vector lists the number of remaining values of each
+robots in their left sides have higher priority. A termination vector lists the number of remaining values of each
 robot, in the order of the robots; vectors are compared lexicographically.
 
 In this example R3 is below R1 and R2 and has no value left. It finds that R1 = 1 and R2 = 4 cannot both stay. R2 may
@@ -32,7 +32,7 @@ UNKNOWN = 2**31 - 1
 """The number of remaining values of a robot whose domain size is unknown."""
 
 TerminationVector = tuple[int, ...]
-"""TV: the numbers of remaining values of the first robot of an order, the second, and so on."""
+"""TV: the numbers of remaining values of the first robot in an order, the second, and so on."""
 
 
 class Explanation(NamedTuple):
@@ -64,8 +64,8 @@ def updated(
 ) -> dict[str, Explanation]:
     """Return the explanations after `culprit` has received a nogood with the left side `lhs` (UpdateExplanations).
 
-    `culprit` will change its value, so explanations that contain it are removed. It has one value less, and must come
-    after all robots of `lhs`.
+    `culprit` will change its value, so explanations that contain it are removed. It has one value fewer, and must come
+    after all robots in `lhs`.
     """
     kept = {name: one for name, one in explanations.items() if culprit not in one.lhs}
     before = kept.get(culprit) or Explanation({}, sizes.get(culprit, UNKNOWN))
@@ -77,7 +77,8 @@ def updated(
 def ordered(names: Sequence[str], explanations: Explanations, left: Mapping[str, int]) -> tuple[str, ...]:
     """Return an order compatible with all `explanations`, which must not be circular (ComputeOrder).
 
-    Among the robots that may come next, it takes the one with the fewest values left; ties go to the first in `names`.
+    Among the robots that may come next, the one with the fewest remaining values is next; ties go to the first in
+    `names`.
     """
     place = {name: number for number, name in enumerate(names)}
     below: dict[str, list[str]] = {name: [] for name in names}

@@ -1,11 +1,11 @@
 """Asynchronous Weak-Commitment search (AWC).
 
 Complete search for satisfaction with priorities that change. A robot obeys robots of higher priority, and takes the
-value with the fewest conflicts with the others. At a dead end it sends the nogood to all robots in it and raises its
-priority above all its neighbours'. So a bad choice above is undone without an exhaustive search below. Priorities
-change only with a new nogood.
+value that has the fewest conflicts with all other robots. At a dead end it sends the nogood to all robots in it and
+raises its priority above that of all its neighbours. So a bad choice above is undone without an exhaustive search
+below. Priorities change only with a new nogood.
 
-- **When to use**: to compare. ABT with the max-degree order is faster here.
+- **When to use**: for comparison. ABT with the max-degree order is faster here.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. **All nogoods are kept,
   which termination requires; space is exponential.**
 - **Parameters**: none.
@@ -18,21 +18,22 @@ The methods have the names of its procedures:
     check_agent_view   `_check_agent_view`     received (ok?, ...)      `_received_ok`
     backtrack          `_backtrack`            received (nogood, ...)   `_received_nogood`
 
-Termination and correctness: there are finitely many nogoods, and each robot sends each only once. So priorities stop
-changing at some point, and then values settle from the highest priority downwards. Suppose a robot is at a dead end at
-quiescence. It has sent its nogood before, so all robots in the nogood know it and each other's values. The lowest of
-them is then at a dead end itself, at a higher priority. The highest such robot would have derived the empty nogood.
+Termination and correctness: there are finitely many nogoods, and each robot sends each nogood only once. So priorities
+stop changing at some point, and then values settle from the highest priority downwards. Suppose a robot is at a dead
+end at quiescence. It has sent its nogood before, so all robots in the nogood know it and each other's values. The
+lowest of them is then at a dead end itself, at a higher priority. The highest such robot would have derived the empty
+nogood.
 
 Choices that the papers leave open:
 
-- Constraints and nogoods may contain many robots. The robot that is lowest at present checks them, so all robots of a
-  scope must know the constraint and each other's values.
+- Constraints and nogoods may contain many robots. The robot that currently has the lowest priority among them checks
+  them, so all robots in a scope must know the constraint and each other's values.
 - A nogood is new if this robot has never sent it.
-- Conflicts to minimise are violated constraints (each evaluation counts as a check) and nogoods that hold (not
-  counted). Ties go to the first value of the domain.
-- For each value, the shortest nogood that holds goes into the new nogood, or else the first violated constraint.
-- A nogood contains only those variables of a robot that matter.
-- Messages are read in packets. The runtime detects quiescence, and so a solution.
+- Conflicts to minimise are violated constraints (each evaluation counts as a check) and nogoods that hold (not counted
+  as checks). Ties go to the first value of the domain.
+- For each value, the shortest nogood that holds is included in the new nogood, or else the first violated constraint.
+- A nogood contains only the relevant variables of a robot.
+- Messages are read in batches. The runtime detects quiescence, and so a solution.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -65,15 +66,15 @@ class StoredNogood(NamedTuple):
 
 
 def agrees(value: Value, known: Value | None) -> bool:
-    """Return whether `known` has the same components as `value`, where `value` has any (not None)."""
+    """Return whether `known` equals `value` in all components where `value` is not None."""
     return known is not None and all(part is None or part == other for part, other in zip(value, known, strict=True))
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class NogoodList:
-    """All received nogoods. Each is indexed by one of its assignments that does not hold ("watched").
+    """All received nogoods. Each nogood is indexed by one of its assignments that does not hold (the "watched" one).
 
-    It is examined again only when that assignment holds.
+    A nogood is examined again only when its watched assignment holds.
     """
 
     def __init__(self) -> None:
@@ -182,7 +183,7 @@ class AWC(Protocol):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if all higher robots allow it; otherwise choose another allowed one, or backtrack."""
+        """Keep the value if all higher robots allow it; otherwise choose another allowed value, or backtrack."""
         self._recompute()
         if self.value is not None and self._reason(self.value) is None:
             return
@@ -213,7 +214,7 @@ class AWC(Protocol):
         self._choose_value(self._allowed())
 
     def _choose_value(self, allowed: list[int]) -> None:
-        """Choose the value with the fewest conflicts (the first of equals) and send it to all neighbours."""
+        """Choose the value with the fewest conflicts (the first in case of ties) and send it to all neighbours."""
         self.value = allowed[0] if len(allowed) == 1 else min(allowed, key=self._violations)
         for agent in self.neighbours:
             self.send(agent, self._ok())
@@ -249,7 +250,7 @@ class AWC(Protocol):
     # The view
 
     def _recompute(self) -> None:
-        """Recompute the higher robots and the nogoods that hold; drop counts of conflicts that changed."""
+        """Recompute the higher robots and the nogoods that hold; drop conflict counts that may have changed."""
         higher = {agent: value for agent, value in self.view.items() if self._is_higher(agent)}
         if higher != self._higher:
             self._conflicts = {
@@ -266,7 +267,7 @@ class AWC(Protocol):
                 self._applicable[index].append(others)
 
     def _is_higher(self, agent: str) -> bool:
-        """Return whether `agent` has higher priority than this robot; ties go by the static order."""
+        """Return whether `agent` has higher priority than this robot; ties are broken by the static order."""
         other = (-self.priorities[agent], self.order.rank[agent])
         return other < (-self.priority, self.order.rank[self.problem.agent])
 

@@ -1,4 +1,4 @@
-"""Messages of Asynchronous Weak-Commitment search: apart from `awc.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of Asynchronous Weak-Commitment search; separate, because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """Assignments that cannot all hold, the receiver's among them, with the last known priorities."""
+    """Assignments, including the receiver's, that cannot all hold, with the last known priorities."""
 
     nogood: dict[str, tuple[Value, int]]
 
     act = acts.RULE_OUT
     backtracks = True
-    # The nogood may follow from any robot's constraints.
+    # The nogood may follow from the constraints of any robot.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
@@ -45,7 +45,7 @@ class Nogood(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """A new link between sender and receiver because of a nogood: each sends the other its value from now on."""
+    """A new link between sender and receiver because of a nogood: each sends its value to the other from now on."""
 
     act = acts.ADD_LINK
     proves_nothing = True

@@ -1,7 +1,7 @@
 """The common base of ABT and its variants with other orders: the view, and the nogoods that depend on it.
 
-Of the kernel (Bessiere, Maestre, Brito, Meseguer, AIJ 161, 2005, Figure 1) `Update` and `ChooseValue` are here; the
-sending of messages is in each protocol's file.
+This file contains `Update` and `ChooseValue` of the kernel (Bessiere, Maestre, Brito, Meseguer, AIJ 161, 2005, Figure
+1); the sending of messages is in each protocol's file.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from robochoc.system.compiling import mypyc_attr
 class Backtracking(Protocol):
     """One agent with a `view` of others' values (myAgentView) and a `store` of nogoods (myNogoodStore).
 
-    `higher` are the robots that send this one their values (Gamma-) while they have higher priority.
+    `higher` are the robots that send their values to this one (Gamma-) while they have higher priority.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -47,7 +47,7 @@ class Backtracking(Protocol):
         return False
 
     def _update(self, agent: str, value: Value | None) -> None:
-        """Store a new value of `agent` (None: unknown); drop nogoods that contain another value of it."""
+        """Store a new value of `agent` (None: unknown); drop nogoods that contain another value of `agent`."""
         if value is None:
             self.view.pop(agent, None)
         else:
@@ -55,7 +55,7 @@ class Backtracking(Protocol):
         self.store.forget(agent, value)
 
     def _assume(self, lhs: Mapping[str, Value]) -> list[str]:
-        """Assume the values in `lhs`; return the robots that do not send this one their values yet."""
+        """Assume the values in `lhs`; return the robots that do not send their values to this robot yet."""
         new = [agent for agent in lhs if agent not in self.higher]
         self.higher.update(new)
         for agent, value in lhs.items():

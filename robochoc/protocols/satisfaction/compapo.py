@@ -5,7 +5,7 @@ mediates: it asks the robots of its good_list (those whose constraints it knows)
 common problem by itself, and sends each robot its value. Robots outside that are then in conflict join the good_list.
 So mediators learn the hard parts of the problem, and in the worst case all of it.
 
-- **When to use**: no costs, robots may learn each other's constraints, and messages are few but may be long.
+- **When to use**: no costs, robots may learn each other's constraints, and messages should be few but may be long.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. A mediator's search is
   exponential in its good_list, and tables of n-ary constraints are exponential in their number of robots.
 - **Parameters**: none.
@@ -14,45 +14,47 @@ So mediators learn the hard parts of the problem, and in the worst case all of i
   problems", JAIR 25 (2006). APO is not complete: Grinshpoun, Meisels: "Completeness and performance of the APO
   algorithm", JAIR 33 (2008), which is CompAPO. Only digests of the papers were available.
 
-The methods, beside the papers' names:
+The methods, next to the papers' names:
 
     init            `_introduce`          evaluate?         `_evaluate`, `_serve`
     check_agent     `_check_agent_view`   evaluate!, wait!  `_evaluated`, `_abandon`
     mediate         `_open`, `_advance`   accept!           `_accept`
     choose_solution `_choose_solution`    good_list         `good_list`
 
-As in CompAPO there are no partial sessions: a mediator continues only once all robots it asked have agreed. Our
-addition is a way to terminate under every schedule, without clock or random numbers:
+As in CompAPO there are no partial sessions: a mediator continues only once all robots that it asked have agreed. This
+project adds a way to terminate under every schedule, without clock or random numbers:
 
-- **Sessions also include the robots around the good_list**: all that share a constraint with one of its robots. They
+- **Sessions also include the robots around the good_list**: all robots that share a constraint with a robot in it. They
   keep their values, too, so the mediator's knowledge of them is true. They send values, not conflicts.
-- **Waiting** follows the wait-die scheme of databases. Priority is the paper's: the mediator with the larger good_list,
-  then the higher robot. A robot in a session lets requests of higher priority wait, and refuses those of lower priority
-  (`wait!`). A refused mediator releases all robots in its session, and tries again when the robot that refused it
-  reports that it is free. So a mediator only waits for sessions of lower priority, and no cycle can form. The session
-  of highest priority is never refused, and finishes.
-- **Only the highest robot of a conflict acts**, and it repairs by itself at most as often as its good_list has robots.
+- **Waiting** follows the wait-die scheme of databases. Priority is as in the paper: the mediator with the larger
+  good_list first, then the higher robot. A robot in a session lets requests of higher priority wait, and refuses
+  requests of lower priority (`wait!`). A refused mediator releases all robots in its session, and tries again when the
+  robot that refused it reports that it is free. So a mediator only waits for sessions of lower priority, and no cycle
+  can form. The session of highest priority is never refused, and finishes.
+- **Only the highest robot in a conflict acts**, and the number of times that it repairs by itself is at most the size
+  of its good_list.
 
-Termination: the number of repairs is bounded, since good_lists are. After the last repair values change in sessions
+Termination: the number of repairs is bounded, because good_lists are. After the last repair, values change in sessions
 only. A session's mediator is in a conflict whose robots are all in the good_list. If no conflict with robots outside
-remains, there are fewer conflicts than before, as all robots around kept their values. Otherwise the good_list grows.
-So finitely many sessions change anything. A session whose conflict has disappeared follows a change of value that had
-not reached the mediator, and a refused session follows one of higher priority: these are finitely many, too. At
-quiescence no robot is the highest of a conflict, so there is no conflict. A mediator whose good_list has no solution
-proves that there is none.
+remains, there are fewer conflicts than before, because all robots around kept their values. Otherwise the good_list
+grows. So only finitely many sessions change anything. A session whose conflict has disappeared follows a change of
+value that had not reached the mediator, and a refused session follows a session of higher priority: there are finitely
+many of these, too. At quiescence no robot is the highest in a conflict, so there is no conflict. A mediator whose
+good_list has no solution proves that there is none.
 
-APO itself is not offered. With its sessions (of those robots that agree) values may change in circles for ever: this
-happened on 8 of 150 random problems of 6 robots, all of which this protocol solved. When APO ended, it was right.
+APO itself is not offered. In its sessions (only of the robots that agree) values may change in circles for ever: this
+happened on 8 of 150 random problems with 6 robots, all of which CompAPO solved. When APO ended, its result was correct.
 
 Other choices and differences:
 
-- A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems never.
+- A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems they are never
+  sent.
 - New values are numbered, so that an old `ok?` never replaces a mediator's decision. A mediator sends the new values to
   all neighbours of the robots that change, so no `ok?` follows an `accept!`.
 - The mediator's search and its tables of constraints are in `mediation.py`; its checks are counted.
 
-Privacy: a mediator learns the domains' sizes, the constraints and the values of all robots in its good_list, and the
-values of those around it. In the worst case one robot learns the whole problem.
+Privacy: a mediator learns the domain sizes, the constraints and the values of all robots in its good_list, and the
+values of the robots around it. In the worst case one robot learns the whole problem.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -82,13 +84,13 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 Changes = dict[str, tuple[int, int]]
-"""New values of robots: the place in the robot's domain, and the number of changes of its value so far."""
+"""New values of robots: the index in the robot's domain, and the number of changes of its value so far."""
 MOST_PROOFS = 4096
-"""Constraints with more combinations of values give no proofs: computing them would take too long."""
+"""Constraints with more combinations of values give no proofs, because computing these would take too long."""
 
 
 class Init(Message, frozen=True):
-    """The sender's domain; it begins with the first value (`init`)."""
+    """The sender's domain, the first value first (`init`)."""
 
     values: tuple[Value, ...]
 
@@ -180,7 +182,7 @@ class Free(Message, frozen=True):
 
 
 class Assign(Message, frozen=True):
-    """The end of a session: the receiver's value, and its neighbours' new ones (`accept!`)."""
+    """The end of a session: the receiver's value, and its neighbours' new values (`accept!`)."""
 
     place: int
     changes: Changes
@@ -198,7 +200,7 @@ class Assign(Message, frozen=True):
 
 
 class Release(Message, frozen=True):
-    """The end of a session for a robot that keeps its value: its neighbours' new values."""
+    """The end of a session for a robot that keeps its value, with its neighbours' new values."""
 
     changes: Changes
 
@@ -218,15 +220,15 @@ def _shown(changes: Changes) -> str:
 
 
 def _current_values(changes: Changes, reception: Reception) -> list[Proof]:
-    """Return the values of robots, as far as the observer knows their domains."""
+    """Return the values of robots whose domains the observer knows."""
     known = [(robot, reception.values(robot), place, count) for robot, (place, count) in changes.items()]
     return [HasValue(robot, values[place], (count,)) for robot, values, place, count in known if values is not None]
 
 
 def _table_proves(table: AllowedTable, tables: Sequence[AllowedTable], reception: Reception) -> Iterator[Proof]:
-    """Yield the proofs of one of the sender's `tables`: the values that clash, and those that all constraints allow.
+    """Yield the proofs in one of the sender's `tables`: the values that clash, and those that all constraints allow.
 
-    There are none if the receiver does not know the domains that the places refer to.
+    There are none if the receiver does not know the domains that the indices refer to.
     """
     values = [reception.values(robot) for robot in table.robots]
     if any(known is None for known in values):
@@ -245,8 +247,9 @@ class CompAPO(Protocol):
     """One agent of CompAPO.
 
     State: `view` (agent_view), with `counts` of changes; the neighbours' `domains`; `good_list` and `tables`, the
-    constraints of its robots as far as they are known. `holder` is the mediator of the session that this robot is in,
-    and `held` that session's priority; `requests` are sessions that wait, `refused` the robots it has refused. Of its
+    constraints of the robots in it as far as they are known. `holder` is the mediator of the session that this robot is
+    in, and `held` that session's priority; `requests` are sessions that wait, `refused` the robots that it has refused.
+    Of its
     own session: its number `session`, the robots `asked`, and `replies`. `waits_for` is the robot that has refused it.
     """
 
@@ -279,7 +282,7 @@ class CompAPO(Protocol):
         self.replies: dict[str, Evaluation] = {}
         self.waits_for: str | None = None
         self._conflict: bool | None = None
-        """Whether this robot is the highest of a conflict; None: not known since the last change."""
+        """Whether this robot is the highest in a conflict; None if not known since the last change."""
 
     def start(self) -> None:
         """Choose the first value, and send the domain to all neighbours."""
@@ -314,7 +317,7 @@ class CompAPO(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Continue a session, or begin one; answer requests. Do nothing before all domains are known."""
+        """Continue or begin a session, and answer requests. Do nothing before all domains are known."""
         if self.verdict is not None or len(self.domains) < len(self.linked):
             return
         if self.holder == self.name:
@@ -348,7 +351,7 @@ class CompAPO(Protocol):
     def _serve(self) -> None:
         """Agree to the first waiting session, or act alone; then refuse requests and report that this robot is free.
 
-        Requests of lower priority than this robot's present session are refused.
+        Requests of lower priority than this robot's current session are refused.
         """
         if self.holder is None and self.requests:
             first = min(self.requests, key=self._priority)
@@ -367,12 +370,12 @@ class CompAPO(Protocol):
                 self.refused.add(robot)
 
     def _evaluate(self, mediator: str, request: Evaluate) -> None:
-        """Agree to a session: keep the value, and send it and, if requested, the constraints."""
+        """Agree to a session: keep the value, and send it, with the constraints if they were requested."""
         tables = self._own_tables() if request.tables else ()
         self.send(mediator, Evaluation(request.session, self._place(), self.count, tables))
 
     def _accept(self, mediator: str, place: int, changes: Changes) -> None:
-        """Adopt the value from the mediator, which has sent it to all neighbours."""
+        """Adopt the value from the mediator, which has also sent it to all neighbours."""
         if mediator != self.holder or not 0 <= place < len(self.problem.values):
             raise ValueError(f"{mediator} assigns value number {place + 1}, which it must not")
         if place != self.value:
@@ -380,7 +383,7 @@ class CompAPO(Protocol):
         self._release(mediator, changes)
 
     def _release(self, mediator: str, changes: Changes) -> None:
-        """End the session, or forget the request for one."""
+        """End the session, or forget the request for a session."""
         self._learn(changes)
         self.requests.pop(mediator, None)
         self.refused.discard(mediator)
@@ -390,14 +393,14 @@ class CompAPO(Protocol):
     # This robot's search
 
     def _check_agent_view(self) -> None:
-        """Repair a conflict by changing the value, or else begin to mediate, unless refused."""
+        """Repair a conflict by changing the value; otherwise begin to mediate, unless refused."""
         if not self._in_conflict() or self._repair():
             return
         if self.waits_for is None:
             self._open()
 
     def _in_conflict(self) -> bool:
-        """Return whether this robot is the highest of a conflict, and so the one to act."""
+        """Return whether this robot is the highest in a conflict, and so the one that must act."""
         if self._conflict is None:
             rank = self.order.rank
             conflicts = self.problem.conflicts(self._place(), self.view)
@@ -468,7 +471,7 @@ class CompAPO(Protocol):
             self._learn({robot: (reply.place, reply.count)})
 
     def _choose_solution(self) -> None:
-        """Solve the problem of the good_list and send the result; outside robots in conflict join the list."""
+        """Solve the problem of the good_list and send the result; robots outside that are in conflict join the list."""
         places = {robot: reply.place for robot, reply in self.replies.items()}
         found = self._solved(places) if self._in_conflict() else {}
         if found is None:
@@ -492,7 +495,7 @@ class CompAPO(Protocol):
         return found
 
     def _end(self, found: Mapping[str, int], changes: Changes, held: Iterable[str]) -> None:
-        """End the session: send the robots in it (`held`) their values, and their neighbours' changes."""
+        """End the session: send the robots in it (`held`) their values, and the changes of their neighbours."""
         met: dict[str, set[str]] = {}
         for table in self._known_tables() if changes else ():
             for robot in table.robots:
@@ -508,7 +511,7 @@ class CompAPO(Protocol):
     # Constraints
 
     def _own_tables(self) -> tuple[AllowedTable, ...]:
-        """Return this robot's constraints, those over the same robots in one table."""
+        """Return this robot's constraints; constraints between the same robots are in one table."""
         if self.name not in self.tables:
             self.tables[self.name] = own_tables(self.problem, self.linked, self.domains)
         return self.tables[self.name]

@@ -1,14 +1,14 @@
 """The Distributed Breakout Algorithm (DBA), for problems without costs.
 
 Local search in cycles: hill climbing on weighted violations. All robots send their values, then the reduction of their
-violated weight by their best move; among neighbours the one with the largest reduction moves. In a quasi-local minimum,
-where neither a robot nor one of its neighbours can reduce anything, the weights of the robot's violated constraints
-grow by one, until a move reduces them. Robots detect by a termination counter that all constraints hold.
+violated weight by their best move; among neighbours the robot with the largest reduction moves. In a quasi-local
+minimum, in which neither a robot nor any of its neighbours can reduce anything, the weights of the robot's violated
+constraints grow by one, until a move reduces them. Robots detect by a termination counter that all constraints hold.
 
 - **When to use**: a large team without costs, where a solution surely exists.
-- **Guarantees**: incomplete; a solution is correct, as all robots know that no constraint is violated when they stop.
-  It never proves that there is none (except for a robot with an empty domain), and gives up after `cycles` cycles. On a
-  constraint graph without cycles it finds a solution if there is one (Zhang, Wittenburg 2002).
+- **Guarantees**: incomplete; a solution is correct, because all robots know that no constraint is violated when they
+  stop. It never proves that there is no solution (except for a robot with an empty domain), and gives up after `cycles`
+  cycles. On a constraint graph without cycles it finds a solution if there is one (Zhang, Wittenburg 2002).
 - **Parameters (`--set`)**: `cycles` (the number of cycles after which it gives up; default 1000).
 - **References**: Yokoo, Hirayama: "Distributed breakout algorithm for solving distributed constraint satisfaction
   problems", ICMAS 1996; Hirayama, Yokoo: "The distributed breakout algorithms", AIJ 161, 2005; Zhang, Wittenburg:
@@ -24,19 +24,19 @@ The papers' procedures:
 
 The counter: a robot without violations, whose neighbours have none, adds one to the least counter among them and
 itself; any violation sets it to 0. So a counter of c means that all robots within distance c have had no violation for
-long enough, and once c is as large as any distance, there is none. The papers leave that bound to the user; with a
-bound that is too small the search stops wrongly. Here it is the number of robots less one, which no distance exceeds.
-Then the counters of all connected robots reach it in the same cycle, so no message has to announce the end.
+long enough, and once c is as large as any distance, there is no violation. The papers leave that bound to the user;
+with a bound that is too small the search stops wrongly. Here it is the number of robots less one, which no distance
+exceeds. Then the counters of all connected robots reach it in the same cycle, so no message has to announce the end.
 
 Choices that the papers leave open, and differences:
 
-- A weight belongs to a constraint, and each of its robots has a weight of its own for it.
-- The first value is chosen at random, and so is one of several best values.
-- Of equal reductions, that of the first robot in the priority order counts.
-- Constraints may be n-ary, as all robots of a scope are neighbours.
+- A weight belongs to a constraint, and each robot in the constraint has its own weight for it.
+- The first value is chosen at random; if there are several best values, one of them is chosen at random.
+- If reductions are equal, the first robot in the priority order wins.
+- Constraints may be n-ary, because all robots in a scope are neighbours.
 - If a value is lost, the last known one is used, and the robot reports a possible violation; a robot that misses a
   reduction does not move, and counts from 0. So with losses counters rarely grow large. A robot that has missed
-  anything does not end the search for all, and the best cycle is the answer, if it passes the check.
+  anything does not end the search for all, and the best cycle is the answer if it passes the check.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -94,7 +94,7 @@ class Improve(wire.Message, frozen=True):
         return f"what I violate weighs {self.weight:,}, and my move would make that {self.reduction:,} less"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        # Whether the two values are consistent; an inconsistency only if no other robot can have caused it.
+        # Whether the two values are consistent; an inconsistency is proven only if no other robot can have caused it.
         own = reception.last(Value, reception.receiver, reception.sender)
         theirs = reception.last(Value, reception.sender, reception.receiver)
         if own is None or theirs is None:
@@ -112,7 +112,7 @@ class Improve(wire.Message, frozen=True):
 class DBA(CycleProtocol):
     """One agent of DBA. A cycle has two phases: all robots send their values, then their reductions.
 
-    `weights` are those of the constraints by number, where they are not 1. `counter` is the termination counter.
+    `weights` are the weights of the constraints, by number, that are not 1. `counter` is the termination counter.
     """
 
     messages = Value | Improve | AnytimeMessage
@@ -144,7 +144,7 @@ class DBA(CycleProtocol):
         self.exchange_values(self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the reduction by this robot's best move, with all neighbours' values known."""
+        """Once all neighbours' values are known, send the reduction by this robot's best move."""
         charged = self.problem.charged(self.checked_values(messages))
         complete = self._are_complete(messages)
         weighed = [self._weight(charged, place) for place in range(len(self.problem.values))]
@@ -164,7 +164,7 @@ class DBA(CycleProtocol):
         return sum(self.weights.get(one.number, 1) for one in charged if one.costs[place] == INFINITE)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Stop, move, or increase the weights of violated constraints, with all neighbours' reductions known."""
+        """Stop, move, or increase the weights of violated constraints, once all neighbours' reductions are known."""
         theirs = {name: improve for name, improve in messages.items() if isinstance(improve, Improve)}
         complete = self._are_complete(messages)
         if not complete:
@@ -182,13 +182,13 @@ class DBA(CycleProtocol):
             self.conclude(Verdict.UNKNOWN)
 
     def _are_complete(self, messages: Mapping[str, wire.Message]) -> bool:
-        """Return whether a message of each neighbour has arrived in this phase; record a missing one."""
+        """Return whether a message from each neighbour has arrived in this phase; record that one is missing."""
         complete = len(messages) == len(self.problem.neighbours)
         self._missed = self._missed or not complete
         return complete
 
     def _has_ended(self, theirs: list[Improve]) -> bool:
-        """Increment or reset the counter; return whether no robot of the component violates anything."""
+        """Increment or reset the counter; return whether no robot in the component violates anything."""
         self.counter = min(improve.counter for improve in theirs)
         if any(improve.weight for improve in theirs):
             return False

@@ -1,30 +1,32 @@
 """Distributed arc consistency (DisAC-9), which `--preprocess ac` runs before any protocol.
 
-A robot removes each of its values that has no support: some constraint allows it with none of the others' remaining
-values, so it is in no solution. It sends its removals to its neighbours, which remove values in turn. The result is
+A robot removes each of its values that has no support: a value that some constraint allows with none of the others'
+remaining values, so that it is in no solution. It sends its removals to its neighbours, which remove values in turn.
+The result is
 that of a central algorithm: the largest arc consistent domains. A robot without a value left proves that there is no
 solution.
 
 This is not a search: at the end each robot has a reduced domain, not one value. The run then continues with the
 requested protocol on these domains.
 
-- **Guarantees**: no value of a solution is removed. It terminates. At most n d messages to each neighbour.
+- **Guarantees**: no value in a solution is removed. It terminates. At most n d messages are sent to each neighbour.
 - **Parameters**: none.
 - **Reference**: Hamadi: "Optimal distributed arc-consistency", Constraints 7 (2002). Only a digest was available.
 
-The rule that saves messages is the paper's: a robot sends a neighbour its removals, all of them so far, only if one of
-them was the last support of a remaining value of the neighbour. It then knows that the neighbour removes that value,
-without a message.
+The rule that saves messages is from the paper: a robot sends a neighbour its removals, all of them so far, only if one
+of them was the last support of a remaining value of the neighbour. The robot then knows that the neighbour removes that
+value, without a message.
 
 Choices and differences:
 
-- Constraints over the same robots count as one, which removes more than each does by itself.
-- Constraints over more than two robots: their robots receive all removals, as a single robot cannot detect that the
-  last combination for a value of another one is gone.
-- Each robot evaluates its constraints once, as tables (`LocalProblem.allowed`); these are its constraint checks, so
-  both robots of a constraint make them. The paper makes each once, as robots also learn each other's constraints.
-- A constraint whose table would be too large is ignored. All removals are correct nevertheless.
-- Only infinite costs count.
+- Constraints over the same robots count as one, which removes more values than each constraint alone.
+- Constraints over more than two robots: all their robots receive all removals, because a single robot cannot detect
+  that the last combination for a value of another robot is gone.
+- Each robot evaluates its constraints once, as tables (`LocalProblem.allowed`); these evaluations are its constraint
+  checks, so both robots in a constraint make them. In the paper each check is made once, because robots also learn each
+  other's constraints.
+- A constraint whose table would be too large is ignored. All removals are still correct.
+- Only infinite costs matter.
 - The runtime detects quiescence.
 """
 
@@ -63,12 +65,12 @@ class Domain(Message, frozen=True):
 
 
 class Del(Message, frozen=True):
-    """Values that the sender has removed, as places in its domain (`del`)."""
+    """Values that the sender has removed, as indices in its domain (`del`)."""
 
     places: tuple[int, ...]
 
     act = Act(Performative.INFORM, "the receiver learns the sender's values that are in no solution")
-    # The removal may follow from any robot's constraints.
+    # The removal may follow from the constraints of any robot.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
@@ -81,7 +83,7 @@ _Table = tuple[tuple[str, ...], dict[tuple[int, ...], int]]
 class DisAC(Protocol):
     """One agent. State: `domains` of the neighbours, and the values `left` in them and in its own, as bitmaps.
 
-    `removed` are its removals in their order, `sent` the number of them that each neighbour knows. `always` are the
+    `removed` are its removals in order, `sent` the number of removals that each neighbour knows. `always` are the
     neighbours that receive all removals: they share a constraint of more than two robots.
     """
 
@@ -109,7 +111,7 @@ class DisAC(Protocol):
         self._tables: list[_Table] | None = None
 
     def start(self) -> None:
-        """Send the domain to all robots that share a constraint."""
+        """Send the domain to all robots with which this robot shares a constraint."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -139,7 +141,7 @@ class DisAC(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """The places of the values that are left."""
+        """The indices of the remaining values."""
         return Findings(left=tuple(_places(self.own)))
 
     def _remove(self, sender: str, places: Iterable[int]) -> None:
@@ -151,12 +153,12 @@ class DisAC(Protocol):
             self.left[sender] &= ~(1 << place)
 
     def _evaluated(self) -> list[_Table]:
-        """Return the constraints as tables; those over the same robots in one."""
+        """Return the constraints as tables; constraints over the same robots form one table."""
         found: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
         for lowest in self.linked:
             try:
                 tables = self.problem.allowed(self.domains, lowest)
-            except UnsupportedError:  # too large: fewer values are removed
+            except UnsupportedError:  # too large for a table, so fewer values are removed
                 continue
             for others, masks in tables:
                 known = found.get(others)
@@ -164,7 +166,7 @@ class DisAC(Protocol):
         return list(found.items())
 
     def _revise(self) -> bool:
-        """Remove this robot's values without support; return whether a value is left."""
+        """Remove this robot's values without support; return whether any value is left."""
         assert self._tables is not None  # noqa: S101 - made before
         before = self.own
         for others, masks in self._tables:
@@ -177,7 +179,7 @@ class DisAC(Protocol):
         return bool(self.own)
 
     def _send_removals(self) -> None:
-        """Send each neighbour that needs removals all those that it does not know yet."""
+        """Send each neighbour that needs removals all removals that it does not know yet."""
         unsupported = self._unsupported()
         for robot in self.linked:
             news = tuple(self.removed[self.sent[robot] :])

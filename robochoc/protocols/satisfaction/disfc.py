@@ -1,32 +1,32 @@
 """Distributed Forward Checking (DisFC).
 
 ABT (`satisfaction/abt.py`) in which no value is ever sent. A robot names its assignment by a counter, which grows with
-each new assignment. Instead of its value it sends each lower neighbour the receiver's domain filtered by it:
-`Ok(counter, allowed)`. The receiver takes values that all filters allow; a value that a filter removes is ruled out by
+each new assignment. Instead of its value it sends each lower neighbour the receiver's domain, filtered by this value:
+`Ok(counter, allowed)`. The receiver takes a value that all filters allow; a value that a filter removes is ruled out by
 the sender's counter. Nogoods are over counters: a robot accepts a nogood about its current counter and the counters in
 its view. A filter is a bitmap over the receiver's declared domain (`solver/filters.py`), so messages contain only
-places in that domain.
+indices in that domain.
 
-- **When to use**: values are private, or constraints are (PKC). Constraints over two robots only.
+- **When to use**: values or constraints are private (PKC). Constraints must be between two robots.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
 - **Parameters**: none.
 - **References**: Brito and Meseguer: "Distributed forward checking", CP 2003; with partially known constraints: Brito,
   Meisels, Meseguer, Zivan: "Distributed constraint satisfaction with partially known constraints", Constraints 14
   (2009).
 
-The methods have the names of ABT's procedures, with these for filters:
+The methods have the names of ABT's procedures, except these for filters:
 
     check the filters   `_consistent`     refuse filters from below (PKC)   `_refuse_below`
 
-A totally known constraint (TKC) is in the filter that its higher robot sends down. Of a partially known one (PKC) each
-robot holds a part, and both send filters, in a single phase: down for the higher robot's part, up for the lower one's.
-A higher robot whose value is not in a filter from below sends a nogood against that assignment.
+A totally known constraint (TKC) is in the filter that its higher robot sends down. In a partially known constraint
+(PKC) each robot has a part, and both send filters, in a single phase: down for the higher robot's part, up for the
+lower robot's. A higher robot whose value is not in a filter from below sends a nogood against that assignment.
 
 Choices that the paper leaves open:
 
-- Packets, and the choice among several nogoods, are as in ABT.
-- A counter names an assignment and not a value, so a repeated value is not visible. An assignment that is kept keeps
-  its counter.
+- Batches of messages, and the choice among several nogoods, are as in ABT.
+- A counter names an assignment and not a value, so others cannot see that a value is repeated. An assignment that is
+  kept keeps its counter.
 - A robot that requested a link, but shares no constraint with the sender, gets a filter that allows everything.
 - A robot with several variables is filtered over all combinations of values of its interface variables.
 
@@ -59,7 +59,7 @@ class DisFC(Protocol):
     """One agent of DisFC.
 
     - `counter`: names this robot's assignment.
-    - `view`: the counters of higher-priority robots. `filters`: the filters they sent.
+    - `view`: the counters of higher-priority robots. `filters`: the filters that these robots sent.
     - `below`: counters and filters of lower-priority robots with parts of PKCs, not yet checked.
 
     The nogood store has values on its left sides; a counter is stored there as a value with one component.
@@ -121,7 +121,7 @@ class DisFC(Protocol):
             self.filters[sender] = ok.allowed
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the current assignment that agrees with the view; others are obsolete."""
+        """Accept a nogood about the current assignment that agrees with the view; all other nogoods are obsolete."""
         if self.value is None or nogood.counter != self.counter:
             return
         if self._coherent(nogood):
@@ -129,7 +129,7 @@ class DisFC(Protocol):
             self.store.add(self.value, {agent: (counter,) for agent, counter in nogood.lhs.items()})
             self.value = None
         else:
-            # The sender's view was outdated, and it has forgotten this robot's assignment: send it again.
+            # The sender's view was outdated, and the sender has forgotten this robot's assignment: send it again.
             self._send_filter(sender, self.value)
 
     def _set_link(self, sender: str) -> None:
@@ -141,7 +141,7 @@ class DisFC(Protocol):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it; otherwise choose another, or backtrack until there is one."""
+        """Keep the value if the view allows it; otherwise choose another value, or backtrack until there is one."""
         while self.verdict is None:
             if self.value is not None and self._consistent(self.value):
                 return
@@ -165,7 +165,7 @@ class DisFC(Protocol):
         return index
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
+        """Resolve the stored nogoods, one for each value, and send the result to the lowest-priority robot in it."""
         lhs = {agent: self.view[agent] for agent in self.store.resolve()}
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -210,7 +210,7 @@ class DisFC(Protocol):
         return all(self.view.get(agent) == counter for agent, counter in nogood.lhs.items() if agent in self.higher)
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Request links to robots of the nogood that send no assignments yet; assume its counters for now."""
+        """Request links to robots in the nogood that send no assignments yet; assume the nogood's counters for now."""
         for agent, counter in nogood.lhs.items():
             if agent not in self.higher:
                 self.higher.add(agent)

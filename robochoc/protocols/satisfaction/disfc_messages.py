@@ -1,4 +1,4 @@
-"""Messages of DisFC: apart from `disfc.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of DisFC, separate from `disfc.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.system.plain_text import counted, listed
 
 
 class Ok(Message, frozen=True):
-    """A new assignment of the sender, named `counter`; `allowed` is the receiver's domain filtered by it (`ok?`)."""
+    """A new assignment of the sender, named `counter`; `allowed` is the receiver's domain, filtered by it (`ok?`)."""
 
     counter: int
     allowed: bytes
@@ -38,7 +38,7 @@ class Nogood(Message, frozen=True):
 
     act = acts.RULE_OUT
     backtracks = True
-    # Only the senders of these counters know the values that they name.
+    # Only the senders of these counters know the values that the counters stand for.
     proves_nothing = True
 
     def in_words(self, words: Wording) -> str:
@@ -49,7 +49,7 @@ class Nogood(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """A request of a lower-priority robot to be sent the receiver's assignments from now on (`adl`)."""
+    """A lower-priority robot's request to be sent the receiver's assignments from now on (`adl`)."""
 
     act = acts.ADD_LINK
     proves_nothing = True

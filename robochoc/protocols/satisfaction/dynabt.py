@@ -1,8 +1,8 @@
 """Dynamic Asynchronous Backtracking (DynABT).
 
 ABT (see `abt.py`) that continues when the problem changes. Its nogoods have an *explanation*, `because`: the
-constraints, and the domains, that they were derived from. A direct conflict is explained by its constraint. A resolvent
-is explained by the union of the explanations that it resolves, and by the resolving robot's domain.
+constraints and domains from which they were derived. A direct conflict is explained by its constraint. A resolvent is
+explained by the union of the explanations of the resolved nogoods, and by the resolving robot's domain.
 
 - **When to use**: the problem changes during the run, for example when a robot is "lost if hit by a meteor" (paper,
   Section 3.1).
@@ -22,9 +22,9 @@ Choices that the paper leaves open, and differences:
 
 - The runtime propagates the changes to all robots before any robot continues. In the paper the robots send them to
   each other.
-- Messages in transit are lost if a search was interrupted or had concluded. Then links are requested again and values
-  sent again before the search continues. If the search had reached quiescence, nothing was lost, and only new values
-  are sent.
+- Messages in transit are lost if a search was interrupted or had concluded. In this case links are requested again and
+  values are sent again before the search continues. If the search had reached quiescence, nothing was lost, and only
+  new values are sent.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -57,7 +57,7 @@ class Nogood(PlainNogood, frozen=True):
 
 
 class DynABT(ABT, DynamicProtocol):
-    """One agent of DynABT. State besides ABT's: `proof`, the explanation of a derived empty nogood."""
+    """One agent of DynABT. State besides that of ABT: `proof`, the explanation of a derived empty nogood."""
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
@@ -92,12 +92,13 @@ class DynABT(ABT, DynamicProtocol):
         )  # a change may follow another before the search continues
         self.uninformed = [child for child in problem.children if child not in known]
         self.higher = {*problem.parents, *(self.higher - invalidated.agents)}
-        # Robots that requested the value, and are still present, keep receiving it, even if its variables have changed.
+        # Robots that requested the value, and are still present, continue to receive it, even if its variables have
+        # changed.
         self.lower = list(dict.fromkeys((*problem.children, *(robot for robot in self.lower if robot in order.rank))))
         self.problem, self.order = problem, order
 
     def resume(self, *, lossless: bool) -> None:
-        """Send what other robots may have missed, and check the view."""
+        """Send the information that other robots may have missed, and check the view."""
         if not lossless:
             for agent in sorted(self.higher.difference(self.problem.parents), key=self.order.rank.__getitem__):
                 self.send(agent, AddLink())
@@ -110,7 +111,7 @@ class DynABT(ABT, DynamicProtocol):
         self.uninformed = []
 
     def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """Move the nogoods and the value to their places in the changed domain."""
+        """Move the nogoods and the value to their indices in the changed domain."""
         old, self.store = self.store, NogoodStore(order, len(problem.values))
         known = {} if problem.agent in invalidated.agents else {value: i for i, value in enumerate(self.problem.values)}
         for index, value in enumerate(problem.values):

@@ -1,12 +1,12 @@
-"""First fit: robots that cannot be placed withdraw, in priority order.
+"""First fit: robots without a possible value withdraw, in priority order.
 
-Each robot waits for the decisions of its parents (neighbours of higher priority). Then it takes the first value that
+Each robot waits for the decisions of its parents (neighbours with higher priority). Then it takes the first value that
 its constraints with the flying parents allow, or withdraws, and sends its decision to its children.
 
-- **When to use**: some robots may withdraw, and any set of them will do. The minimum number of withdrawals is an
-  optimisation problem for a protocol with costs.
-- **Guarantees**: it terminates after one message for each edge. The set of withdrawn robots is minimal by inclusion:
-  no robot could be added, as all robots that ruled it out fly. It is not a minimum.
+- **When to use**: some robots may withdraw, and it does not matter which. To minimise the number of withdrawals, use a
+  protocol with costs.
+- **Guarantees**: it terminates after one message for each edge. The set of withdrawn robots is minimal by inclusion: no
+  robot could be added, because all robots that ruled it out fly. Its size need not be the minimum.
 - **Parameters**: none.
 - **Reference**: paper, Section 5.2: "the robots who can't belonging to the solution will be taken from the operational
   scene. Thus only robots that will satisfy all constraints will fly to take their positions."
@@ -34,7 +34,7 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class FirstFit(Protocol):
-    """One robot. `view` holds the values of the parents that fly, `awaited` the parents without a message yet."""
+    """One robot. `view` contains the values of the parents that fly, `awaited` the parents without a message yet."""
 
     messages: ClassVar[Any] = Placed
     traits: ClassVar[Traits] = Traits(

@@ -1,4 +1,4 @@
-"""The message of first fit: apart from `first_fit.py`, as mypyc cannot compile msgspec's classes."""
+"""The message of first fit, separate from `first_fit.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

@@ -1,10 +1,10 @@
-"""A mediator's local problem (CompAPO): a value for each robot of its good_list, by depth-first branch and bound.
+"""A mediator's local problem (CompAPO): depth-first branch and bound for a value of each robot in its good_list.
 
-All constraints among these robots hold in the result. As few constraints as possible with robots outside, whose values
-are fixed, are broken. Forward checking removes values of later robots; the robot with the fewest remaining values is
-next; values that break the fewest constraints come first, and among these the robot's present value.
+The result satisfies all constraints among these robots, and breaks as few constraints as possible with robots outside,
+whose values are fixed. Forward checking removes values of later robots; the robot with the fewest remaining values is
+next; values that break the fewest constraints come first, and among these the robot's current value.
 
-Each access to a table, for one value, is a constraint check, and is counted.
+Each access to a table, for one value, is one constraint check, and is counted.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from robochoc.solver.local_problem import LocalProblem
 class AllowedTable(msgspec.Struct, frozen=True, array_like=True):
     """All constraints over the same robots in one table: a bit for each combination of their values, set if allowed.
 
-    The place of the last robot's value varies fastest; bit i of the table is bit i % 8 of byte i // 8.
+    The index of the last robot's value varies fastest; bit i of the table is bit i % 8 of byte i // 8.
     """
 
     robots: tuple[str, ...]
@@ -37,7 +37,7 @@ class AllowedTable(msgspec.Struct, frozen=True, array_like=True):
             raise ValueError(f"a table of {len(self.allowed)} bytes does not have a bit for each combination of values")
 
     def allows(self, places: Iterable[int]) -> bool:
-        """Return whether the values at these `places` of the robots are allowed."""
+        """Return whether the values with these indices (`places`) of the robots are allowed."""
         at = 0
         for place, size in zip(places, self.sizes, strict=True):
             at = at * size + place
@@ -57,7 +57,7 @@ def own_tables(
 
 
 def distinct(tables: Iterable[AllowedTable]) -> list[AllowedTable]:
-    """Return one of `tables` for each set of robots, the first one: all of these robots send the same table."""
+    """Return the first of `tables` for each set of robots: all of these robots send the same table."""
     found: dict[frozenset[str], AllowedTable] = {}
     for table in tables:
         found.setdefault(frozenset(table.robots), table)
@@ -65,10 +65,10 @@ def distinct(tables: Iterable[AllowedTable]) -> list[AllowedTable]:
 
 
 def sizes_in(tables: Iterable[AllowedTable], places: Mapping[str, int]) -> dict[str, int]:
-    """Return the sizes of the domains of all robots in `tables`, whose values are at these `places`.
+    """Return the domain sizes of all robots in `tables`, whose values have the indices `places`.
 
     Raises:
-        ValueError: if tables contradict each other or the places.
+        ValueError: if tables contradict each other or the indices.
     """
     sizes: dict[str, int] = {}
     for table in tables:
@@ -84,7 +84,7 @@ def _table(
     others: tuple[str, ...],
     masks: Mapping[tuple[int, ...], int],
 ) -> AllowedTable:
-    """Return a table whose last robot is the one of `problem`."""
+    """Return a table whose last robot is the robot of `problem`."""
     own = len(problem.values)
     bits = 0
     for row, place in enumerate(sorted(masks)):
@@ -105,7 +105,7 @@ class _Node(NamedTuple):
 class _RestrictedTable:
     """A table restricted to the mediator's robots: the values of robots outside are fixed.
 
-    `inside` are the robots that the mediator decides on. `hard`: all robots of the table are inside.
+    `inside` are the robots whose values the mediator chooses. `hard`: all robots in the table are inside.
     """
 
     def __init__(self, table: AllowedTable, members: Mapping[str, int], places: Mapping[str, int]) -> None:
@@ -123,7 +123,7 @@ class _RestrictedTable:
         self.hard = len(self.inside) == len(table.robots)
 
     def mask(self, robot: str, assigned: Mapping[str, int], left: int) -> int:
-        """Return the values of `robot` in `left` that are allowed, when all other robots inside are assigned."""
+        """Return the values of `robot` in `left` that are allowed when all other robots inside are assigned."""
         base = self._base + sum(
             [stride * assigned[name] for name, stride in self._strides.items() if name != robot], start=0
         )
@@ -140,12 +140,12 @@ class Mediation:
     """One mediator's problem. `checks` counts its constraint checks."""
 
     def __init__(self, tables: Sequence[AllowedTable], members: Mapping[str, int], places: Mapping[str, int]) -> None:
-        """Select the tables that contain one of `members`.
+        """Select the tables that contain at least one of `members`.
 
         Args:
             tables: all constraints of the members.
-            members: the robots to decide on, in the order of priority, with the sizes of their domains.
-            places: the present values of the members and of all others in tables, as places in domains.
+            members: the robots whose values are chosen, in priority order, with their domain sizes.
+            places: the current values of the members and of all other robots in tables, as indices in their domains.
         """
         self.checks = 0
         self._members = members
@@ -159,7 +159,7 @@ class Mediation:
         """The number of constraints that the best assignment so far breaks."""
 
     def best(self) -> dict[str, int] | None:
-        """Return the best assignment of the members; None if their constraints allow none."""
+        """Return the best assignment of the members; None if their constraints allow no assignment."""
         found: dict[str, int] | None = None
         open_nodes = [iter([node] if (node := self._root()) else [])]
         while open_nodes and self._least:
@@ -207,7 +207,7 @@ class Mediation:
                 yield child
 
     def _pruned(self, node: _Node, table: _RestrictedTable, robot: str) -> _Node | None:
-        """Return `node` after forward checking with a table in which only `robot` is open; None: no value is left."""
+        """Return `node` after forward checking with a table in which only `robot` is open; None if no value is left."""
         left = node.left[robot]
         self.checks += left.bit_count()
         mask = table.mask(robot, node.assigned, left)
@@ -231,7 +231,7 @@ def allows(table: AllowedTable, places: Mapping[str, int]) -> bool:
 
 
 def _values(mask: int) -> Iterator[int]:
-    """Yield the places of the bits in `mask`."""
+    """Yield the indices of the bits in `mask`."""
     while mask:
         low = mask & -mask
         yield low.bit_length() - 1

@@ -1,7 +1,7 @@
-"""Nogoods and the store that keeps at most one for each value of a robot's domain.
+"""Nogoods, and the store that keeps at most one nogood for each value in a robot's domain.
 
-A nogood `lhs => x_i != v` means that x_i cannot take v while all assignments of its left side hold. One for each value
-is enough for completeness, and bounds the space by O(n d) (Bessiere, Maestre, Brito and Meseguer, AIJ 161, 2005,
+A nogood `lhs => x_i != v` means that x_i cannot take v while all assignments in its left side hold. One nogood for each
+value is enough for completeness, and bounds the space by O(n d) (Bessiere, Maestre, Brito and Meseguer, AIJ 161, 2005,
 Section 3).
 """
 
@@ -13,11 +13,11 @@ from robochoc.protocols.message import Value
 from robochoc.protocols.order import PriorityOrder
 
 LeftSide = Mapping[str, Value]
-"""A conjunction of assignments of higher-priority robots; None where a variable of a robot does not matter."""
+"""A conjunction of assignments of higher-priority robots; None if a variable of a robot does not matter."""
 
 
 Explanation = frozenset[str]
-"""Keys of constraints and domains (`solver/explanation.py`): a nogood is valid as long as all of them are."""
+"""Keys of constraints and domains (`solver/explanation.py`): a nogood is valid as long as all of these are."""
 
 NO_EXPLANATION: Explanation = frozenset()
 
@@ -26,7 +26,7 @@ def contradicts(value: Value, other: Value) -> bool:
     """Return whether two views of one robot's value differ in a component that both contain."""
     if value == other:
         return False
-    for part, known in zip(value, other, strict=True):  # twice as fast as a generator
+    for part, known in zip(value, other, strict=True):  # twice as fast as a generator expression
         if part != known and part is not None and known is not None:
             return True
     return False
@@ -40,11 +40,12 @@ def joined(value: Value | None, other: Value) -> Value:
 
 
 class NogoodStore:
-    """The left sides of the nogoods that rule out this robot's values, by the value's place in the domain.
+    """The left sides of the nogoods that rule out this robot's values, by the value's index in the domain.
 
-    Each has an explanation: the keys of the constraints and domains it was derived from (empty if the protocol keeps
-    none). Many values often share one left side. Left sides are indexed by their robots, so that a new value of a robot
-    only costs time for the nogoods that contain it. `open` is the number of values that no nogood rules out.
+    Each left side has an explanation: the keys of the constraints and domains from which it was derived (empty if the
+    protocol keeps none). Many values often share one left side. Left sides are indexed by their robots, so a new value
+    of a robot only costs time for the nogoods that contain this robot. `open` is the number of values that no nogood
+    rules out.
     """
 
     def __init__(self, order: PriorityOrder, size: int) -> None:
@@ -110,7 +111,7 @@ class NogoodStore:
             places.update(indices)
 
     def forget(self, agent: str, value: Value | None = None) -> None:
-        """Drop all nogoods that contain another value of `agent` than `value` (None: any value)."""
+        """Drop all nogoods that contain a value of `agent` other than `value` (None: any value)."""
         named = self._naming.get(agent)
         if named:
             self._drop([lhs for lhs in named.values() if value is None or contradicts(lhs[agent], value)])
@@ -120,7 +121,7 @@ class NogoodStore:
     ) -> None:
         """Drop all nogoods that contain a value that is not in `assignments`, or a robot that is not in them.
 
-        `places` are the robots' places in them; the assignments before `first` are known to be unchanged.
+        `places` are the robots' indices in `assignments`; the assignments before `first` are known to be unchanged.
         """
         stale: dict[int, LeftSide] = {}
         size = len(assignments)
@@ -142,7 +143,7 @@ class NogoodStore:
                 self._remove(index, lhs)
 
     def resolve(self) -> dict[str, Value]:
-        """Return the union of all left sides: the resolvent, if every value has a nogood."""
+        """Return the union of all left sides, which is the resolvent if every value has a nogood."""
         union: dict[str, Value] = {}
         for lhs in self._distinct():
             for agent, value in lhs.items():
@@ -167,7 +168,7 @@ class NogoodStore:
             self._unindex(lhs)
 
     def _remove(self, index: int, lhs: LeftSide) -> None:
-        """Drop the nogood against the value at `index`, which has this left side."""
+        """Drop the nogood with this left side against the value at `index`."""
         self._by_value[index] = None
         self.open += 1
         places = self._places[id(lhs)]
@@ -177,7 +178,7 @@ class NogoodStore:
             self._unindex(lhs)
 
     def _index(self, lhs: LeftSide, indices: Iterable[int]) -> None:
-        """Add a left side that is new, with the values that it rules out."""
+        """Add a new left side, with the values that it rules out."""
         key = id(lhs)
         self._places[key] = set(indices)
         for agent in lhs:

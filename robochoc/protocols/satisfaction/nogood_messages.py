@@ -1,4 +1,4 @@
-"""The nogood that ABT, AFC-ng, AFC-tree and Agile-ABT send; apart, as mypyc cannot compile msgspec's classes."""
+"""The nogood that ABT, AFC-ng, AFC-tree and Agile-ABT send; separate, as mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 

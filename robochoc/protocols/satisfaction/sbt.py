@@ -1,7 +1,7 @@
 """Synchronous Backtracking (SBT).
 
-Chronological backtracking, distributed. One current partial assignment (CPA) goes from robot to robot in priority
-order. Its holder adds its first consistent value and sends the CPA on; without such a value, it sends the CPA back. One
+Distributed chronological backtracking. One current partial assignment (CPA) goes from robot to robot in priority order.
+Its holder adds its first consistent value and sends the CPA on; if there is no such value, it sends the CPA back. One
 robot acts at a time, so no message is ever obsolete.
 
 - **When to use**: as a simple baseline without costs.
@@ -17,10 +17,10 @@ The methods:
 
 Choices that the papers leave open:
 
-- Constraints may be n-ary. The lowest-priority robot of the scope checks them, when it holds the CPA.
-- `Backtrack` contains no assignments, as the robot before still has its own.
+- Constraints may be n-ary. The lowest-priority robot in the scope checks them, when it holds the CPA.
+- `Backtrack` contains no assignments, because the previous robot still has its own CPA.
 - A robot with an empty domain reports it at once.
-- The last robot concludes with a solution, as all others still hold the values in the CPA.
+- The last robot concludes with a solution, because all others still have the values in the CPA.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve

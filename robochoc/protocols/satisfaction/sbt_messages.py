@@ -1,4 +1,4 @@
-"""Messages of synchronous backtracking: apart from `sbt.py`, as mypyc cannot compile msgspec's classes."""
+"""Messages of synchronous backtracking, separate from `sbt.py` because mypyc cannot compile msgspec's classes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class CPA(Message, frozen=True):
 
 
 class Backtrack(Message, frozen=True):
-    """A request to take the next value: no robot below has a value that agrees with the receiver's."""
+    """A request to take the next value: no robot below has a value that is consistent with the receiver's."""
 
     act = acts.REJECT_VALUE
     backtracks = True
