@@ -1,1 +1,1 @@
-"""Protocols whose robots send tables of costs or utilities instead of values tried one by one: one file each."""
+"""Protocols whose robots send tables of costs or utilities instead of trying single values, one file each."""

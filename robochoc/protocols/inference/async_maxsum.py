@@ -1,13 +1,14 @@
 """Asynchronous Max-Sum.
 
-Max-Sum without cycles. Each robot processes the messages that have arrived, chooses the cheapest value by them, and
-sends its neighbours the changes. When nothing changes any more, no more messages are sent: that is the end.
+Max-Sum without cycles. Each robot processes the messages that have arrived, chooses the cheapest value according to
+them, and sends its neighbours the changes. When nothing changes any more, no more messages are sent, and the search
+ends.
 
 - **When to use**: costs, a graph with few cycles, and messages with unequal delays.
-- **Guarantees**: incomplete. It ends, as a robot sends each neighbour at most `limit` messages. On a graph without
-  cycles the result is optimal, if `limit` and `tolerance` do not cut it short; elsewhere it is an estimate. The result
-  are the values at the end, or at a limit of the run. A robot whose values all cost `inf` proves that there is no
-  solution.
+- **Guarantees**: incomplete. It ends, because a robot sends each neighbour at most `limit` messages. On a graph without
+  cycles the result is optimal, if `limit` and `tolerance` do not cut the search short; elsewhere it is an estimate. The
+  result consists of the values at the end, or at a limit of the run. A robot whose values all cost `inf` proves that
+  there is no solution.
 - **Parameters (`--set`)**: `damping` (the weight of the last message in a new one; default 0.5), `preference` (the
   maximum random charge of a value; default 0.01), `tolerance` (smaller changes are not sent; default 0.0001), `limit`
   (the number of messages to each neighbour; default 200).
@@ -21,7 +22,7 @@ Choices that the papers leave open, and differences:
 
 - Messages between robots, R and Q, are damped; messages between nodes of the same robot are not.
 - A damped message is not the robot's actual result. So it is marked as not `settled`, and its receiver answers in any
-  case; then the robot sends nearer results, until the rest is at most `tolerance`. So damping does not change the
+  case; then the robot sends closer results, until the difference is at most `tolerance`. So damping does not change the
   result on a graph without cycles.
 - All robots start at once, with their private costs.
 - If messages are lost and no more arrive, all robots send their last messages again, up to ten times.
@@ -101,13 +102,13 @@ MORE = " for the moment"
 
 
 REPEATS = 10
-"""The number of times that a robot sends all its last messages again after a loss."""
+"""The number of times that a robot sends all its last messages again after messages were lost."""
 
 
 class AsyncMaxSum(Protocol):
     """One agent of asynchronous Max-Sum.
 
-    `functions` are this robot's, with the last Q from above; None until all domains from above have arrived.
+    `functions` are this robot's functions, with the last Q from above; None until all domains from above have arrived.
     `from_below` contains the last R from each robot below, `sent_rows` the last rows sent to each neighbour, and
     `sent_messages` the number of these messages. `owed` are the neighbours that wait for an answer.
     """
@@ -176,7 +177,7 @@ class AsyncMaxSum(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """Choose a value by all received messages, and send the changes."""
+        """Choose a value based on all received messages, and send the changes."""
         if self.verdict is not None or not self.preferred or len(self._domains) < len(self.above):
             return
         if self.functions is None:
@@ -197,7 +198,7 @@ class AsyncMaxSum(Protocol):
             self._send_changes(name, [next(rest) for _ in r], Q)
 
     def go_on(self) -> bool:
-        """Send all last messages again, up to `REPEATS` times, as messages were lost and no more will arrive."""
+        """Send all last messages again, up to `REPEATS` times, because messages were lost and no more will arrive."""
         if self._repeated >= REPEATS or self.verdict is not None or not self.preferred:
             return False
         self._repeated += 1

@@ -1,32 +1,35 @@
 """Bounded Max-Sum.
 
-Max-Sum on a tree is exact. So the robots cut the functions with the weakest dependencies until a tree is left, and
-solve that. The weights of the cuts bound the error of the result.
+Max-Sum is exact on a tree. So the robots cut the functions with the weakest dependencies until a tree is left, and
+solve that tree. The weights of the cuts bound the error of the result.
 
 - **When to use**: costs, a large team, and a guarantee without a search.
-- **Guarantees**: incomplete; linear in messages except for building the tree. It reports a lower bound of the optimum:
+- **Guarantees**: incomplete; linear in messages except for building the tree. It reports a lower bound on the optimum:
   the optimum of the tree. The result costs at most the bound plus the weight of all cuts. If the graph is a forest,
   nothing is cut, and the result is optimal. A run reports `optimal` if the result costs no more than the bound. The
-  bound is valid with hard constraints, too. If one of them is cut, the result may break it, and the weight is infinite:
-  then only the bound is guaranteed. A root whose tree costs `inf` proves that there is no solution.
+  bound is valid with hard constraints, too. If a hard constraint is cut, the result may break it, and the weight is
+  infinite: then only the bound is guaranteed. A root whose tree costs `inf` proves that there is no solution.
 - **Parameters**: none.
 - **References**: Rogers, Farinelli, Stranders, Jennings: "Bounded approximate decentralised coordination via the
   max-sum algorithm", Artificial Intelligence 175(2), 2011; for the bound: Rollon, Larrosa: "Improved bounded max-sum
   for distributed constraint optimization", CP 2012.
 
-A function is the sum of all constraints between two robots; the lower of them holds it. The weight of its dependency
-on one of them is the largest difference that this robot's value makes. A cut replaces the function by its minimum over
-this robot's values, and leaves the rest with the other robot. Of the two dependencies of a function only the lighter
-one is ever cut, so the tree is a maximum spanning tree of the robots by these weights. They build it (`spanning`).
+A function is the sum of all constraints between two robots; the lower of them holds it. The weight of its dependency on
+one of them is the largest difference that this robot's value makes. A cut replaces the function by its minimum over
+this robot's values, and leaves the rest with the other robot. Only the lighter of a function's two dependencies is ever
+cut, so the tree is a maximum spanning tree of the robots by these weights. The robots build this tree themselves
+(`spanning`).
 
-Then costs go up the tree, and values down. That is Max-Sum on a tree: R or Q, depending on the holder of the function.
+Then costs go up the tree, and values go down. That is Max-Sum on a tree: R or Q, depending on which robot holds the
+function.
 
 Choices that the paper leaves open, and differences:
 
 - Here costs are minimised. The paper maximises, and replaces a cut function by its worst case; then the reported value
-  is that of the assignment. Here it is the best case, as only that is a bound of the optimum (Rollon and Larrosa).
-- Values go down the tree, each chosen for the value above; so ties need no preferences.
-- Only functions of two robots; the paper's may have more.
+  is that of the assignment. Here it is replaced by its best case, because only the best case gives a bound on the
+  optimum (Rollon and Larrosa).
+- Values go down the tree, each chosen for the value above; so no preferences are needed to break ties.
+- Functions must be between two robots; in the paper they may have more.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -82,8 +85,8 @@ class Dependency(Message, frozen=True):
 class Branch(Message, frozen=True):
     """A lower bound on the cost of the sender's branch.
 
-    `costs` are of the receiver's values, if the sender holds their function (R), and of the sender's otherwise (Q).
-    `cut` is the weight of all cuts there, `most` the highest possible cost of all functions.
+    `costs` are the costs of the receiver's values if the sender holds their function (R), otherwise of the sender's
+    values (Q). `cut` is the weight of all cuts in the branch, `most` the highest possible cost of all functions.
     """
 
     costs: list[float]
@@ -91,14 +94,14 @@ class Branch(Message, frozen=True):
     most: float
 
     act = acts.TELL_BOUNDS
-    proves_nothing = True  # constraints are cut
+    proves_nothing = True  # constraints may have been cut
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
         return f"my branch costs {costs_text(self.costs)}, and up to {cost_text(self.cut)} more"
 
 
 class Assign(Message, frozen=True):
-    """The receiver's value: the best for the value of the sender, which holds their function."""
+    """The receiver's value: the best for the value of the sender, which holds their common function."""
 
     value: Value
 
@@ -112,8 +115,8 @@ class Assign(Message, frozen=True):
 class BoundedMaxSum(SpanningProtocol):
     """One agent of bounded Max-Sum.
 
-    `functions` are this robot's, by the robot above that shares them. `costs` are those of its values in its branch of
-    the tree. A root knows `optimum`, the cost of its tree, and `cut`, the weight of all cuts.
+    `functions` are this robot's functions, by the robot above that shares each. `costs` are the costs of its values in
+    its branch of the tree. A root knows `optimum`, the cost of its tree, and `cut`, the weight of all cuts.
     """
 
     messages = Domain | Dependency | Fragment | Heaviest | Choice | Merged | NewRoot | Branch | ValueMessage | Assign
@@ -145,7 +148,7 @@ class BoundedMaxSum(SpanningProtocol):
 
     @property
     def findings(self) -> Findings:
-        """At a root, a lower bound on the cost of its tree's robots."""
+        """At a root, a lower bound on the cost of the robots in its tree."""
         return Findings(bound=self.optimum)
 
     def start(self) -> None:
@@ -163,7 +166,7 @@ class BoundedMaxSum(SpanningProtocol):
     # Dependencies and their weights
 
     def _send_dependencies(self) -> bool:
-        """Make this robot's functions, once the domains above are known, and send their weights."""
+        """Create this robot's functions, once the domains above are known, and send their weights."""
         messages = self.next_messages(self.above)
         if messages is None:
             return False
@@ -204,7 +207,7 @@ class BoundedMaxSum(SpanningProtocol):
     # Costs go up the tree
 
     def start_in_tree(self) -> None:
-        """Add up the cuts: the weight at the holder of a function, the rest at the robot that keeps it."""
+        """Add up the cuts: the weight at the robot that holds a function, the rest at the robot that keeps it."""
         for name, weight in self.weights.items():
             if name not in self.joined:
                 self.cut += weight if name in self.functions else 0
@@ -269,7 +272,7 @@ class BoundedMaxSum(SpanningProtocol):
         return True
 
     def _choose_value(self, place: int) -> None:
-        """Choose a value; send it to the children, or the values that they have to choose."""
+        """Choose a value; send the children this value, or the values that they must choose."""
         self.value = place
         for child in self.children:
             table = self.functions.get(child)
@@ -282,7 +285,7 @@ class BoundedMaxSum(SpanningProtocol):
 
 
 def _weight(table: Array) -> float:
-    """Return the largest difference that a place on the first axis makes; forbidden combinations make none."""
+    """Return the largest difference that an index on the first axis makes; forbidden combinations make none."""
     return max(
         (high - low if low < INFINITE else 0)
         for low, high in zip(table.min(axis=0).tolist(), table.max(axis=0).tolist(), strict=True)

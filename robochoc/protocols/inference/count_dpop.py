@@ -1,15 +1,15 @@
 """Counting DPOP: DPOP that also counts the optima.
 
-DPOP (see `dpop.py`) whose tables have two entries for each combination of values of the separator: the least cost of
-the subtree, and the number of its assignments that attain it. Tables are joined by adding costs and multiplying
-numbers, and projected by the least cost and the sum of the numbers that belong to it. So the root knows, besides the
-optimum, the number of optima. Without costs these are the solutions.
+DPOP (see `dpop.py`) whose tables have two entries for each combination of values in the separator: the least cost of
+the subtree, and the number of its assignments that attain this cost. Tables are joined by adding costs and multiplying
+numbers, and projected by taking the least cost and summing the numbers that belong to it. So the root knows, besides
+the optimum, the number of optima. Without costs, the optima are the solutions.
 
 - **When to use**: to count, without a central solver, on a pseudo-tree with a small induced width. With `--count` the
-  result has the number. Otherwise it does no more than `dpop`.
+  result contains the number. Otherwise it does no more than `dpop`.
 - **Guarantees**: complete; it terminates with an optimum and the number of optima, or with a proof that there is no
   solution. Numbers are exact, whatever their size.
-- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005 (DPOP). The
   same elimination counts if sums and products replace minima and sums: Dechter, "Bucket elimination: a unifying
   framework for reasoning", Artificial Intelligence 113, 1999.
@@ -21,13 +21,14 @@ The additions to DPOP are these methods:
 
 Choices:
 
-- Each table of costs (UTIL) is followed by one of numbers (`Counts`), of as many bytes a number as the largest needs.
-- The bits of the numbers are sent with the sizes (`CountDimensions`), before any table is made. They are part of the
-  memory need. 2^20 bits or more end the run.
-- A value of a robot with several variables counts once for each of its local solutions of least cost.
-- Unconnected parts have a root each, and each root knows the number of its tree. The run multiplies them.
+- Each table of costs (UTIL) is followed by a table of numbers (`Counts`), with as many bytes for each number as the
+  largest one needs.
+- The number of bits of the numbers is sent with the sizes (`CountDimensions`), before any table is made. It is part of
+  the memory need. A run ends if 2^20 bits or more are needed.
+- A value of a robot with several variables counts once for each of its local solutions with the least cost.
+- Unconnected parts have a root each, and each root knows the number for its tree. The run multiplies these numbers.
 - If robots may withdraw, a withdrawn robot has exactly one assignment.
-- The number itself is not checked, as a check of constraints cannot compute it.
+- The number itself is not checked, because a check of constraints cannot compute it.
 
 >>> from robochoc.generators.random_csp import random_csp
 >>> from robochoc.run import Options, Runtime, solve
@@ -59,14 +60,14 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_BITS = 1 << 20
-"""Also represents all larger numbers of bits: it ends the run."""
+"""Also represents all larger numbers of bits; a run that needs so many ends."""
 
 
 Bits = Annotated[int, msgspec.Meta(ge=0, le=MOST_BITS)]
 
 
 class CountDimensions(Dimensions, frozen=True):
-    """DPOP's `Dimensions`; `bits` suffice for the number of all assignments of the sender's subtree."""
+    """DPOP's `Dimensions`; `bits` are enough for the number of all assignments of the sender's subtree."""
 
     bits: Bits
 
@@ -77,7 +78,7 @@ class CountDimensions(Dimensions, frozen=True):
 class Counts(Message, frozen=True):
     """A piece of the sender's table of numbers, in the order of UTIL's cells: the assignments that attain each cost.
 
-    `numbers` are unsigned integers of `width` bytes, little-endian, of any size.
+    `numbers` are unsigned little-endian integers of `width` bytes, of any size.
     """
 
     width: Annotated[int, msgspec.Meta(ge=1, le=MOST_BITS // 8)]
@@ -98,11 +99,11 @@ WORD = 64
 
 
 _OBJECT = 40
-"""The bytes of a Python integer besides its digits: its header, and the table's pointer to it."""
+"""The number of bytes of a Python integer besides its digits: its header, and the table's pointer to it."""
 
 
 _SCRATCH = 24
-"""The bytes for each cell while costs are compared: two sums, and the mask of equal ones."""
+"""The number of bytes for each cell while costs are compared: two sums, and the mask of equal ones."""
 
 
 def bytes_of_numbers(cells: int, bits: int) -> int:
@@ -111,7 +112,7 @@ def bytes_of_numbers(cells: int, bits: int) -> int:
 
 
 def bytes_to_count(cells: int, bits: int, below: int) -> int:
-    """Return the peak size for counting: the children's tables, `below` bytes, and this robot's.
+    """Return the peak size for counting: the children's tables (`below` bytes) and this robot's.
 
     This robot's table exists four times: a product, the sum, an intermediate result, and the piece that is sent.
     """
@@ -121,10 +122,10 @@ def bytes_to_count(cells: int, bits: int, below: int) -> int:
 def count_attaining(
     least: Codes, charges: Sequence[float], tables: Sequence[Table], own: Numbers, below: Sequence[Numbers]
 ) -> Numbers:
-    """Return the number of assignments that attain each cost of `least`: 0 if it is infinite.
+    """Return the number of assignments that attain each cost in `least`: 0 if the cost is infinite.
 
     Args:
-        least: The least costs, of `tables` joined.
+        least: The least costs in the joined `tables`.
         charges: The costs of this robot's values.
         tables: Tables of costs: this robot's axis first, then the axes of `least` (see `aligned`).
         own: The number of local solutions behind each of this robot's values.
@@ -150,7 +151,7 @@ def numbers_of(values: Sequence[int], bits: int) -> Numbers:
 
 
 def packed_numbers(table: Numbers) -> Iterator[tuple[int, bytes]]:
-    """Yield `table` in pieces for the wire, with as few bytes per number as the largest one needs."""
+    """Yield `table` in pieces for messages, with as few bytes per number as the largest number needs."""
     flat = table.reshape(-1)
     width = max(1, -(-int(flat.max()).bit_length() // 8))
     step = max(1, PIECE // width)
@@ -178,7 +179,7 @@ class IncomingNumbers:
         return numbers_of(self._numbers, self._own_bits).reshape(self._costs.shape)
 
     def add(self, width: int, piece: bytes) -> None:
-        """Append the next piece. Raises `ValueError` for bytes that do not fit."""
+        """Append the next piece. Raises `ValueError` if the bytes do not fit."""
         cells, odd = divmod(len(piece), width)
         start, left = len(self._numbers), self._costs.size - len(self._numbers)
         if odd or not 0 < cells <= left or width > max(1, -(-self._bits // 8)):
@@ -197,9 +198,10 @@ class IncomingNumbers:
 class CountDPOP(DPOP):
     """One agent of counting DPOP.
 
-    State besides DPOP's:
+    State besides that of DPOP:
 
-    - `bits`: sufficient for the number of assignments of this subtree; `bits_below`: of the children's;
+    - `bits`: the bits needed for the number of assignments of this subtree; `bits_below`: those needed for the
+      children's subtrees;
     - `numbers`: the children's tables of numbers;
     - `count`: the number of optima of the whole tree (at its root).
     """
@@ -239,13 +241,13 @@ class CountDPOP(DPOP):
 
     @property
     def findings(self) -> Findings:
-        """Return DPOP's findings; for a root also the number of its tree's optima."""
+        """Return the findings of DPOP; for a root also the number of optima of its tree."""
         return msgspec.structs.replace(super().findings, count=None if self.count is None else f"{self.count:x}")
 
     # The sizes of tables
 
     def _plan(self) -> None:
-        """Compute the bits of this robot's numbers."""
+        """Compute the number of bits needed for this robot's numbers."""
         own = sum(self.problem.behind).bit_length()
         self.bits = min(own + sum(self.bits_below.values()), MOST_BITS)
 
@@ -259,7 +261,7 @@ class CountDPOP(DPOP):
         self.send(self.parent or "", CountDimensions(sizes, dearest, width, most, self.bits))
 
     def _check_limits(self, most: Need, width: int) -> None:
-        """Raise `TooLargeError` as DPOP does, and if numbers have too many bits."""
+        """Raise `TooLargeError` as in DPOP, and if numbers have too many bits."""
         if self.bits >= MOST_BITS:
             raise TooLargeError(f"the number of assignments could have {MOST_BITS:,} bits or more: use dpop")
         super()._check_limits(most, width)
@@ -283,7 +285,7 @@ class CountDPOP(DPOP):
             self._compute_utils_of_all()
 
     def _compute_utils_of_all(self) -> None:
-        """Join the children's tables, once those of numbers have arrived as well."""
+        """Join the children's tables, once the tables of numbers have arrived as well."""
         if len(self.numbers) < len(self.children) or not all(table.complete for table in self.numbers.values()):
             return
         self._joined_children = [*self.utils]
@@ -303,7 +305,7 @@ class CountDPOP(DPOP):
             self.count = int(self._own_numbers.item())
 
     def _send_table(self, costs: Codes) -> None:
-        """Send the parent the table of costs, and then that of numbers."""
+        """Send the parent the table of costs, and then the table of numbers."""
         super()._send_table(costs)
         numbers, self._own_numbers = self._own_numbers, None
         if numbers is not None:

@@ -6,37 +6,38 @@ subtree. It adds up its constraints and its children's tables, and minimises ove
 each robot chooses the cheapest value (VALUE).
 
 - **When to use**: costs, and a pseudo-tree with a small induced width. The number of messages is linear, but a table
-  has as many dimensions as the separator has robots.
+  has one dimension for each robot in the separator.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. A run that needs
   more memory than allowed ends before any table is made.
-- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005, Algorithm 1.
 
-The methods have the names of its procedures:
+The methods have the names of the paper's procedures:
 
     Phase 1 (pseudo-tree)   `dfs.TreeProtocol`          Compute_utils           `_compute_utils`
     UTIL_Message_handler    `_util_message_handler`     Choose_optimal          `_choose_optimal`
     VALUE_Message_handler   `_value_message_handler`
 
-Memory is known before tables are made; in the paper, tables are made at once. Each robot sends its domain to robots
-below (`Domain`). It sends its parent its separator, an upper bound on its costs, and the largest memory need below
-(`Dimensions`). The root ends the run if that is more than `memory`. Otherwise it lets all continue, and each robot
-sends its children the order of their tables' axes (`Proceed`): the nearest robot first, so no table is ever transposed.
-This adds two messages for each robot except the roots, and one for each edge. A robot with one value has no axis.
+Memory needs are known before tables are made; in the paper, tables are made at once. Each robot sends its domain to
+robots below (`Domain`). It sends its parent its separator, an upper bound on its costs, and the largest memory need
+below (`Dimensions`). The root ends the run if that need is more than `memory`. Otherwise it lets all robots continue,
+and each robot sends its children the order of their tables' axes (`Proceed`): the nearest robot first, so no table is
+ever transposed. This adds two messages for each robot except the roots, and one for each edge. A robot with one value
+has no axis.
 
 Choices that the paper leaves open, and differences:
 
 - Costs are minimised; `inf` is a violated hard constraint. A robot whose whole table is `inf` ends the search.
-- A separator contains only robots that share a constraint with the subtree.
+- A separator contains only robots that share a constraint with a robot in the subtree.
 - The join is made block by block and is never in memory as a whole. Besides the table, this robot's cheapest value for
   each cell is stored (one or two bytes), so the children's tables, larger by an axis, can be freed.
-- VALUE contains the places of the values in the child's separator, in that order.
+- VALUE contains the indices of the values in the child's separator, in the order of the separator.
 - A table has as few bytes per cost as it needs, and is sent in pieces of up to 16 MiB. Ties go to the first value.
-- A constraint is checked by the lowest robot of its scope, once for each distinguishable combination, when its table
-  is made. Additions and minimisations do not count as constraint checks.
+- A constraint is checked by the lowest robot in its scope, once for each distinguishable combination, when its table is
+  made. Additions and minimisations do not count as constraint checks.
 - Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
-- The memory limit holds for each robot's arrays. It does not include messages in transit, nor costs that a local
-  problem caches.
+- The memory limit applies to each robot's arrays. It does not include messages in transit, nor costs cached by a local
+  problem.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -104,15 +105,15 @@ Size = Annotated[int, msgspec.Meta(ge=2)]
 
 
 Cost = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
-"""2^53 also represents all larger costs: it ends the run."""
+"""2^53 also represents all larger costs; a run with such costs ends."""
 
 
 MOST_CELLS = 4096
-"""Larger tables have no rule about their proofs: it would take too long."""
+"""Larger tables have no rule about their proofs, because computing the proofs would take too long."""
 
 
 class Need(msgspec.Struct, frozen=True, array_like=True, order=True):
-    """A memory need: the peak number of `bytes` in arrays of `robot`; the nearest float from 2^53 on."""
+    """A memory need: the peak number of `bytes` in the arrays of `robot`; from 2^53 on, the nearest float."""
 
     bytes: int | float
     robot: str
@@ -135,7 +136,7 @@ class Domain(Message, frozen=True):
 class Dimensions(Message, frozen=True):
     """The sender's separator with its domain sizes; `dearest` is an upper bound on the costs in its table.
 
-    `induced_width` is the size of the largest separator in the sender's subtree, `most` the largest memory need there.
+    `induced_width` is the size of the largest separator in the sender's subtree, `most` the largest memory need in it.
     """
 
     separator: dict[str, Size]
@@ -157,7 +158,7 @@ class Dimensions(Message, frozen=True):
 
 
 class Proceed(Message, frozen=True):
-    """Permission to make tables, as the tree's tables fit in memory; with the axes of the receiver's table.
+    """Permission to make tables, because the tables of the tree fit in memory; with the axes of the receiver's table.
 
     The axes are the receiver's separator, the nearest robot first.
     """
@@ -173,9 +174,9 @@ class Proceed(Message, frozen=True):
 
 
 class UTIL(Message, frozen=True):
-    """A piece of the sender's table, in the order of its cells; its first axis is the nearest robot's.
+    """A piece of the sender's table, in the order of its cells; its first axis belongs to the nearest robot.
 
-    `costs` are unsigned integers of `width` bytes, little-endian; the largest number represents `inf`.
+    `costs` are unsigned little-endian integers of `width` bytes; the largest number represents `inf`.
     """
 
     width: Width
@@ -189,8 +190,8 @@ class UTIL(Message, frozen=True):
     def proves(self, reception: Reception) -> Sequence[Proof] | None:
         """Return the bounds on the sender's costs. There is no rule for large tables.
 
-        For each combination of values, some value of the sender costs no more than its cell, as all robots below cost
-        at least 0. If all neighbours of the sender are above it, no robot is below; then no value costs less.
+        For each combination of values, some value of the sender costs no more than its cell, because all robots below
+        cost at least 0. If all neighbours of the sender are above it, no robot is below; then no value costs less.
         """
         axes = axes_of(reception, reception.receiver, reception.sender)
         dimensions = reception.last(Dimensions, reception.sender, reception.receiver)
@@ -204,7 +205,7 @@ class UTIL(Message, frozen=True):
 
 
 class VALUE(Message, frozen=True):
-    """The places of the values of the robots in the receiver's separator, in the order of its axes."""
+    """The values of the robots in the receiver's separator, as indices, in the order of its axes."""
 
     assignment: list[int]
 
@@ -231,7 +232,7 @@ def axes_of(reception: Reception, parent: str, child: str) -> Sequence[str] | No
 
 
 MOST_AXES = 1_000
-"""No table with this many axes fits into memory."""
+"""A table with this many axes never fits into memory."""
 Scope = tuple[str, ...]
 T = TypeVar("T")
 
@@ -243,7 +244,7 @@ class DPOP(TreeProtocol):
 
     - `domains` of the neighbours above, and `dimensions` of the children;
     - `separator`, and `utils`, the children's tables;
-    - `choices`: for each combination of values in the separator this robot's cheapest value;
+    - `choices`: for each combination of values in the separator, this robot's cheapest value;
     - `optimum`: the cost of the whole tree (at its root).
     """
 
@@ -300,7 +301,7 @@ class DPOP(TreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for a root also the optimum of its tree, once it has all tables."""
+        """The position in the tree; for a root also the optimum of its tree, once it has received all tables."""
         return msgspec.structs.replace(super().findings, bound=self.optimum)
 
     # The sizes of tables
@@ -329,14 +330,14 @@ class DPOP(TreeProtocol):
             self._send_dimensions(Dimensions(self._sizes, self._dearest, width, most))
 
     def _width_and_need(self) -> tuple[int, Need]:
-        """Return the induced width and the largest memory need from this robot down."""
+        """Return the induced width and the largest memory need of this robot's subtree."""
         self._need = self._memory_need([scope for scope, _ in self.problem.scopes(self.ancestors)])
         below = [self.dimensions[child] for child in self.children]
         width = max([len(self._sizes), *(one.induced_width for one in below)])
         return width, max([self._need, *(one.most for one in below)])
 
     def _plan(self) -> None:
-        """Prepare the memory needs, after the sizes of the separator are known; here nothing is needed."""
+        """Prepare the memory needs, after the sizes of the separator are known. DPOP itself has nothing to prepare."""
 
     def _send_dimensions(self, dimensions: Dimensions) -> None:
         """Send the parent the dimensions of this robot's table."""
@@ -370,7 +371,7 @@ class DPOP(TreeProtocol):
     def _separator_sizes(self, checked: Sequence[Scope]) -> dict[str, int]:
         """Return the separator, with each robot's domain size.
 
-        The separator contains the ancestors that share a constraint with this robot or one below it.
+        The separator contains the ancestors that share a constraint with this robot or with a robot below it.
         """
         sizes = {name: len(self.domains[name]) for scope in checked for name in scope}
         own = len(self.problem.values)
@@ -398,20 +399,20 @@ class DPOP(TreeProtocol):
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
 
     def _own_sizes(self) -> list[int]:
-        """Return the shape of this robot's table, its axes in any order."""
+        """Return the shape of this robot's table, with its axes in any order."""
         return list(self._sizes.values())
 
     def _child_sizes(self, child: str) -> list[int]:
-        """Return the shape of a child's table, its axes in any order."""
+        """Return the shape of a child's table, with its axes in any order."""
         return list(self.dimensions[child].separator.values())
 
     def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Return the bytes of arrays that are stored longer than a join of `inputs`; here there are none."""
+        """Return the bytes of arrays that are stored longer than a join of `inputs`. DPOP itself has none."""
         del inputs
         return 0
 
     def _proceed(self, separator: Sequence[str]) -> None:
-        """Make the tables of this robot's constraints, after the children were allowed to make theirs."""
+        """Make the tables of this robot's constraints, after the children have been allowed to make theirs."""
         self._check_axes(separator, expected=self.separator is None)
         self.separator = tuple(separator)
         for child in self.children:
@@ -419,7 +420,7 @@ class DPOP(TreeProtocol):
         self._start_utils()
 
     def _check_axes(self, separator: Sequence[str], *, expected: bool) -> None:
-        """Raise `ValueError` unless the axes are `expected` now, those of the separator, and tables fit in memory."""
+        """Raise `ValueError` unless axes are `expected` now, match the separator, and tables fit in memory."""
         if sorted(separator) != sorted(self._sizes) or not expected:
             own = ", ".join(self._sizes)
             raise ValueError(f"{self.problem.agent} received unexpected axes {list(separator)}; its separator is {own}")
@@ -443,7 +444,7 @@ class DPOP(TreeProtocol):
     # UTIL, from the leaves up
 
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
-        """Store a piece of the child's table; compute this robot's table when all children's are complete."""
+        """Store a piece of the child's table; compute this robot's table when all children's tables are complete."""
         if child not in self._axes:
             raise ValueError(f"{child} was not asked for a table")
         if child not in self.utils:
@@ -457,11 +458,11 @@ class DPOP(TreeProtocol):
 
     @property
     def _all_arrived(self) -> bool:
-        """Whether the children's tables of costs are complete."""
+        """Whether all children's tables of costs are complete."""
         return len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values())
 
     def _table_axes(self, child: str) -> Sequence[str]:
-        """Return the robots of the axes of a child's table."""
+        """Return the robots that the axes of a child's table belong to."""
         return self._axes[child]
 
     def _compute_utils_of_all(self) -> None:
@@ -483,10 +484,10 @@ class DPOP(TreeProtocol):
         self._send_or_choose(costs)
 
     def _process_joined(self, costs: Codes) -> None:
-        """Compute further results of the joined tables, besides the least `costs`; here there are none."""
+        """Compute further results from the joined tables, besides the least `costs`. DPOP itself has none."""
 
     def _send_or_choose(self, costs: Codes) -> None:
-        """Send the table to the parent; a root chooses, and a table without a finite cost ends the search."""
+        """Send the table to the parent; a root chooses its value, and a table without a finite cost ends the search."""
         if are_all_infinite(costs):
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is None:
@@ -523,7 +524,7 @@ class DPOP(TreeProtocol):
             self.send(child, VALUE([agent_view[name] for name in self._axes[child]]))
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of this robot's cheapest value for these values of the separator."""
+        """Return the index of this robot's cheapest value for these values in the separator."""
         return int(choices[tuple(assignment)])
 
 

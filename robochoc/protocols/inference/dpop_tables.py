@@ -1,6 +1,6 @@
-"""Tables of costs as DPOP joins, projects, stores and sends them (see `dpop`).
+"""Tables of costs in DPOP: how they are joined, projected, stored and sent (see `dpop`).
 
-An axis belongs to a robot, a place on it to one of the robot's values. Costs are integers, or `inf` if a hard
+An axis belongs to a robot, an index on it to one of the robot's values. Costs are integers, or `inf` if a hard
 constraint is broken; they are added up in float64, which is exact below 2^53. Stored and sent tables contain unsigned
 integers, as narrow as the costs allow; the largest number represents `inf`. The memory that an operation needs is known
 before: `bytes_of`.
@@ -22,16 +22,16 @@ Array = NDArray[np.float64]
 Codes = NDArray[np.unsignedinteger[Any]]
 Table = Array | Codes
 Width = Literal[1, 2, 4, 8]
-"""The bytes of a cost."""
+"""The number of bytes of one cost."""
 
 BLOCK = 1 << 17
-"""The cells of a join that are made at a time: few enough for the processor's cache."""
+"""The number of cells of a join that are made at a time, small enough for the processor's cache."""
 TEMPORARY = 32
 """The most bytes for each of these: sums, a table's costs as they are added, and the search for the minimum."""
 LONGEST = 16
 """The number of blocks that may form one block if a single axis needs it."""
 PIECE = 1 << 24
-"""The most bytes of a table in one message, 16 MiB: a quarter of the capacity of a queue."""
+"""The maximum number of bytes of a table in one message, 16 MiB: a quarter of the capacity of a queue."""
 _WIDTHS: tuple[Width, ...] = (1, 2, 4, 8)
 
 
@@ -43,24 +43,24 @@ class Projection(NamedTuple):
 
 
 class Extent(NamedTuple):
-    """The size of a table: its number of cells, and `width`, the bytes of a cost."""
+    """The size of a table: its number of cells, and `width`, the number of bytes of a cost."""
 
     cells: int
     width: int
 
 
 def width_of(dearest: int) -> Width:
-    """Return the bytes of a cost in a table whose largest finite cost is `dearest`."""
+    """Return the number of bytes for each cost in a table whose largest finite cost is `dearest`."""
     return next(width for width in _WIDTHS if dearest < _top(width))
 
 
 def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent]) -> int:
-    """Return the peak size of all arrays while a table is made and sent. It allocates nothing.
+    """Return the peak size of all arrays while a table is made and sent, without allocating anything.
 
     Args:
         shape: The table's shape.
         own: The number of this robot's values.
-        width: The bytes of a cost in it.
+        width: The number of bytes of each cost in the table.
         inputs: The tables that are joined.
     """
     cells = math.prod(shape)
@@ -71,9 +71,9 @@ def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent
 
 
 def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
-    """Return a view of `table` with an axis for each robot in `onto`; of length 1 if the table has no such axis.
+    """Return a view of `table` with an axis for each robot in `onto`, of length 1 if the table has no such axis.
 
-    `axes` are the robots of the table's axes; those that are not in `onto` have a single value.
+    `axes` are the robots of the table's axes; robots that are not in `onto` have a single value.
     """
     kept = [name for name in axes if name in onto]
     table = table[tuple([slice(None) if name in onto else 0 for name in axes])]
@@ -103,7 +103,7 @@ def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Tab
 
 
 def place_type(sizes: Iterable[int]) -> np.dtype[np.unsignedinteger[Any]]:
-    """Return the narrowest type, little-endian, for places of values of robots with these numbers of values."""
+    """Return the narrowest little-endian type for indices of values of robots with these numbers of values."""
     return np.min_scalar_type(max(sizes) - 1).newbyteorder("<")
 
 
@@ -113,7 +113,7 @@ def are_all_infinite(costs: Codes) -> bool:
 
 
 def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
-    """Yield `costs` in pieces for the wire, with as few bytes per cost as the largest one needs."""
+    """Yield `costs` in pieces for messages, with as few bytes per cost as the largest cost needs."""
     width = width_of(_max_finite(costs))
     flat = costs.reshape(-1)
     step = PIECE // width
@@ -125,7 +125,7 @@ def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
 class IncomingTable:
     """A table of this `shape` that arrives in pieces; `dearest` is an upper bound on its finite costs.
 
-    Memory is allocated with the first piece; check `bytes_of` before.
+    Memory is allocated when the first piece arrives; check `bytes_of` before that.
     """
 
     def __init__(self, shape: Sequence[int], dearest: int) -> None:
@@ -141,13 +141,13 @@ class IncomingTable:
 
     @property
     def costs(self) -> Codes:
-        """The costs that have arrived. Raises `ValueError` before the first piece."""
+        """The costs that have arrived so far. Raises `ValueError` before the first piece."""
         if self._costs is None:
             raise ValueError("no piece of the table has arrived")
         return self._costs
 
     def add(self, width: Width, piece: bytes) -> None:
-        """Append the next piece. Raises `ValueError` for bytes that do not fit."""
+        """Append the next piece. Raises `ValueError` if the bytes do not fit."""
         if width > width_of(self._dearest) or (self._costs is not None and width != self._costs.itemsize):
             raise ValueError(f"a piece of the table has {width} bytes a cost, not as many as the other pieces")
         if len(piece) % width or not 0 < len(piece) // width <= self._left:
@@ -164,7 +164,7 @@ class IncomingTable:
 
 
 def _block(table: Table, place: Sequence[int]) -> Array:
-    """Return the block of `table` at this place on the first axes after this robot's, as floats."""
+    """Return the block of `table` at these indices on the first axes after this robot's, as floats."""
     steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
     index: tuple[slice | int, ...] = (slice(None), *steps)
     block = table[index]
@@ -197,7 +197,7 @@ def _max_finite(costs: Codes) -> int:
 
 
 def _stepped(shape: Sequence[int], own: int) -> int:
-    """Return the number of leading axes to iterate over, so that the remaining ones form a block."""
+    """Return the number of leading axes to iterate over, so that the remaining axes form a block."""
     split, cells, most = len(shape), own, BLOCK * LONGEST
     while split and cells * shape[split - 1] <= most:
         split -= 1

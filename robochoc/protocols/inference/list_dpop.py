@@ -1,16 +1,16 @@
 """Listing DPOP: DPOP that also lists the optima.
 
-DPOP (see `dpop.py`) whose robots store their tables, those of costs and those of numbers (see `count_dpop.py`), until
-values go down. The numbers give each optimum of a tree a number. For several optima at once, the root sends its values,
-and the number that the subtree of each child has in each. So does each robot. Without costs, the optima are all
-solutions.
+DPOP (see `dpop.py`) whose robots store their tables of costs and their tables of numbers (see `count_dpop.py`) until
+values are sent down. The numbers give each optimum of a tree a number. For several optima at once, the root sends its
+values and, for each optimum, its number in the subtree of each child. So does each robot below. Without costs, the
+optima are all solutions.
 
-- **When to use**: to list the optima, or solutions, on a pseudo-tree with a small induced width. The result has them as
-  `optima`, each of them checked, with their total number.
-- **Guarantees**: complete; it terminates with all optima, or with `limit` different ones if there are more, or with a
+- **When to use**: to list the optima, or solutions, on a pseudo-tree with a small induced width. The result contains
+  them as `optima`, all of them checked, with their total number.
+- **Guarantees**: complete; it terminates with all optima, or with `limit` different optima if there are more, or with a
   proof that there is no solution.
-- **Parameters (`--set`)**: `limit`, the most optima that are listed (default 100, at most 10,000); `memory`, the most
-  bytes of a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `limit`, the maximum number of optima that are listed (default 100, at most 10,000);
+  `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005 (DPOP). The
   numbers are those of `count_dpop.py`.
 
@@ -23,12 +23,13 @@ The additions to counting DPOP are these methods:
 Choices:
 
 - There is one message for each edge of the tree, whatever the number of optima. A robot learns, for each listed
-  optimum, the values of its separator and its own, and the number of this optimum in its subtree.
-- In the first optimum, each robot has the first value that is possible with the values above it. The team adopts it.
-- Optima differ if robots see different values of each other. Of local solutions of a robot that look alike, as all
-  those of a robot without neighbours do, the first is listed, and they count as one here; `count-dpop` counts them all.
-- Unconnected parts have a root each, which lists the optima of its tree. The run combines them.
-- The list is checked with the files; if these are on several machines, there is none.
+  optimum, the values in its separator, its own value, and the number of this optimum in its subtree.
+- In the first optimum, each robot has the first value that is possible with the values above it. The team adopts this
+  optimum.
+- Optima differ if robots see different values of each other. If local solutions of a robot look alike, as all those of
+  a robot without neighbours do, the first one is listed, and they count as one here; `count-dpop` counts them all.
+- Unconnected parts have a root each, which lists the optima of its tree. The run combines the lists.
+- The list is checked against the files; if the files are on several machines, it is not checked.
 
 >>> from robochoc.generators.random_csp import random_csp
 >>> from robochoc.run import Options, Runtime, solve
@@ -85,10 +86,10 @@ Number = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]+\Z", max_length=MOST_BI
 
 
 class ListedValues(Message, frozen=True):
-    """For each listed optimum, the values of DPOP's VALUE, and the number of the receiver's part in it.
+    """For each listed optimum, the values in DPOP's VALUE, and the number of the receiver's part in this optimum.
 
-    `assignments` are the places of the values of the robots in the receiver's separator. `numbers` count, from 0 on,
-    the cheapest assignments of its subtree under these values.
+    `assignments` are the values of the robots in the receiver's separator, as indices. `numbers` count, from 0, the
+    cheapest assignments of its subtree under these values.
     """
 
     assignments: list[list[int]]
@@ -114,10 +115,10 @@ class StoredTables(NamedTuple):
 class ListDPOP(CountDPOP):
     """One agent of listing DPOP.
 
-    State besides counting DPOP's, whose numbers count assignments that look different:
+    State besides that of counting DPOP, whose numbers here count assignments that look different:
 
     - `kept`: the tables, until values have arrived;
-    - `listed`: the place of this robot's value in each listed optimum.
+    - `listed`: the index of this robot's value in each listed optimum.
     """
 
     messages = TreeMessage | Domain | CountDimensions | Proceed | UTIL | Counts | ListedValues
@@ -150,14 +151,14 @@ class ListDPOP(CountDPOP):
 
     @property
     def findings(self) -> Findings:
-        """DPOP's findings and the list; for a root also the number of its tree's optima."""
+        """The findings of DPOP and the list; for a root also the number of optima of its tree."""
         listing = None if self.listed is None else Listing(self.listed, self.settings.limit)
         return msgspec.structs.replace(super().findings, listing=listing)
 
     # Counting, and stored tables
 
     def _plan(self) -> None:
-        """Compute the bits of this robot's numbers."""
+        """Compute the number of bits needed for this robot's numbers."""
         own = len(self.problem.values).bit_length()
         self.bits = min(own + sum(self.bits_below.values()), MOST_BITS)
 
@@ -166,7 +167,7 @@ class ListDPOP(CountDPOP):
         return numbers_of([1] * len(self.problem.values), self.bits)
 
     def _additional_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Return the bytes for counting, and those of all tables, which are stored."""
+        """Return the bytes for counting, and the bytes of all tables, which are stored."""
         cells = math.prod(self._own_sizes())
         own = cells * (width_of(self._dearest) + bytes_of_numbers(1, self.bits))
         below = sum(bytes_of_numbers(math.prod(self._child_sizes(child)), self.bits) for child in self.children)
@@ -189,7 +190,7 @@ class ListDPOP(CountDPOP):
         self._list([assignment] * number, range(number))
 
     def _values_handler(self, assignments: Sequence[Sequence[int]], numbers: Sequence[str]) -> None:
-        """Process the values above. Raises `ValueError` if they are invalid, or unexpected."""
+        """Process the values above. Raises `ValueError` if they are invalid or unexpected."""
         shape = [self._sizes[name] for name in self.separator or ()]
         if not 0 < len(assignments) == len(numbers) <= self.settings.limit:
             found = f"{len(assignments):,} combinations of values, {len(numbers):,} numbers"
@@ -202,7 +203,7 @@ class ListDPOP(CountDPOP):
         self._list(assignments, [int(number, 16) for number in numbers])
 
     def _list(self, assignments: Sequence[Sequence[int]], numbers: Sequence[int]) -> None:
-        """Choose this robot's values of the listed optima, and send the children their parts."""
+        """Choose this robot's values in the listed optima, and send the children their parts."""
         if self.kept is None:
             raise ValueError(f"{self.problem.agent} already has values, or has no table yet")
         picked = [self._pick(self.kept, one, number) for one, number in zip(assignments, numbers, strict=True)]
@@ -234,7 +235,7 @@ class ListDPOP(CountDPOP):
 
 
 def _digits(number: int, bases: dict[str, int]) -> dict[str, int]:
-    """Return the digits of `number`, one for each base, the last one the least significant."""
+    """Return the digits of `number`, one for each base, the least significant digit last."""
     digits = dict[str, int]()
     for name in reversed(bases):
         number, digits[name] = divmod(number, bases[name])

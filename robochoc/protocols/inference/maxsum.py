@@ -16,7 +16,7 @@ each value by all other functions. A robot chooses the value with the lowest sum
   the max-sum algorithm", AAMAS 2008, Section 4; for damping and splitting: Cohen, Galiki, Zivan: "Governing convergence
   of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
 
-The methods have the names of the first paper's equations:
+The methods correspond to the first paper's equations:
 
     Q, from variable to function (1)   `_q`
     R, from function to variable (2)   `Factor.r`
@@ -24,27 +24,27 @@ The methods have the names of the first paper's equations:
     preferences gamma                  `preferred`
     split constraint factor graph      `_split`
 
-A function is held by the lowest-priority robot of its scope, the only one that knows the constraint. Messages between
-nodes of the same robot are not sent. In a cycle all functions send R, then all variables send Q. All messages between
-two robots in a phase are one message, with a row for each function that contains both. First, robots send their domains
-to the holders of their functions.
+The lowest-priority robot in the scope of a function holds it, because only this robot knows the constraint. Messages
+between nodes of the same robot are not sent. In a cycle all functions send R, then all variables send Q. All messages
+between two robots in a phase form one message, with a row for each function that contains both. At the start, robots
+send their domains to the holders of their functions.
 
-Ties: if values are interchangeable, such as colours, all their costs would stay equal. So each value of each robot has
+Ties: if values are interchangeable, such as colours, all their costs would stay equal. So each value of each robot gets
 a small random charge, its preference (the paper's gamma).
 
 With `split`, each function becomes two: the first has a share of each entry, drawn from `split` to 1 - `split`, and the
-other the rest. 0.5 makes equal halves; below it they differ a little. Both are nodes of the graph, so a robot's Q to
-one of them contains the other's R. That works like damping: the search settles sooner. The halves form a cycle, so on a
-tree the result is no longer sure to be optimal.
+second has the rest. 0.5 makes equal halves; below 0.5 they differ a little. Both are nodes in the graph, so a robot's Q
+to one of them contains the other's R. That works like damping: the search settles sooner. The halves form a cycle, so
+on a tree the result is no longer sure to be optimal.
 
 Choices that the paper leaves open, and differences:
 
 - Q is damped.
-- Q is normalised to a minimum of 0 (in the paper: to a sum of 0), as entries may be infinite: a value that always
+- Q is normalised to a minimum of 0 (in the paper: to a sum of 0), because entries may be infinite: a value that always
   violates a hard constraint costs `inf`. Nothing is subtracted from `inf`, so such a value remains excluded.
 - Constraints may be n-ary, up to a maximum size of their tables.
-- For lost messages, the last R and Q are used. If a domain is lost, its functions are left out; instead of R their
-  holder sends its own domain, to request the other one again.
+- If messages are lost, the last R and Q are used. If a domain is lost, its functions are left out; instead of R their
+  holder sends its own domain, to request the missing domain again.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -73,7 +73,7 @@ from robochoc.protocols.wording import Wording, costs_text
 from robochoc.solver.local_problem import LocalProblem
 
 MAX_SPLIT = 0.5
-"""With this share both halves of a function are equal."""
+"""With this share, both halves of a function are equal."""
 
 
 class MaxSumSettings(CycleSettings, frozen=True):
@@ -97,7 +97,7 @@ class MaxSumSettings(CycleSettings, frozen=True):
 
 
 class R(wire.Message, frozen=True):
-    """Messages from functions to a variable, a row for each of the sender's functions that includes the receiver.
+    """Messages from functions to a variable, with a row for each of the sender's functions that includes the receiver.
 
     A row contains the minimum cost of the function for each of the receiver's values.
     """
@@ -115,9 +115,9 @@ class R(wire.Message, frozen=True):
 
 
 class Q(wire.Message, frozen=True):
-    """Messages from a variable to functions, a row for each of the receiver's functions, in the order of R.
+    """Messages from a variable to functions, with a row for each of the receiver's functions, in the order of R.
 
-    A row contains the cost of each of the sender's values by all its other functions.
+    A row contains the cost of each of the sender's values in all its other functions.
     """
 
     rows: list[Row]
@@ -137,10 +137,10 @@ def _rows_in_words(rows: Sequence[Row]) -> str:
 
 
 class FactorGraphProtocol(CycleProtocol):
-    """The common base of Max-Sum and Max-Sum_AD: a variable, and the functions of which this robot is the lowest.
+    """The common base of Max-Sum and Max-Sum_AD: a variable, and the functions whose lowest robot is this one.
 
     Robots in `above` receive R from this robot and send Q to it; robots in `below` send R and receive Q. `preferred`
-    are the private costs of the values, with their preferences.
+    are the private costs of the values, including their preferences.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -166,8 +166,8 @@ class FactorGraphProtocol(CycleProtocol):
 class MaxSum(FactorGraphProtocol):
     """One agent of Max-Sum.
 
-    `factors` are its functions. `edges` contains the last Q to each function: its own ones first, then those of each
-    robot below.
+    `factors` are its functions. `edges` contains the last Q to each function: first to its own functions, then to those
+    of each robot below.
     """
 
     messages = Domain | R | Q | AnytimeMessage
@@ -190,9 +190,9 @@ class MaxSum(FactorGraphProtocol):
         self.edges: list[Row] = []
         self._own: list[Row] = []
         self._last_q: dict[str, Sequence[Row]] = {}
-        """The last Q of each robot above."""
+        """The last Q from each robot above."""
         self._last_r: dict[str, Sequence[Row]] = {}
-        """The last R of each robot below that has sent one."""
+        """The last R from each robot below that has sent one."""
         self._made = False
         self._shape: list[tuple[str, int]] = []
         """The number of `edges` of each robot."""
@@ -205,7 +205,7 @@ class MaxSum(FactorGraphProtocol):
         self._send_r()
 
     def _make_functions(self) -> None:
-        """Make the functions of robots whose domains are known. All Q are 0 at first."""
+        """Create the functions whose robots' domains are known. All Q are 0 at first."""
         domains = self._domains
         self._made = True
         self._shape = []
@@ -228,7 +228,7 @@ class MaxSum(FactorGraphProtocol):
         return halves
 
     def _receive_q(self, messages: Mapping[str, wire.Message]) -> None:
-        """Process all Q of the cycle."""
+        """Process all Q received in the cycle."""
         for name, message in messages.items():
             self._record(name, message)
         self._send_r()
@@ -238,7 +238,7 @@ class MaxSum(FactorGraphProtocol):
         self._record(sender, message)
 
     def _record(self, name: str, message: wire.Message) -> None:
-        """Store the last R, Q or domain of a robot; ignore Q of functions that have changed since."""
+        """Store the last R, Q or domain from a robot; ignore Q for functions that have changed since."""
         if isinstance(message, R):
             self._last_r[name] = message.rows
         elif isinstance(message, Domain) and name in self.above:
@@ -269,7 +269,7 @@ class MaxSum(FactorGraphProtocol):
         self.listen(self.below, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
-        """Choose the value with the lowest cost by all R, and send Q."""
+        """Choose the value with the lowest cost in all R, and send Q."""
         for name, message in messages.items():
             self._record(name, message)
         received = {name: self._last_r[name] for name in self.below if name in self._last_r}

@@ -1,8 +1,8 @@
 """Max-Sum with alternating directions (Max-Sum_AD, ADVP, ADSSVP).
 
-Max-Sum on a graph whose edges all have one direction for a phase, and the other one in the next. A phase's graph has no
-cycles, so its messages settle. From the third phase on, robots may also send their values instead of the costs of all
-values (value propagation): then the others answer an actual value, and the search settles permanently.
+Max-Sum on a graph whose edges all have one direction in one phase, and the other direction in the next. The graph of a
+phase has no cycles, so its messages settle. From the third phase on, robots may also send their values instead of the
+costs of all values (value propagation): then the others respond to an actual value, and the search settles permanently.
 
 - **When to use**: costs, and a graph with many cycles, on which Max-Sum does not settle.
 - **Guarantees**: incomplete; it stops after `cycles` phases. AD is optimal on a graph without cycles after one phase
@@ -24,15 +24,16 @@ robots send Q to the functions of those below. The last messages of the other di
 Choices that the papers leave open, and differences:
 
 - In the paper a phase has as many rounds as the longest path has nodes, and each round has a message on each edge. Here
-  a robot waits for all robots above it (or below), and sends its messages once. They are those of the last round, with
-  one message for each pair of neighbours and phase.
-- The first phase goes up, as only holders know how many functions there are.
+  a robot waits for all robots above it (or below it), and sends its messages once. These are the messages of the last
+  round, with one message for each pair of neighbours and phase.
+- The first phase goes up, because only holders know how many functions there are.
 - A value counts as a Q that excludes all other values, so the same rule computes R from both.
-- If all values cost `inf` by received values, a robot chooses the one that violates the fewest functions. Its Q is then
-  all 0.
-- For lost messages, the last R and Q are used. A robot without R from a robot below sends its domain again, and a
+- If all values cost `inf` because of received values, a robot chooses the value that violates the fewest functions. Its
+  Q is then all 0.
+- If messages are lost, the last R and Q are used. A robot without R from a robot below sends its domain again, and a
   function with unknown domains is left out; its holder requests the domain. Then the cost may rise.
-- With constraints of three or more robots, a robot may answer values of the previous phase. Then ADVP need not settle.
+- With constraints between three or more robots, a robot may respond to values from the previous phase. Then ADVP need
+  not settle.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -72,7 +73,7 @@ class MaxSumADSettings(CycleSettings, frozen=True):
 
 
 FIRST_WITH_VALUES = 3
-"""The first phase in which values may be sent, after both directions."""
+"""The first phase in which values may be sent: both directions have been used before it."""
 PERIOD = 3
 """ADSSVP sends no values in every third phase."""
 
@@ -80,8 +81,8 @@ PERIOD = 3
 class MaxSumAD(FactorGraphProtocol):
     """One agent of Max-Sum_AD. A cycle is a phase.
 
-    `functions` are this robot's, with the last Q from above. `from_below` contains the last R from each robot below,
-    `own` those of this robot's functions.
+    `functions` are this robot's functions, with the last Q from above. `from_below` contains the last R from each robot
+    below, `own` the last R from this robot's functions.
     """
 
     messages = Domain | R | Q | Value | AnytimeMessage
@@ -114,7 +115,7 @@ class MaxSumAD(FactorGraphProtocol):
         self.listen(self.below, self._phase_up)
 
     def _make_functions(self) -> None:
-        """Make the functions of robots whose domains are known."""
+        """Create the functions whose robots' domains are known."""
         self.functions = Functions(self.problem.tables(self._domains), self._domains)
         self._nothing = [[0.0] * len(self.preferred) for _ in self.functions.factors]
         self.own = self._nothing
@@ -162,7 +163,7 @@ class MaxSumAD(FactorGraphProtocol):
     def _record(self, name: str, message: wire.Message) -> None:
         """Store a message. A value excludes all others; a domain shows that its sender lacks this robot's domain.
 
-        R and Q of functions that have changed since, because a domain came late, have another number of rows.
+        R and Q for functions that have changed since, because a domain arrived late, have another number of rows.
         """
         if isinstance(message, R) and name in self.below:
             self.from_below[name] = checked(message.rows, len(message.rows), len(self.preferred))
@@ -190,7 +191,7 @@ class MaxSumAD(FactorGraphProtocol):
 
     @property
     def _rows(self) -> list[Row]:
-        """All R: of this robot's functions, then of those of each robot below."""
+        """All R: from this robot's functions, then from the functions of each robot below."""
         return [*self.own, *(row for rows in self.from_below.values() for row in rows)]
 
     def _choose(self) -> bool:

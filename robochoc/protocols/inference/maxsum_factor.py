@@ -17,19 +17,19 @@ Row = list[float]
 """An entry for each value of a robot."""
 
 SMALL = 400
-"""Up to this number of entries a table over two robots is faster as lists than in numpy."""
+"""Up to this number of entries, a table over two robots is processed faster as lists than in numpy."""
 
 MOST = 2.0**512
 """The highest finite entry of Q.
 
-In a graph with cycles hard constraints can make entries grow in each cycle by the number of a robot's functions. An
-entry that overflowed would count as a forbidden value, and prove something false. Sums of as many entries as a robot
+In a graph with cycles, hard constraints can make entries grow in each cycle by the number of a robot's functions. An
+entry that overflowed would count as a forbidden value, and lead to a false proof. Sums of as many entries as a robot
 can have remain finite.
 """
 
 
 class Factor:
-    """A function node: the sum of all constraints over the same robots (`agents` and the one that holds it)."""
+    """A function node: the sum of all constraints over the same robots (`agents` and the robot that holds it)."""
 
     def __init__(self, agents: Sequence[str], charges: Array) -> None:
         self.agents = agents
@@ -39,7 +39,7 @@ class Factor:
 
     @classmethod
     def joined(cls, tables: Iterable[CostTable]) -> list[Self]:
-        """Return one function for each set of robots in `tables`; tables of a single robot are left out."""
+        """Return one function for each set of robots in `tables`; tables over a single robot are left out."""
         sums: dict[tuple[str, ...], Array] = {}
         for table in tables:
             if table.agents:
@@ -50,12 +50,12 @@ class Factor:
     def split(self, shares: Array) -> tuple[Factor, Factor]:
         """Return two functions whose sum is this one: of each entry its share, between 0 and 1, and the rest.
 
-        Forbidden combinations are forbidden in both.
+        Forbidden combinations are forbidden in both functions.
         """
         return Factor(self.agents, self.charges * shares), Factor(self.agents, self.charges * (1 - shares))
 
     def r(self, q: Sequence[Row]) -> list[Row]:
-        """Return the minimum cost of each robot's values, given the others' Q; in the order of the axes."""
+        """Return the minimum cost of each robot's values, given the Q of the others, in the order of the axes."""
         if self._lines:
             (other, own), (lines, columns) = q, self._lines
             return [[min(map(add, line, own)) for line in lines], [min(map(add, line, other)) for line in columns]]
@@ -101,7 +101,7 @@ def from_zero(row: Row) -> Row:
 
 
 def cheapest(row: Row) -> int:
-    """Return the place of the minimum, the first of several."""
+    """Return the index of the minimum; if there are several, the first."""
     return row.index(min(row))
 
 
@@ -120,7 +120,7 @@ class Functions:
         self._sizes = {name: len(values) for name, values in domains.items()}
 
     def receive_q(self, name: str, rows: list[Row]) -> None:
-        """Store Q of a robot above. Raises `ValueError` for rows of another number or size."""
+        """Store Q from a robot above. Raises `ValueError` if the number or size of the rows is wrong."""
         self.q[name] = checked(rows, len(self.q[name]), self._sizes[name])
 
     def answers(self, own: Sequence[Row]) -> tuple[list[Row], dict[str, list[Row]]]:
@@ -137,7 +137,7 @@ class Functions:
 
 
 def checked(rows: list[Row], many: int, size: int) -> list[Row]:
-    """Return `rows`. Raises `ValueError` if they are not `many`, or not all of `size` entries."""
+    """Return `rows`. Raises `ValueError` unless there are `many` rows, all with `size` entries."""
     if len(rows) != many or any(len(row) != size for row in rows):
         raise ValueError(f"the message must have {many:,} rows of {size:,} entries")
     return rows

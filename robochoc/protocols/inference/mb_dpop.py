@@ -4,35 +4,37 @@ DPOP (see `dpop.py`) whose tables have at most `k` dimensions. If a robot's sepa
 fixed: the *cycle-cut* robots. Their values are enumerated by a *cluster root*, which sends them down (`Context`) and
 receives a table for each combination. So memory is bounded, and more messages are needed.
 
-- **When to use**: costs, on a pseudo-tree too wide for `dpop`. With a `k` of the induced width or more it is DPOP.
+- **When to use**: costs, on a pseudo-tree too wide for `dpop`. If `k` is at least the induced width, it is the same as
+  DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
   sent has more than `k` dimensions. The number of messages is exponential in the cycle-cut robots of a cluster.
-- **Parameters (`--set`)**: `k`, the most dimensions of a table (default 4); `memory` as in DPOP.
+- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` as in DPOP.
 - **Reference**: Petcu, Faltings: "MB-DPOP: a new memory-bounded algorithm for distributed optimization", IJCAI 2007,
   Algorithms 1 (labeling) and 2 (memory-bounded inference).
 
-Its procedures are these methods:
+The paper's procedures are these methods:
 
     labeling, bottom up     `_plan`, `_send_dimensions`    UTIL of a context   `_compute_utils`
     cluster root            `_next_context`                best context        `_choose_optimal`
 
-The rules of labeling, leaves first. A robot's list contains the cycle-cut robots of its cluster, also those below it:
+The rules of labelling, leaves first. A robot's list contains the cycle-cut robots of its cluster, including those below
+it:
 
-- A robot inherits the lists of its children. It is a cluster root if these are not empty, none of their robots is in
-  its separator, and this has at most `k` robots. Then it enumerates them (it is one of them), and has no list.
-- Otherwise it adds robots of its separator to the list, until at most `k` of the others are left.
+- A robot inherits the lists of its children. It is a cluster root if these lists are not empty, none of their robots is
+  in its separator, and its separator has at most `k` robots. Then it enumerates them (it is one of them itself), and
+  has no list.
+- Otherwise it adds robots in its separator to the list, until at most `k` of the others are left.
 
 Choices that the paper leaves open, and differences:
 
-- The robots highest in the tree are added to a list first. Therefore `DomainAtDepth`, DPOP's `Domain`, has the
-  sender's depth.
-- Sizes, limits and the permission to proceed are DPOP's, so that nothing is computed before all tables are known to
-  fit.
-- A context goes only to those children whose tables depend on it, as places of the values in the order of the child's
-  list. Tables of other children are requested once.
-- Once a cluster root has its values, it sends the best context down again, and waits for the tables: then all robots
-  of the cluster have their choices for it, and VALUE continues as in DPOP.
-- The tables of a robot's constraints are made once, and are as large as the constraints are.
+- The robots that are highest in the tree are added to a list first. Therefore `DomainAtDepth`, which replaces DPOP's
+  `Domain`, contains the sender's depth.
+- Sizes, limits and the permission to proceed are as in DPOP, so nothing is computed before all tables are known to fit.
+- A context is sent only to children whose tables depend on it, as indices of the values in the order of the child's
+  list. Tables from other children are requested once.
+- Once a cluster root has its values, it sends the best context down again, and waits for the tables: then all robots in
+  the cluster have their choices for it, and VALUE continues as in DPOP.
+- The tables of a robot's constraints are made once, and are as large as the constraints.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -88,7 +90,7 @@ from robochoc.system.plain_text import counted, listed
 
 
 class MBDPOPSettings(DPOPSettings, frozen=True):
-    """`k`: the most dimensions of a table. `memory`: the most bytes of a robot's tables."""
+    """`k`: the maximum number of dimensions of a table. `memory`: the maximum number of bytes in a robot's tables."""
 
     k: int = 4
 
@@ -117,7 +119,7 @@ class DomainAtDepth(Message, frozen=True):
 
 
 class SeparatorAxis(msgspec.Struct, frozen=True, array_like=True):
-    """A robot of a separator: the size of its domain, and its depth in the tree."""
+    """A robot in a separator: the size of its domain, and its depth in the tree."""
 
     size: Size
     depth: Depth
@@ -126,8 +128,8 @@ class SeparatorAxis(msgspec.Struct, frozen=True, array_like=True):
 class Label(Message, frozen=True):
     """The sender's label: its separator, and its list of cycle-cut robots with the sizes of their domains.
 
-    While these have fixed values, the sender's table has axes for the rest of the separator only. `dearest`,
-    `induced_width` and `most` are those of DPOP's `Dimensions`.
+    While these robots have fixed values, the sender's table has axes only for the rest of the separator. `dearest`,
+    `induced_width` and `most` are as in DPOP's `Dimensions`.
     """
 
     separator: dict[str, SeparatorAxis]
@@ -150,7 +152,7 @@ class Label(Message, frozen=True):
 
 
 class Context(Message, frozen=True):
-    """Fixed values, as places, for the robots of the receiver's list of cycle-cut robots, in that order."""
+    """Fixed values, as indices, for the cycle-cut robots in the receiver's list, in the order of the list."""
 
     values: list[int]
 
@@ -168,12 +170,12 @@ Sizes = dict[str, int]
 class MBDPOP(DPOP):
     """One agent of MB-DPOP.
 
-    State besides DPOP's:
+    State besides that of DPOP:
 
     - `depth`, and the `depths` of robots above;
     - `cuts`: the children's lists of cycle-cut robots, with the sizes of their domains;
     - `cut`: this robot's list; `enumerated`: the robots that a cluster root enumerates;
-    - `context`: the present values, as places, of the robots of these lists.
+    - `context`: the current values, as indices, of the robots in these lists.
     """
 
     messages = TreeMessage | DomainAtDepth | Label | Proceed | Context | UTIL | VALUE
@@ -235,7 +237,7 @@ class MBDPOP(DPOP):
     # Labels, from the leaves up
 
     def _store_label(self, child: str, label: Label) -> None:
-        """Store a child's label. Raises `ValueError` if its table would have more than `k` dimensions."""
+        """Store a child's label. Raises `ValueError` if the child's table would have more than `k` dimensions."""
         free = [name for name in label.separator if name not in label.cut]
         if len(free) > self.settings.k or len(label.cut) > MOST_AXES:
             raise ValueError(f"{child} announced a table of {len(free)} dimensions, more than {self.settings.k}")
@@ -281,15 +283,15 @@ class MBDPOP(DPOP):
             stored += math.prod(self._own_sizes()) * (width_of(self._dearest) + places)
         return stored
 
-    # Tables of a context
+    # Tables in a context
 
     def _table_axes(self, child: str) -> Sequence[str]:
-        """Return the robots of a child's table that are not fixed for it."""
+        """Return the robots in a child's table that are not fixed for it."""
         return [name for name in self._axes[child] if name not in self.cuts[child]]
 
     @property
     def _free(self) -> tuple[str, ...]:
-        """The robots of the axes of this robot's table."""
+        """The robots that the axes of this robot's table belong to."""
         return tuple(name for name in self.separator or () if name not in self.cut)
 
     def _start_utils(self) -> None:
@@ -332,7 +334,7 @@ class MBDPOP(DPOP):
                 self.send(child, Context([context[name] for name in self.cuts[child]]))
 
     def _compute_if_complete(self) -> None:
-        """Compute if there is a context and all tables have arrived."""
+        """Compute if there is a context and all tables for it have arrived."""
         if self.context is not None and self.choices is None and self._all_arrived:
             self._compute_utils()
 
@@ -340,7 +342,7 @@ class MBDPOP(DPOP):
         self._compute_if_complete()
 
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
-        """Store a piece of the child's table. Raises `ValueError` for an unexpected one."""
+        """Store a piece of the child's table. Raises `ValueError` for an unexpected piece."""
         if self.context is None and self.cuts.get(child):
             raise ValueError(f"{child} sent a table without a request")
         super()._util_message_handler(child, width, costs)
@@ -380,7 +382,7 @@ class MBDPOP(DPOP):
     # The enumeration of a cluster root
 
     def _record_best(self, costs: Codes) -> None:
-        """Store cheaper costs of this context than in all before; then start the next one, or send on the best."""
+        """Store the costs of this context that are lower than all before; then start the next, or send on the best."""
         if self._best is None or self._best_context is None:
             self._best = np.full_like(costs, np.iinfo(costs.dtype).max)
             self._best_context = np.zeros((len(self.enumerated), *costs.shape), place_type(self.enumerated.values()))
@@ -421,11 +423,11 @@ class MBDPOP(DPOP):
         super()._choose_optimal(assignment)
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of this robot's cheapest value, or of its fixed one."""
+        """Return the index of this robot's cheapest value, or of its fixed value."""
         free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
         return int(choices[tuple(free)]) + (self.context or {}).get(self.problem.agent, 0)
 
 
 def is_place(place: int, size: int) -> bool:
-    """Return whether a robot with `size` values has one at `place`."""
+    """Return whether a robot with `size` values has a value with index `place`."""
     return 0 <= place < size

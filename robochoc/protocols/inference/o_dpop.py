@@ -1,13 +1,13 @@
 """Open DPOP (O-DPOP): DPOP that sends entries of tables instead of tables, best first and on request.
 
-DPOP (see `dpop.py`) in which a parent asks (`Ask`), and its child answers with one *good*: a combination of values of
-its separator, and the least cost of its subtree for it. Goods come in the order of their costs. So a parent knows a
-lower bound on all others, and often needs only a few.
+DPOP (see `dpop.py`) in which a parent asks (`Ask`), and its child answers with one *good*: a combination of values in
+its separator, with the least cost of its subtree for this combination. Goods come in the order of their costs. So a
+parent knows a lower bound on all other combinations, and often needs only a few goods.
 
 - **When to use**: costs, if few combinations are good. The number of messages may be exponential in the induced width,
-  but each is short; a table is never sent as a whole.
+  but each message is short; a table is never sent as a whole.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
-- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "O-DPOP: an algorithm for open/distributed constraint optimization", AAAI 2006.
 
 Its rules are these methods:
@@ -16,15 +16,15 @@ Its rules are these methods:
     VALUE propagation         as in DPOP
 
 A robot joins its children's goods. For a combination without a good, the cost of the child's last good is a lower
-bound. The robot's cheapest combination is a good once all children have sent their matching goods for it. Until then it
-asks the children that lack one.
+bound. The robot's cheapest combination is a good once all children have sent their matching goods for it. Until then
+the robot asks the children whose goods are missing.
 
 Choices that the paper leaves open, and differences:
 
 - Domains and sizes are sent as in DPOP, so all combinations are known from the beginning. In the paper, an open problem
   reveals values as they are asked for.
-- A robot asks all children that lack a good at the same time, each once.
-- A robot stores its costs as a table, of eight bytes a cell, and so has DPOP's need for memory.
+- A robot asks all children whose goods are missing at the same time, each once.
+- A robot stores its costs as a table with eight bytes per cell, and so needs as much memory as DPOP.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -65,9 +65,9 @@ class Ask(Message, frozen=True):
 
 
 class Good(Message, frozen=True):
-    """A combination of values of the sender's separator, as places in the order of its axes, and its least cost.
+    """A combination of values in the sender's separator, as indices in the order of its axes, and its least cost.
 
-    No combination that the sender has not sent costs less.
+    All combinations that the sender has not sent yet cost at least as much.
     """
 
     assignment: list[int]
@@ -99,11 +99,11 @@ class Done(Message, frozen=True):
 class ODPOP(DPOP):
     """One agent of O-DPOP.
 
-    State besides DPOP's:
+    State besides that of DPOP:
 
-    - `goods`: for each child the costs of its goods (not a number: not sent), by its separator;
-    - `last`: for each child the cost of its last good, `inf` if it has no more;
-    - `optimum`: at the root, a lower bound on its tree's cost; at the end the optimum.
+    - `goods`: for each child the costs of its goods, by its separator (NaN: not sent);
+    - `last`: for each child the cost of its last good; `inf` if it has no more;
+    - `optimum`: at the root, a lower bound on the cost of its tree; at the end, the optimum.
     """
 
     messages = TreeMessage | Domain | Dimensions | Proceed | Ask | Good | Done | VALUE
@@ -185,7 +185,7 @@ class ODPOP(DPOP):
         self._receive_bound(child, cost)
 
     def _receive_bound(self, child: str, cost: float) -> None:
-        """Store that all remaining combinations of `child` cost at least `cost`."""
+        """Record that all remaining combinations of `child` cost at least `cost`."""
         if child not in self._waiting:
             raise ValueError(f"{child} was not asked for a good")
         self._waiting.discard(child)
@@ -193,7 +193,7 @@ class ODPOP(DPOP):
         self._ask_or_answer()
 
     def _ask_or_answer(self) -> None:
-        """Send the requested next good if it is known; otherwise ask the children that lack one."""
+        """Send the requested next good if it is known; otherwise ask the children whose goods are missing."""
         if not self._asked or self._waiting:
             return
         costs = self._lower_bounds()
@@ -222,7 +222,7 @@ class ODPOP(DPOP):
             self.send(self.parent, Good(list(cell), int(cost)))
 
     def _send_end(self) -> None:
-        """Send that there are no more goods; if there was none, there is no solution."""
+        """Report that there are no more goods; if there was none at all, there is no solution."""
         if self._unsent.all():
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is not None:
@@ -245,7 +245,7 @@ class ODPOP(DPOP):
     # VALUE, from the root down
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of this robot's value in the good that it sent for `assignment`."""
+        """Return the index of this robot's value in the good that it sent for `assignment`."""
         if self._unsent[tuple(assignment)]:
             raise ValueError(f"{self.problem.agent} has sent no good for {list(assignment)}")
         return super()._best_value(choices, assignment)

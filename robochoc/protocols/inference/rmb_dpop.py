@@ -1,39 +1,40 @@
 """Refined memory-bounded DPOP (RMB-DPOP).
 
 MB-DPOP (see `mb_dpop.py`), with fewer and smaller enumerations. A *cluster* consists of neighbouring robots in the tree
-whose separators have more than `k` robots; the robot above it is its *cluster root*. Robots are cut (fixed) one by
-one, so that each relieves as many robots of the cluster as possible. A cut robot within the cluster enumerates its own
-values, for its own branch; the cluster root enumerates the others. So branches work at the same time, and each receives
-only the values that it needs.
+whose separators have more than `k` robots; the robot above it is its *cluster root*. Robots are cut (fixed) one by one,
+so that each cut relieves as many robots in the cluster as possible. A cut robot within the cluster enumerates its own
+values, for its own branch; the cluster root enumerates the values of the others. So branches work at the same time, and
+each receives only the values that it needs.
 
-- **When to use**: costs, on a pseudo-tree too wide for `dpop`, as `mb-dpop`. With a `k` of the induced width or more it
-  is DPOP.
+- **When to use**: costs, on a pseudo-tree too wide for `dpop`, as `mb-dpop`. If `k` is at least the induced width, it
+  is the same as DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
   sent has more than `k` dimensions. The number of messages is exponential in the cut robots of a branch.
-- **Parameters (`--set`)**: `k`, the most dimensions of a table (default 4); `memory` as in DPOP.
+- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` as in DPOP.
 - **Reference**: Chen, Zhang, Deng, Chen, Li: "RMB-DPOP: refining MB-DPOP by reducing redundant inferences", AAMAS 2020.
 
-Its messages and mechanisms are these methods:
+The messages and mechanisms of the paper are these methods:
 
     LABEL, SEP_DEGREE    `_announce_dimensions`    CONTEXT, distributed enumeration    `_start_context`
     ALLOCATION           `_allocate`               cache of a child's table            `_request_tables`
     UTIL                 `_compute_utils`          CC_VALUE                            `_apply_cut_values`
 
-How robots are chosen, in a cluster:
+How cut robots are chosen in a cluster:
 
 - A robot whose separator has more than `k` robots that are not cut yet proposes all of these. Proposals go up, and are
-  added up for each candidate. Of candidates that are not above a robot, it sends on only the best.
-- The cluster root chooses the candidate that relieves the most robots; of several, the one nearest to the lowest robot
-  that it relieves. Then it asks again, until there are no more proposals.
+  added up for each candidate. If candidates are not above a robot, it sends on only the best of them.
+- The cluster root chooses the candidate that relieves the most robots; in case of ties, the one nearest to the lowest
+  robot that it relieves. Then it asks again, until there are no more proposals.
 
 Choices that the paper leaves open, and differences:
 
-- Only branches that proposed a robot learn that it is cut. If tables are small enough already, it remains an axis.
+- Only branches that proposed a robot learn that it is cut. If tables in a branch are small enough already, the robot
+  remains an axis there.
 - A table goes up with the best values of the cut robots below, for each cell (`CutUTIL`). In the end they are sent down
   once (`CutValue`), so that the whole cluster chooses under them. A branch without cut robots, whose last context had
   the same values, is not asked.
-- Separators are known bottom-up, as in `mb_dpop.py`, and so are memory needs, before any table is made.
-- In the enumeration of a cluster root, the robots that the fewest children depend on change fastest.
+- Separators, and so memory needs, are known bottom-up, as in `mb_dpop.py`, before any table is made.
+- When a cluster root enumerates, the robots on which the fewest children depend change fastest.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve
@@ -78,10 +79,10 @@ from robochoc.system.plain_text import counted, listed
 
 
 class Candidate(msgspec.Struct, frozen=True, array_like=True):
-    """A robot that may be cut: the size of its domain, its depth, and the robots that this would relieve.
+    """A robot that may be cut: the size of its domain, its depth, and the robots that cutting it would relieve.
 
-    `relieved` is the number of robots with too large a separator that it belongs to; `lowest` is the depth of the
-    lowest of them.
+    `relieved` is the number of robots whose separator is too large and contains it; `lowest` is the depth of the lowest
+    of them.
     """
 
     size: Size
@@ -93,7 +94,7 @@ class Candidate(msgspec.Struct, frozen=True, array_like=True):
 class ClusterLabel(Message, frozen=True):
     """The sender's separator; if it is too large, also the robots that may be cut for the sender and its cluster below.
 
-    `dearest`, `induced_width` and `most` are those of DPOP's `Dimensions`.
+    `dearest`, `induced_width` and `most` are as in DPOP's `Dimensions`.
     """
 
     separator: dict[str, SeparatorAxis]
@@ -115,7 +116,7 @@ class ClusterLabel(Message, frozen=True):
 
 
 class SepDegree(Message, frozen=True):
-    """The robots that may still be cut for the cluster below; `most` is the present largest memory need there."""
+    """The robots that may still be cut for the cluster below; `most` is the largest memory need there at present."""
 
     candidates: dict[str, Candidate]
     most: Need
@@ -140,9 +141,9 @@ class Allocation(Message, frozen=True):
 
 
 class CutUTIL(Message, frozen=True):
-    """A piece of the sender's table, as in UTIL; with the best values of the cut robots from the sender down.
+    """A piece of the sender's table, as in UTIL, with the best values of the cut robots from the sender down.
 
-    `places` has a row for each of these robots, in the order of their allocation, with a place for each cell.
+    `places` has a row for each of these robots, in the order of their allocation, with an index for each cell.
     """
 
     width: Width
@@ -158,7 +159,7 @@ class CutUTIL(Message, frozen=True):
 
 
 class CutValue(Message, frozen=True):
-    """The optimal values, as places, of the receiver's cut robots: first those above it, then those from it down."""
+    """The optimal values, as indices, of the receiver's cut robots: first those above it, then those from it down."""
 
     values: list[int]
 
@@ -195,7 +196,7 @@ def added_up(all_candidates: Iterable[Mapping[str, Candidate]]) -> dict[str, Can
 
 
 def best(candidates: Mapping[str, Candidate]) -> str:
-    """Return the candidate that relieves the most robots; of several the one nearest to its lowest, then deepest."""
+    """Return the candidate that relieves the most robots; then the nearest to its lowest robot; then the deepest."""
 
     def merit(name: str) -> tuple[int, int, int, str]:
         one = candidates[name]
@@ -233,7 +234,7 @@ class BestTables:
             np.copyto(self.places[number, *part], row, where=better, casting="unsafe")
 
     def packed(self) -> Iterator[tuple[Width, bytes, bytes]]:
-        """Yield the costs in pieces for the wire, each with the places that belong to it."""
+        """Yield the costs in pieces for messages, each with the indices that belong to it."""
         rows, start = self.places.reshape(len(self.places), -1), 0
         for width, piece in packed_costs(self.costs):
             cells = len(piece) // width
@@ -249,7 +250,7 @@ def bytes_of_best(shape: Sequence[int], width: int, own: int, cut: Sequence[int]
 
 
 class IncomingPlaces:
-    """The places of cut robots' values that come with a table of this `shape`; `cut`: their numbers of values."""
+    """The indices of cut robots' values that come with a table of this `shape`; `cut`: their numbers of values."""
 
     def __init__(self, shape: Sequence[int], cut: Sequence[int]) -> None:
         self._limits = np.array(cut).reshape(-1, 1)
@@ -257,7 +258,7 @@ class IncomingPlaces:
         self.table: Places = np.empty((len(cut), *shape), place_type(cut))
 
     def add(self, cells: int, piece: bytes) -> None:
-        """Append the next piece, of `cells` cells. Raises `ValueError` for bytes that do not fit."""
+        """Append the next piece, of `cells` cells. Raises `ValueError` if the bytes do not fit."""
         rows = self.table.reshape(len(self.table), -1)
         if len(piece) != cells * len(rows) * rows.itemsize or cells > rows.shape[1] - self._start:
             raise ValueError(f"{len(piece)} bytes are not the places of {len(rows)} robots for {cells} cells")
@@ -285,7 +286,7 @@ RMBMessage = (
 class RMBDPOP(MBDPOP):
     """One agent of RMB-DPOP.
 
-    State besides MB-DPOP's, whose `cut` are here the cut robots above, and `cuts` those above each child:
+    State besides that of MB-DPOP, whose `cut` contains the cut robots above, and `cuts` those above each child:
 
     - `proposed`: the children's candidates; `candidates`: their sum; `awaited`: children that will propose again;
     - `below`: the cut robots from this one down; `inner`: from each child down;
@@ -389,7 +390,7 @@ class RMBDPOP(MBDPOP):
         return added_up([own if len(free) > self.settings.k else {}, *self.proposed.values()])
 
     def _propose(self) -> None:
-        """Send the parent the candidates: the first time with the label."""
+        """Send the parent the candidates, the first time with the label."""
         width, most = self._width_and_need()
         if self._labelled:
             self.send(self.parent or "", SepDegree(self.candidates, most))
@@ -449,7 +450,7 @@ class RMBDPOP(MBDPOP):
         own, below = len(self.problem.values), [*self.below.values()]
         return stored + bytes_of_best(self._own_sizes(), width_of(self._dearest), own, below)
 
-    # Contexts: each robot enumerates its part
+    # Contexts: each robot enumerates its own part
 
     def _start_inference(self) -> None:
         """Start to enumerate, unless the parent sends a context."""
@@ -473,7 +474,7 @@ class RMBDPOP(MBDPOP):
         return values is not None
 
     def _request_tables(self, context: Mapping[str, int]) -> None:
-        """Request tables from the children in the cluster, except those whose values are the last ones again."""
+        """Request tables from the children in the cluster, except children whose values are the same as last time."""
         for child, cut in self.cuts.items():
             values = [context[name] for name in cut]
             if self._requested.get(child, []) != values:
@@ -497,7 +498,7 @@ class RMBDPOP(MBDPOP):
         return self._places[child]
 
     def _compute_utils(self) -> None:
-        """Compute the minimum cost of the subtree in the context; after the last one, send the best of all."""
+        """Compute the minimum cost of the subtree in the context; after the last context, send the best of all."""
         context = self.context or {}
         axes = [name for name in self._free if name not in context]
         costs, choices = self._projected(axes, context)
@@ -520,7 +521,7 @@ class RMBDPOP(MBDPOP):
         return [rows[name] if name in rows else context[name] for name in self.below]
 
     def _end_contexts(self, found: BestTables) -> None:
-        """Send the best of all contexts: a robot of a cluster to its parent, others as in DPOP."""
+        """Send the best of all contexts: robots in a cluster to their parent, others as in DPOP."""
         self.choices = found.choices
         if self._final is not None:
             self._choose_in_context(self._final)
@@ -558,7 +559,7 @@ class RMBDPOP(MBDPOP):
         self._apply_cut_values(dict(zip(cut, values, strict=True)))
 
     def _apply_cut_values(self, values: Mapping[str, int]) -> None:
-        """Send on the best values of cut robots, and make this robot's table under them."""
+        """Send on the best values of cut robots, and make this robot's table under these values."""
         self.settled, self.choices, self.best = True, None, None
         self.context = {name: values[name] for name in (*self.cut, *self.enumerated)}
         for child, cut in self.cuts.items():
@@ -569,6 +570,6 @@ class RMBDPOP(MBDPOP):
         self._compute_if_complete()
 
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
-        """Return the place of this robot's cheapest value; the tables here contain its fixed one, if it is fixed."""
+        """Return the index of this robot's cheapest value; if it is fixed, the tables contain only its fixed value."""
         free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
         return int(choices[tuple(free)])

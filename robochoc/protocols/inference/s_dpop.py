@@ -1,13 +1,13 @@
 """Self-stabilizing DPOP (S-DPOP): DPOP that reuses its results when the problem changes.
 
-DPOP (see `dpop.py`) whose robots store their place in the pseudo-tree, their children's tables and their choices. After
-a change, only robots compute again whose separator, constraint, or child's table has changed. All others send an empty
-message (`Reuse`) instead of a table.
+DPOP (see `dpop.py`) whose robots store their position in the pseudo-tree, their children's tables and their choices.
+After a change, only robots whose separator, constraint, or child's table has changed compute again. All others send an
+empty message (`Reuse`) instead of a table.
 
 - **When to use**: costs, a pseudo-tree with a small induced width, and a problem that changes during the run.
 - **Guarantees**: complete; each epoch terminates with an optimum, or with a proof that there is no solution. Reused
   results depend on nothing that a change has invalidated.
-- **Parameters (`--set`)**: `memory`, the most bytes of a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "S-DPOP: superstabilizing, fault-containing multiagent combinatorial optimization",
   AAAI 2005.
 
@@ -17,20 +17,21 @@ The three parts of the paper are these methods:
     UTIL propagation        `_measure`, `_receive_reuse`, `_send_or_choose`
     VALUE propagation       `_choose_optimal`
 
-An epoch on the tree of the previous epoch is as follows. The root starts it (`Check`), and so all robots learn which
-domains above them have changed. From the leaves up, each robot reports whether its table can have changed: by `Reuse`,
-or DPOP's `Dimensions`. Then the root lets the robots with `Dimensions` proceed. A table that is the same after all is
-not sent, but `Reuse` once more. VALUE is sent to children that have computed, or whose separator has other values.
+An epoch on the tree of the previous epoch runs as follows. The root starts the epoch (`Check`), so all robots learn
+which domains above them have changed. From the leaves up, each robot reports whether its table can have changed: by
+`Reuse`, or by DPOP's `Dimensions`. Then the root lets the robots with `Dimensions` proceed. If a recomputed table is
+the same after all, `Reuse` is sent instead of it. VALUE is sent to children that have computed, or whose separator has
+other values.
 
 Choices that the paper leaves open, and differences:
 
 - The runtime propagates the changes to all robots before any robot continues.
 - A robot that has a new neighbour, or has lost its parent, starts a new tree for all connected robots, by the first
-  wave of an election (see `shared/dfs.py`). A lost child, or another lost neighbour, needs none. In the paper, a new
-  link needs no new tree if one end is above the other; here that is not known, and tables are reused on the new tree as
-  well.
-- A wave on the old tree ends the epoch's work there. Messages that neighbours sent before their first wave are dropped;
-  a robot that has already computed computes again.
+  wave of an election (see `shared/dfs.py`). The loss of a child or another neighbour does not require a new tree. In
+  the paper, a new link needs no new tree if one end is above the other; here that is not known, and tables are reused
+  on the new tree as well.
+- A wave ends the epoch's work on the old tree. Messages that neighbours sent before their first wave are dropped; a
+  robot that has already computed computes again.
 - After an epoch in which messages were lost (it was interrupted, or had no solution), all robots start again.
 - A proof of no solution remains valid if constraints are added or values removed.
 
@@ -65,7 +66,7 @@ from robochoc.system.plain_text import listed
 class Check(Message, frozen=True):
     """The tree is unchanged; `changed` are the robots above the receiver whose domains have changed.
 
-    Those of them that share a constraint with the receiver send it their domains themselves.
+    If a changed robot shares a constraint with the receiver, it sends the receiver its domain itself.
     """
 
     changed: list[str]
@@ -79,7 +80,7 @@ class Check(Message, frozen=True):
 
 
 class Reuse(Message, frozen=True):
-    """The sender's table is the one that the receiver has."""
+    """The sender's table is unchanged: the receiver already has it."""
 
     act = Act(Performative.CONFIRM, "the receiver may use the sender's last table again")
     proves_nothing = True
@@ -91,11 +92,11 @@ class Reuse(Message, frozen=True):
 class SDPOP(DPOP, DynamicProtocol):
     """One agent of S-DPOP.
 
-    State besides DPOP's, kept from epoch to epoch:
+    State besides that of DPOP, kept from epoch to epoch:
 
-    - `basis`: the inputs of this robot's table, without the children's tables;
+    - `basis`: the inputs to this robot's table, except the children's tables;
     - `sent`: this robot's table, if the parent has it;
-    - `sent_values`: for each child the values that it received last.
+    - `sent_values`: for each child, the values that it received last.
     """
 
     messages = TreeMessage | Check | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE
@@ -118,24 +119,24 @@ class SDPOP(DPOP, DynamicProtocol):
         self.sent: Codes | None = None
         self.sent_values: dict[str, list[int]] = {}
         self.known_values: list[Value] = []
-        """The domain that robots below know."""
+        """The domain as robots below know it."""
         self._own_tables: list[tuple[Table, tuple[str, ...]]] = []
         self._tabulated: tuple[object, ...] = ()
-        """The inputs of the tables of this robot's constraints."""
+        """The inputs to the tables of this robot's constraints."""
         self._has_new_values = False
         self._is_old_tree = False
         """Whether the tree is that of the previous epoch."""
         self._needs_tree = False
         self._before_wave: set[str] = set()
-        """Neighbours whose first wave has not arrived; their earlier messages belong to an old tree."""
+        """Neighbours whose first wave has not arrived yet; their earlier messages belong to an old tree."""
         self._last_parent: str | None = None
         self._last_optimum: int | None = None
         self._start_epoch()
 
     def _start_epoch(self) -> None:
-        """Reset the state that belongs to one epoch, or one tree."""
+        """Reset the state that belongs to one epoch or one tree."""
         self._expected: set[str] | None = None
-        """Robots above that send their domains; None: not known yet."""
+        """Robots above that send their domains; None if not known yet."""
         self._new_domains: dict[str, list[Value]] = {}
         self._reports: set[str] = set()
         self._renewed: set[str] = set()
@@ -148,7 +149,7 @@ class SDPOP(DPOP, DynamicProtocol):
     # The tree
 
     def start(self) -> None:
-        """Start a tree with the present neighbours."""
+        """Start a tree with the current neighbours."""
         self.leave_tree()
         self._before_wave = {*self.problem.neighbours}
         super().start()
@@ -195,7 +196,7 @@ class SDPOP(DPOP, DynamicProtocol):
             self._check_subtree([])
 
     def receive(self, sender: str, message: Message) -> None:
-        """Process a message; a wave ends work on the old tree."""
+        """Process a message; a wave ends the work on the old tree."""
         if self.verdict is not None:
             return
         if isinstance(message, Wave):
@@ -208,7 +209,7 @@ class SDPOP(DPOP, DynamicProtocol):
         super().receive(sender, message)
 
     def _start_new_tree(self) -> None:
-        """Start a new tree. This epoch's unfinished work is done again."""
+        """Start a new tree. The unfinished work of this epoch is done again."""
         if self._computes:
             self.basis = self.sent = None
         self._is_old_tree = self._needs_tree = False
@@ -272,7 +273,7 @@ class SDPOP(DPOP, DynamicProtocol):
             self.send(child, Check([*changed, *own]))
         self._measure()
 
-    # The sizes of tables, and whether they are unchanged
+    # The sizes of tables, and whether tables are unchanged
 
     def _store_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Store the dimensions of a table that may have changed."""
@@ -284,7 +285,7 @@ class SDPOP(DPOP, DynamicProtocol):
         self._renewed.add(child)
 
     def _receive_reuse(self, child: str) -> None:
-        """Reuse a child's table: it did not have to be computed, or is the same after all."""
+        """Reuse a child's table: it did not have to be computed, or it is the same after all."""
         if child not in self.utils or child not in self.children or child in self._incoming:
             raise ValueError(f"{child} sent Reuse, but {self.problem.agent} has no table of it")
         if child not in self._reports:
@@ -297,7 +298,7 @@ class SDPOP(DPOP, DynamicProtocol):
             raise ValueError(f"{child} sent an unexpected or repeated Reuse")
 
     def _measure(self) -> None:
-        """Once all inputs of this robot's table are known, send Reuse, or its dimensions."""
+        """Once all inputs to this robot's table are known, send Reuse, or the table's dimensions."""
         if self._expected is None or not self._expected <= self._new_domains.keys():
             return
         if len(self._reports) < len(self.children) or self._inputs:
@@ -314,7 +315,7 @@ class SDPOP(DPOP, DynamicProtocol):
             self.optimum = self._last_optimum
 
     def _own_inputs(self) -> tuple[object, ...]:
-        """Return the inputs of this robot's table, besides the children's tables."""
+        """Return the inputs to this robot's table, except the children's tables."""
         seen = {name for scope, _ in self.problem.scopes(self.ancestors) for name in scope}
         domains = {name: self.domains[name] for name in seen}
         return self.problem.table_inputs(self.ancestors), domains, {*self.children}
@@ -325,7 +326,7 @@ class SDPOP(DPOP, DynamicProtocol):
         return 2 * (tables + math.prod(self._own_sizes()) * width_of(self._dearest))
 
     def _proceed(self, separator: Sequence[str]) -> None:
-        """Let the children proceed whose tables may have changed, and wait for their tables."""
+        """Let those children proceed whose tables may have changed, and wait for their tables."""
         self._check_axes(separator, expected=self._computes and not self._proceeding)
         self._proceeding = True
         self._axes_changed = self.separator != tuple(separator)
@@ -359,7 +360,7 @@ class SDPOP(DPOP, DynamicProtocol):
             self._compute_if_complete()
 
     def _compute_if_complete(self) -> None:
-        """Compute once all children's tables have arrived; not if nothing has changed after all."""
+        """Compute once all children's tables have arrived, unless nothing has changed after all."""
         if self._waiting:
             return
         if self._inputs == self.basis and not self._tables_changed and not self._axes_changed:

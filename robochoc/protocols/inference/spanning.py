@@ -1,16 +1,16 @@
-"""Maximum spanning forests that the robots build themselves, as Boruvka's algorithm does.
+"""Maximum spanning forests that the robots build themselves, as in Boruvka's algorithm.
 
-Each robot starts as a tree of its own. In a round, each tree finds the heaviest function that leads out of it, and all
-trees that such functions join become one; so there are at most log2(n) rounds. All robots of a tree know its root, and
-send it to their neighbours (Fragment). The heaviest functions are reported up the tree (Heaviest), its root chooses one
-(Choice), and robots tell their neighbours in other trees whether their function was chosen (Merged). Exactly one
-function of the new tree was chosen from both sides; the higher of its robots is the new root, and informs the whole
+At first each robot is a separate tree. In a round, each tree finds the heaviest function that leads out of it, and all
+trees joined by such functions become one tree; so there are at most log2(n) rounds. All robots in a tree know its root,
+and send it to their neighbours (Fragment). The heaviest functions are reported up the tree (Heaviest), its root chooses
+one (Choice), and robots tell their neighbours in other trees whether their common function was chosen (Merged). Exactly
+one function in the new tree was chosen from both sides; the higher of its robots is the new root, and informs the whole
 tree (NewRoot).
 
-A robot continues with a round when it has all messages for it: messages of one robot arrive in the order in which they
-were sent, and wait until then. No two functions are equally heavy, as ties are broken by the robots' places in the
-order. (Boruvka 1926; with messages: Gallager, Humblet, Spira: "A distributed algorithm for minimum-weight spanning
-trees", ACM TOPLAS 5(1), 1983, which needs no common rounds, and fewer messages.)
+A robot continues with a round when it has all messages for it: the messages from one robot arrive in the order in which
+they were sent, and wait until then. No two functions are equally heavy, because ties are broken by the robots'
+positions in the order. (Boruvka 1926; with messages: Gallager, Humblet, Spira: "A distributed algorithm for
+minimum-weight spanning trees", ACM TOPLAS 5(1), 1983, which needs no common rounds, and fewer messages.)
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ Ends = tuple[str, str]
 
 
 class Fragment(Message, frozen=True):
-    """The root of the sender's part of the forest."""
+    """The root of the tree that the sender belongs to."""
 
     root: str
 
@@ -42,7 +42,7 @@ class Fragment(Message, frozen=True):
 
 
 class Heaviest(Message, frozen=True):
-    """The heaviest function that leads out of the sender's branch, and its robots. None: there is none."""
+    """The heaviest function that leads out of the sender's branch, and its robots; None if there is none."""
 
     weight: float | None
     ends: Ends | None
@@ -57,7 +57,7 @@ class Heaviest(Message, frozen=True):
 
 
 class Choice(Message, frozen=True):
-    """The robots of the function that joins this tree with another one. None: there is none; the tree is complete."""
+    """The robots of the function that joins this tree with another; None if there is none and the tree is complete."""
 
     ends: Ends | None
 
@@ -71,7 +71,7 @@ class Choice(Message, frozen=True):
 
 
 class Merged(Message, frozen=True):
-    """Whether the sender's tree is joined with the receiver's by their function."""
+    """Whether the sender's tree is joined with the receiver's tree by their common function."""
 
     joined: bool
 
@@ -83,7 +83,7 @@ class Merged(Message, frozen=True):
 
 
 class NewRoot(Message, frozen=True):
-    """The root of the tree after several have been joined; the sender is the receiver's parent."""
+    """The root of the tree that results when several trees are joined; the sender is the receiver's parent."""
 
     root: str
 
@@ -101,8 +101,8 @@ Heaviness = tuple[float, int, int]
 class SpanningProtocol(Protocol):
     """One agent that first builds a maximum spanning forest with the others.
 
-    `weights` are those of the functions with neighbours, known on both sides, when `start_spanning` is called. `parent`
-    (None: a root) and `children` are known when `start_in_tree` is called.
+    `weights` are the weights of the functions shared with neighbours, known on both sides, when `start_spanning` is
+    called. `parent` (None: a root) and `children` are known when `start_in_tree` is called.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -124,7 +124,7 @@ class SpanningProtocol(Protocol):
 
     @property
     def children(self) -> list[str]:
-        """The neighbours in the tree without the parent."""
+        """The neighbours in the tree, without the parent."""
         return [name for name in self.joined if name != self.parent]
 
     def receive(self, sender: str, message: Message) -> None:
@@ -137,7 +137,7 @@ class SpanningProtocol(Protocol):
             pass
 
     def next_messages(self, names: Iterable[str]) -> dict[str, Message] | None:
-        """Remove and return the next message of each of `names`; None if one is missing."""
+        """Remove and return the next message from each of `names`; None if one is missing."""
         senders = list(names)
         if not all(self._waiting[name] for name in senders):
             return None
