@@ -1,1 +1,1 @@
-"""Protocols for asymmetric costs (ADCOP): each robot of a constraint pays its own part, and keeps it to itself."""
+"""Protocols for asymmetric costs (ADCOP): each robot in a constraint pays its own part, and keeps it private."""

@@ -1,22 +1,22 @@
 """Asymmetric Coordinated Local Search (ACLS).
 
 Local search in cycles for asymmetric costs. Each robot proposes a value that improves its own side, drawn in proportion
-to the improvement. Its neighbours answer with the costs of their own sides, now and with the proposal. So the robot
-knows the costs of its move for both sides, and moves with a given probability if it is cheap enough.
+to the improvement. Its neighbours answer with the costs of their own sides, now and with the proposed value. So the
+robot knows the costs of its move for both sides, and moves with a given probability if it is cheap enough.
 
-- **When to use**: asymmetric costs, many robots, a good answer without proof.
+- **When to use**: asymmetric costs, many robots, a good result without proof.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality.
 - **Parameters (`--set`)**: `coordination` (c, default 0.8), `probability` (default 0.5), `cycles` (default 100).
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
   problems", JAIR 47, 2013 (Section on local search).
 
-What others learn: for each proposal, the sum of a neighbour's own side in two entries.
+Information disclosed: for each proposal, the sum of a neighbour's own side in two entries.
 
 Choices that the paper leaves open, and differences:
 
 - The present costs are requested in every cycle, so they are correct after neighbours have moved.
-- Broken hard constraints come before costs: a proposal that breaks fewer is cheaper, one that breaks more is rejected.
-  c applies to costs.
+- Broken hard constraints come before costs: a proposal that breaks fewer of them is cheaper, a proposal that breaks
+  more is rejected. c applies to costs.
 - Totally known constraints are part of every robot's own costs; they may be n-ary.
 - If a value is lost, the last known one is used. A robot that misses a neighbour's side does not move.
 
@@ -68,7 +68,7 @@ Paid = tuple[int, int | float]
 
 
 class Proposal(wire.Message, frozen=True):
-    """The value that the sender would like to take. None: it has none (`proposal`)."""
+    """The value that the sender would like to take; None if it has no proposal (`proposal`)."""
 
     value: wire.Value | None
 
@@ -84,7 +84,7 @@ class Proposal(wire.Message, frozen=True):
 
 
 class Sides(wire.Message, frozen=True):
-    """The sender's own side towards the receiver: with its value now, and with what it proposes (`impact`)."""
+    """The sender's own side towards the receiver: with the receiver's value now, and with its proposal (`impact`)."""
 
     now: Paid
     proposed: Paid
@@ -153,7 +153,7 @@ class ACLS(CycleProtocol):
         self.listen(self.problem.neighbours, self._answer)
 
     def _drawn(self, gains: Sequence[LexicographicCost]) -> int | None:
-        """Return the place of a value with a gain, drawn in proportion to the gain; None: there is none."""
+        """Return the index of a value with a gain, drawn in proportion to the gain; None if there is none."""
         better = [place for place, saved in enumerate(gains) if saved > NO_GAIN]
         if not better:
             return None
@@ -163,7 +163,7 @@ class ACLS(CycleProtocol):
         return next((place for place, total in zip(better, sums, strict=True) if lot < total), better[-1])
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send each neighbour with a proposal the costs of this robot's side, now and with the proposal."""
+        """Send each neighbour with a proposal the costs of this robot's side, now and with the proposed value."""
         for name in self.problem.neighbours:
             message = messages.get(name)
             wanted = message.value if isinstance(message, Proposal) else None

@@ -1,7 +1,7 @@
 """Asymmetric Pseudo-tree Forward Bounding (AsymPT-FB).
 
-PT-FB for asymmetric costs: each robot of a constraint pays its own part, which no other robot knows. The bounds that
-robots of a subtree report are on their own sides. Before a robot has its subtree searched, it asks all robots above
+PT-FB for asymmetric costs: each robot in a constraint pays its own part, which no other robot knows. The bounds that
+robots in a subtree report are on their own sides. Before a robot has its subtree searched, it asks all robots above
 with which it shares a constraint for the costs of their sides with each of its values. It stores the answers: they
 apply whenever that robot has the same value, and are part of its bounds from then on.
 
@@ -15,16 +15,17 @@ The methods, besides those of PT-FB (`pt_fb.py`):
 
     ask robots above for their sides   `search_subtree`     their answers   `_send_row`     add them    `_add_row`
 
-Information disclosed: as in PT-FB, with bounds on single sides; and for each value that a robot has while its subtree
-searches, the costs of its side for all values of a robot below, less their minimum. Of its part towards a robot below,
-a robot uses only the least entry for each of its values, and the rows of values that it takes.
+Information disclosed: as in PT-FB, with bounds on single sides; and, for each value that a robot has while its subtree
+searches, the costs of its side for all values of a robot below, minus their minimum. In its part towards a robot below,
+a robot uses only the least entry for each of its values, and the rows for values that it takes.
 
 Choices that the paper leaves open, and differences:
 
-- A robot asks about all of its values at once, and once for each value of the robot above.
+- A robot asks about all its values at once, and once for each value of the robot above.
 - A robot's costs contain, from the beginning, the least costs of its own parts with robots below. Its answers are the
   costs of its side in excess of these.
-- Totally known constraints are paid by the lowest robot of the scope in the tree, as in PT-FB; they may be n-ary.
+- Totally known constraints are paid by the robot in the scope that is lowest in the tree, as in PT-FB; they may be
+  n-ary.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -66,7 +67,7 @@ class RowRequest(Message, frozen=True):
 
 
 class Row(Message, frozen=True):
-    """For each value of the receiver, the cost of the sender's side in excess of the cost that the sender counts."""
+    """For each value of the receiver, the cost of the sender's side beyond the cost that the sender counts."""
 
     costs: list[Number]
 
@@ -104,9 +105,9 @@ class CostsOfBothSides(CostsAbove):
 class AsymPTFB(PTFB):
     """One agent of AsymPT-FB.
 
-    State, besides PT-FB's:
+    State besides that of PT-FB:
 
-    - `least`: for each robot below that shares a constraint, the least cost of each value for this robot's parts.
+    - `least`: for each robot below that shares a constraint, the least cost of each value in this robot's parts.
     - `asking`: robots above that have not sent their sides yet; the search begins after them. None: no search waits.
     """
 
@@ -134,7 +135,7 @@ class AsymPTFB(PTFB):
         return CostsOfBothSides(self.problem)
 
     def start_in_tree(self) -> None:
-        """Compute the least costs of this robot's sides; then begin as PT-FB."""
+        """Compute the least costs of this robot's sides; then begin as in PT-FB."""
         self.least = {name: self.problem.least_side(name) for name in self.descendants}
         self.above.alone = [sum(costs) for costs in zip(self.problem.charges, *self.least.values(), strict=True)]
         super().start_in_tree()
@@ -158,7 +159,7 @@ class AsymPTFB(PTFB):
     def _unknown(self) -> list[str]:
         """The robots above that may have a side, and have not sent it for their present value.
 
-        A robot knows which of its parents have a side; a child may have one unknown to it.
+        A robot knows which of its parents have a side; a child may have a side unknown to it.
         """
         may = {*self.problem.pkc_parents, *self.problem.children}
         return [name for name in self.ancestors if name in may and not self.above.knows(name)]
@@ -168,7 +169,7 @@ class AsymPTFB(PTFB):
         return super().knows_cost(sender) and not self._unknown
 
     def search_subtree(self, bound: Number) -> None:
-        """Ask the robots above for their sides; search once all are known."""
+        """Ask the robots above for their sides; search once all sides are known."""
         if self.asking is not None:
             raise ValueError(f"{self.problem.agent} is already asking for sides")
         self.limit, self.asking = bound, {*self._unknown}

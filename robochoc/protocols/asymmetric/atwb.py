@@ -1,10 +1,11 @@
 """Asymmetric Two-Way Bounding (ATWB).
 
-AFB for asymmetric costs: each robot of a constraint pays its own part, which no other robot knows. The robot that holds
-the current partial assignment (CPA) bounds it both ways at the same time. Robots after it answer with estimates, as in
-AFB (forward bounding). Robots before it that share a partially known constraint with it answer with the costs of their
-own sides with its new value (backward bounding). Once all of these have answered, the CPA continues with its exact
-cost. As soon as the cost so far and the estimates reach the best solution (B), the holder takes its next value.
+AFB for asymmetric costs: each robot in a constraint pays its own part, which no other robot knows. The robot that holds
+the current partial assignment (CPA) computes bounds in both directions at the same time. Robots after it answer with
+estimates, as in AFB (forward bounding). Robots before it that share a partially known constraint with it answer with
+the costs of their own sides for its new value (backward bounding). Once all of these have answered, the CPA continues
+with its exact cost. As soon as the cost so far and the estimates reach the best solution (B), the holder takes its next
+value.
 
 - **When to use**: asymmetric costs; fewer messages and checks than SyncABB, but robots disclose more of their costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
@@ -17,16 +18,16 @@ The methods, besides those of AFB (`afb.py`):
     backward bounding: ask robots before   `_pass_on`          their answers            `_send_side`
     both costs are known: pass on the CPA  `_assign_cpa`       add them                 `_add_side`
 
-Information disclosed: robots after the holder learn the values of the CPA, its cost, and B. The holder learns bounds on
-the costs of robots after it, and, of each robot before, the cost that its side adds with each value that it tries. Of
-its part towards robots after it, a robot uses only the least entry for each of its values, and the requested ones;
-nothing else of it changes any message.
+Information disclosed: robots after the holder learn the values in the CPA, its cost, and B. The holder learns bounds on
+the costs of robots after it, and, for each robot before it, the cost that its side adds for each value that the holder
+tries. In its part towards robots after it, a robot uses only the least entry for each of its values, and the requested
+entries; no other entry affects any message.
 
 Choices that the paper leaves open, and differences:
 
-- A request contains the counters of both values, and the answer the counter of the holder's. So a request for a value
-  that its receiver has changed is dropped, and so is an answer about a value that the holder has changed: a stronger
-  CPA is in transit, or the search has ended.
+- A request contains the counters of both values, and the answer contains the counter of the holder's value. So a
+  request for a value that its receiver has changed is dropped, and so is an answer about a value that the holder has
+  changed: a stronger CPA is in transit, or the search has ended.
 - A robot's cost in the CPA contains, from the beginning, the least costs of its own parts with robots after it. Its
   answers are the costs of its side in excess of these.
 - Totally known constraints are paid by their lowest robot, as in AFB; they may be n-ary.
@@ -59,8 +60,8 @@ from robochoc.solver.local_problem import LocalProblem
 class SideRequest(Message, frozen=True):
     """A request for the cost that the receiver's side of constraints with the sender adds to the CPA.
 
-    This is backward bounding. The sender has taken `value`, its `counter`-th; the receiver's value in the CPA is its
-    `yours`-th.
+    This is backward bounding. The sender has taken `value`, its `counter`-th value; the receiver's value in the CPA is
+    its `yours`-th.
     """
 
     value: Value
@@ -74,7 +75,7 @@ class SideRequest(Message, frozen=True):
 
 
 class Side(Message, frozen=True):
-    """The cost that the sender's side adds, in excess of the counted cost, to the CPA with the `counter`-th value."""
+    """The cost that the sender's side adds, beyond the counted cost, to the CPA with the `counter`-th value."""
 
     counter: int
     cost: Cost
@@ -86,13 +87,13 @@ class Side(Message, frozen=True):
 
 
 class KnownSides(CostLookup):
-    """The costs of this robot's values, including the received sides of robots before, each requested once."""
+    """The costs of this robot's values, including the received sides of robots before it, each requested once."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self._rank = order.rank
         self._known: dict[tuple[str, Value], dict[int, Cost]] = {}
-        """For a robot's value, its sides by the places of this robot's values."""
+        """For each value of another robot, that robot's sides by the indices of this robot's values."""
 
     def knows(self, robot: str, index: int | None) -> bool:
         """Return whether the side of `robot`, with its value in the last CPA, for the value at `index` is known."""
@@ -122,10 +123,10 @@ class KnownSides(CostLookup):
 class ATWB(AFB):
     """One agent of ATWB.
 
-    State, besides AFB's:
+    State besides that of AFB:
 
     - `least`: for each child, the least cost of each value for this robot's parts of constraints with the child.
-    - `asked`: the robots before that have not sent their sides for the value yet; None: the CPA has been passed on.
+    - `asked`: the robots before it that have not sent their sides for the value yet; None: the CPA has been passed on.
     """
 
     messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate | SideRequest | Side
@@ -148,11 +149,11 @@ class ATWB(AFB):
         self.asked: set[str] | None = None
 
     def _cost_lookup(self) -> KnownSides:
-        """Return the lookup of this robot's costs, which stores the received sides of robots before."""
+        """Return the lookup of this robot's costs, which stores the received sides of robots before it."""
         return KnownSides(self.problem, self.order)
 
     def start(self) -> None:
-        """Compute the least costs of this robot's sides; then begin as AFB."""
+        """Compute the least costs of this robot's sides; then begin as in AFB."""
         self.least = {child: self.problem.least_side(child) for child in self.problem.children}
         super().start()
 
@@ -175,7 +176,7 @@ class ATWB(AFB):
         self.cost += sum(least[index] for least in self.least.values())
 
     def _pass_on(self, lower_bounds: list[Cost]) -> bool:
-        """Ask robots on both sides for their costs; pass on the CPA if the sides of all robots before are known.
+        """Ask robots on both sides for their costs; pass on the CPA if the sides of all robots before it are known.
 
         Return False if the CPA is complete, or too costly with the known other sides.
         """
@@ -194,7 +195,7 @@ class ATWB(AFB):
         return True
 
     def _add_side(self, sender: str, side: Side) -> None:
-        """Add the side of a robot before, unless the value has changed since."""
+        """Add the side of a robot before this one, unless the value has changed since."""
         if self.value is None or side.counter != self.counter:
             return
         if self.asked is None or sender not in self.asked:
@@ -204,7 +205,7 @@ class ATWB(AFB):
         self.cost += side.cost
 
     def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
-        """Keep a value, or choose the next one, as AFB; send the CPA on once all sides of robots before are known."""
+        """Keep or choose a value, as in AFB; send the CPA on once all sides of the robots before this one are known."""
         super()._assign_cpa(lower_bounds)
         if self.value is not None and self.asked is not None and not self.asked:
             self.asked = None
@@ -214,7 +215,7 @@ class ATWB(AFB):
     # The robots before
 
     def _send_side(self, sender: str, request: SideRequest) -> None:
-        """Send the cost of this robot's side in excess of the cost in the CPA; drop requests about another value."""
+        """Send the cost of this robot's side beyond the cost in the CPA; drop requests about another value."""
         if sender not in self.problem.children:
             raise ValueError(f"{sender} is not below {self.problem.agent}")
         if self.over or self.value is None or request.yours != self.counter:

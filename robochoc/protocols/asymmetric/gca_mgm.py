@@ -1,7 +1,7 @@
 """Guaranteed Convergence Asymmetric MGM (GCA-MGM).
 
-As MCS-MGM, but a robot hands over its entry whenever a neighbour's move has cost it anything. A robot pays the entries
-that it has received from then on, so fewer and fewer moves seem better than they are, and the robots stop moving.
+MCS-MGM in which a robot hands over its entry whenever a neighbour's move has cost it anything. From then on a robot
+pays the entries that it has received, so fewer and fewer moves seem better than they are, and the robots stop moving.
 
 - **When to use**: asymmetric costs, if convergence is required.
 - **Guarantees**: incomplete; it converges, and stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji,
@@ -10,7 +10,7 @@ that it has received from then on, so fewer and fewer moves seem better than the
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
   problems", JAIR 47, 2013 (GCA-MGM).
 
-For the choices see `mcs_mgm.py`. More entries are disclosed than there.
+For the choices see `mcs_mgm.py`. More entries are disclosed than in MCS-MGM.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

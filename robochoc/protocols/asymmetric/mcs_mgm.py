@@ -2,27 +2,27 @@
 
 MGM for asymmetric costs: each robot computes gains for its own side. A robot's move may cost a neighbour more than the
 robot has gained. Then the neighbour hands over the entry of its part that has become due: from then on the other robot
-pays it. So the sum of both sides of each constraint stays the same, and the next move of that robot takes the entry
-into account.
+pays this entry. So the sum of both sides of each constraint stays the same, and the next move of that robot takes the
+entry into account.
 
-- **When to use**: asymmetric costs, many robots, little disclosed of their costs.
+- **When to use**: asymmetric costs, many robots, and robots should disclose little about their costs.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji, the total cost
   of both sides of a pair, never changes.
 - **Parameters (`--set`)**: `cycles` (default 100).
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
   problems", JAIR 47, 2013 (MCS-MGM).
 
-Information disclosed: the single entries of parts that are handed over; values, and gains.
+Information disclosed: the single entries of parts that are handed over, values, and gains.
 
 Choices that the paper leaves open, and differences:
 
 - A cycle has three phases: values, transfers (mostly of nothing), gains.
-- Nothing is handed over before a robot has moved.
-- If neighbours have the same gain, the first one in the priority order moves.
-- Gains and entries are pairs, broken hard constraints first. Totally known constraints are paid by all robots of the
+- No entry is handed over before a robot has moved.
+- If neighbours have the same gain, the first of them in the priority order moves.
+- Gains and entries are pairs, broken hard constraints first. Totally known constraints are paid by all robots in the
   scope, as in MGM, and never handed over.
 - If a value is lost, the last known one is used; a robot that misses a gain does not move. No robot counts a lost entry
-  from then on: P_ij + P_ji then falls for the robots, but not in the answer, whose cost is computed from the files.
+  from then on: P_ij + P_ji then falls for the robots, but not in the result, whose cost is computed from the files.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -50,7 +50,7 @@ from robochoc.solver.local_problem import LexicographicCost, LocalProblem
 
 
 class Transfer(Message, frozen=True):
-    """An entry of the sender's part, at both robots' values: from now on the receiver pays it. None: no transfer.
+    """An entry in the sender's part, at both robots' values: from now on the receiver pays it. None: no transfer.
 
     A cost is a pair: broken hard constraints, and costs.
     """
@@ -68,14 +68,14 @@ class Transfer(Message, frozen=True):
 
 
 Entry = tuple[int, wire.Value]
-"""An entry of this robot's side: the place of its value, and the other robot's value."""
+"""An entry on this robot's side: the index of its value, and the other robot's value."""
 
 
 class MCSMGM(Gainers):
     """One agent of MCS-MGM.
 
-    `changed` holds, for each neighbour, the differences of entries of this robot's side from its part: entries handed
-    over are added or subtracted. `last_gains` are the neighbours' last gains.
+    `changed` contains, for each neighbour, the differences between entries on this robot's side and its original part:
+    entries handed over are added or subtracted. `last_gains` are the neighbours' last gains.
     """
 
     messages = Value | Transfer | Gain
@@ -124,7 +124,7 @@ class MCSMGM(Gainers):
         return loss > max(gained, NO_GAIN)
 
     def _transfer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Hand over the entries that are due after neighbours' moves, with all neighbours' values known."""
+        """Hand over the entries that are due after neighbours' moves, once all neighbours' values are known."""
         values = self.checked_values(messages)
         entries: dict[str, LexicographicCost | None] = {}
         for name, value in values.items():
@@ -142,7 +142,7 @@ class MCSMGM(Gainers):
         self.listen(self.problem.neighbours, self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """Add the entries received, and send the gain of this robot's best move."""
+        """Add the received entries, and send the gain of this robot's best move."""
         for name, message in messages.items():
             if isinstance(message, Transfer) and message.entry is not None and name in self._values:
                 self._add(name, self._values[name], message.entry)
@@ -151,7 +151,7 @@ class MCSMGM(Gainers):
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if this robot's gain is the largest, with all neighbours' gains known."""
+        """Move if this robot's gain is the largest, once all neighbours' gains are known."""
         self.last_gains = {
             name: (message.broken, message.cost) for name, message in messages.items() if isinstance(message, Gain)
         }
@@ -163,7 +163,7 @@ class MCSMGM(Gainers):
             self.exchange_values(self._transfer)
 
     def _add(self, neighbour: str, value: wire.Value, cost: LexicographicCost) -> None:
-        """Add `cost` to the entry of this robot's side for its present value and `value` of a neighbour."""
+        """Add `cost` to the entry on this robot's side for its present value and `value` of a neighbour."""
         entry = (self.present, value)
         self.changed[neighbour][entry] = _sum(self.changed[neighbour].get(entry, NO_GAIN), cost)
 

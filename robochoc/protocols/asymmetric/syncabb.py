@@ -1,14 +1,14 @@
 """Synchronous Asymmetric Branch and Bound (SyncABB), with one phase or two.
 
-Branch and bound for asymmetric costs: each robot of a constraint pays its own part, which no other robot knows. The
-values of the robots so far (the CPA) go from robot to robot in priority order, as in SyncBB. Its holder knows only its
-own side. So the CPA also goes back, and the robots before add the costs of their own sides for the new value. Only the
-sum is sent. Once it reaches the bound, the holder takes its next value.
+Branch and bound for asymmetric costs: each robot in a constraint pays its own part, which no other robot knows. The
+values of the robots so far (the CPA) go from robot to robot in priority order, as in SyncBB. The holder of the CPA
+knows only its own side. So the CPA also goes back, and the robots before the holder add the costs of their own sides
+for the new value. Only the sum is sent. Once it reaches the bound, the holder takes its next value.
 
-With one phase (`phases=1`) each new value is priced at once. With two, the CPA first becomes complete with the sides of
-lower robots alone, then goes back once, and each robot adds its sides towards all lower robots.
+With one phase (`phases=1`), the cost of each new value is computed at once. With two, the CPA first becomes complete
+with the sides of lower robots alone, then goes back once, and each robot adds its sides towards all lower robots.
 
-- **When to use**: asymmetric costs, few robots, little disclosed of their costs.
+- **When to use**: asymmetric costs, few robots, and robots should disclose little about their costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Space is linear.
 - **Parameters (`--set`)**: `phases` (1 or 2, default 1).
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
@@ -20,15 +20,15 @@ The methods:
     CPA on its way back                          `_add_side`, `_add_all_sides`
     it has come back, with its cost              `_hand_on`
 
-Information disclosed: robots after a robot learn its values, and the total cost of the CPA. A robot before learns the
-cost of the CPA without its own side. Entries of a part that no CPA requires change no message.
+Information disclosed: robots after a robot learn its values, and the total cost of the CPA. A robot before it learns
+the cost of the CPA without its own side. Entries of a part that no CPA requires do not affect any message.
 
 Choices that the paper leaves open, and differences:
 
 - With one phase, a CPA goes back only to robots that share a partially known constraint with its holder, and its cost
-  then returns to the holder. In the paper it visits all robots before, and the first one sends it on.
+  then returns to the holder. In the paper it visits all robots before the holder, and the first one sends it on.
 - Totally known constraints are paid by their lowest robot, when it takes a value; they may be n-ary.
-- Every message that goes down carries the best path; so no bound is broadcast.
+- Every message that goes down contains the best path, so no bound is broadcast.
 - A robot with an empty domain reports it at once.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -86,9 +86,10 @@ class CPA(Message, frozen=True):
 
 
 class CPABack(Message, frozen=True):
-    """The CPA on its way back: the new value of `robot`, for the receiver to add its own side (`CPA_BACK`).
+    """The CPA on its way back: the new value of `robot`, so that the receiver can add its own side (`CPA_BACK`).
 
-    `left` are the robots that it must reach after the receiver; `bound` is the cost at which it returns at once.
+    `left` are the robots that the message must reach after the receiver; `bound` is the cost at which it returns at
+    once.
     """
 
     robot: str
@@ -108,7 +109,7 @@ class CPABack(Message, frozen=True):
 
 
 class FullBack(Message, frozen=True):
-    """A complete CPA on its way back, for the receiver to add its own side towards all robots after it.
+    """A complete CPA on its way back, so that the receiver can add its own side towards all robots after it.
 
     `bound` is the cost at which it returns to the last robot at once.
     """
@@ -128,7 +129,7 @@ class FullBack(Message, frozen=True):
 
 
 class Priced(Message, frozen=True):
-    """The cost of the CPA with the receiver's value, now that all robots before have added their own sides."""
+    """The cost of the CPA with the receiver's value, after all robots before it have added their own sides."""
 
     paid: Cost
 
@@ -154,7 +155,7 @@ class Priced(Message, frozen=True):
 
 
 class TooCostly(Message, frozen=True):
-    """The CPA with the receiver's value costs the bound or more, including the sides of robots before."""
+    """The CPA with the receiver's value costs at least the bound, including the sides of robots before it."""
 
     act = acts.REJECT_VALUE
     proves_nothing = True
@@ -219,7 +220,7 @@ class SyncABB(SyncBB):
         self._extend(0)
 
     def _pass_on(self, cost: Cost) -> bool:
-        """Send the CPA back for its cost, if robots before have a side in it; otherwise pass it on."""
+        """Send the CPA back for its cost if robots before this one have a side in it; otherwise pass it on."""
         paid = self.paid + cost
         if self.settings.phases == TWO_PHASES:
             if not self.rank or self.rank + 1 < len(self.order.names):
@@ -233,7 +234,7 @@ class SyncABB(SyncBB):
         return True
 
     def _hand_on(self, paid: Cost) -> bool:
-        """Send the CPA to the next robot. Return False if it is complete: it is the best one."""
+        """Send the CPA to the next robot. Return False if it is complete, and so the best one."""
         if self.rank + 1 < len(self.order.names):
             self.send(self.order.names[self.rank + 1], CPA(self._all_values, paid, self.best))
             return True
@@ -248,7 +249,7 @@ class SyncABB(SyncBB):
 
     @property
     def _next(self) -> int:
-        """The place of this robot's next value."""
+        """The index of this robot's next value."""
         return 0 if self.value is None else self.value + 1
 
     # The robots before
@@ -282,7 +283,7 @@ class SyncABB(SyncBB):
             self.send(names[-1], Priced(paid))
 
     def _side(self, robot: str, value: Value) -> Cost:
-        """Return the cost of this robot's side of constraints with `robot`, for its `value` and this robot's."""
+        """Return the cost of this robot's side of constraints with `robot`, for its `value` and this robot's value."""
         if self.value is None:
             raise ValueError(f"unexpected returning CPA of {robot}: {self.problem.agent} has no value in it")
         broken, cost = self.problem.own_side(self.value, robot, value)

@@ -1,1 +1,1 @@
-"""Protocols that allocate tasks, each to one robot at most, by bids for them: one file each."""
+"""Protocols that allocate tasks, each to at most one robot, by bids, one file each."""

@@ -1,12 +1,13 @@
 """Consensus-Based Auction Algorithm (CBAA).
 
-Each robot does one task at most. It bids for the task that is worth most to it, of those where its bid is above the
-highest known bid. Robots send each other the highest bids that they know; a robot that is outbid bids for another task.
+Each robot does at most one task. It bids for the task that is worth most to it, among those for which its bid is above
+the highest known bid. Robots send each other the highest bids that they know; a robot that is outbid bids for another
+task.
 
-- **When to use**: for task allocation with one task for each robot. Where robots can do several tasks, use CBBA.
-- **Guarantees**: incomplete: no proof of optimality. It ends with the outcome of the sequential greedy algorithm,
-  which gains at least half of the optimum of one task for each robot. If messages arrive in rounds, it needs at most
-    `N_t D` rounds, for `N_t` tasks and a network of diameter `D`. Two robots may have the same task for a while.
+- **When to use**: for task allocation with one task for each robot. If robots can do several tasks, use CBBA.
+- **Guarantees**: incomplete: no proof of optimality. It ends with the outcome of the sequential greedy algorithm, which
+  gains at least half of the optimum for one task per robot. If messages arrive in rounds, it needs at most `N_t D`
+  rounds, for `N_t` tasks and a network of diameter `D`. Two robots may have the same task for a while.
 - **Reference**: Choi, Brunet, How: "Consensus-based decentralized auctions for robust task allocation", IEEE
   Transactions on Robotics 25(4), 2009, Section III.
 
@@ -18,10 +19,11 @@ The paper's procedure:
 
 Choices that the paper leaves open, and differences:
 
-- A robot does both phases when messages come, not at fixed times, and sends only bids that the receiver may not know.
-- A message names the winner of each bid, to distinguish equal bids. Of equal bids that of the robot of higher priority
-  counts.
-- Robots send their bids for a task only to robots that can do the task: all of these write to each other.
+- A robot executes both phases when messages arrive, not at fixed times, and sends only bids that the receiver may not
+  know.
+- A message names the winner of each bid, to distinguish equal bids. If bids are equal, the robot with higher priority
+  wins.
+- Robots send their bids for a task only to robots that can do the task: all of these send messages to each other.
 - A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -50,11 +52,11 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import listed
 
 WinningBid = tuple[Lot, str, int]
-"""A task by the sender's name for it, its winner as far as the sender knows, and the winner's bid."""
+"""A task, identified by the sender's name for it, its winner as far as the sender knows, and the winner's bid."""
 
 
 class WinningBids(wire.Message, frozen=True):
-    """The highest bids that the sender knows, and the receiver may not know (`y`, with the winners)."""
+    """The highest bids that the sender knows and the receiver may not know (`y`, with the winners)."""
 
     bids: list[WinningBid]
 
@@ -77,9 +79,9 @@ def winning_bid_in_words(words: Wording, lot: Lot, winner: str, amount: int) -> 
 
 
 def winning_bids_prove(standings: Sequence[WinningBid], reception: Reception) -> list[Proof]:
-    """Return what the sender's own bids in `standings` prove.
+    """Return the proofs in the sender's own bids in `standings`.
 
-    Those of other winners prove nothing, as the sender's name for a task is not the winner's.
+    Bids of other winners prove nothing, because the sender's name for a task is not the winner's.
     """
     own = [(lot, amount) for lot, winner, amount in standings if winner == reception.sender]
     return [proof for lot, amount in own for proof in proofs_of_bid(reception.sender, lot, amount, reception)]
@@ -106,7 +108,7 @@ class CBAA(Auction):
         self.y: dict[int, int] = {}
         self.z: dict[int, str] = {}
         self._sent_bids = {rival: dict[int, tuple[str, int]]() for rival in self.market.shared}
-        """For each rival the best bids that were sent to it, or received from it."""
+        """For each rival, the best bids that were sent to it or received from it."""
 
     def start_auction(self) -> None:
         """Bid for the best task."""
@@ -125,7 +127,7 @@ class CBAA(Auction):
                 self.y[task], self.z[task] = amount, winner
 
     def settle(self) -> None:
-        """Give up a task that another robot has won, bid for another one, and send the bids."""
+        """Give up a task that another robot has won, bid for another task, and send the bids."""
         if self.verdict is None and self.market.shared:
             self._release()
             self._select()
@@ -135,7 +137,7 @@ class CBAA(Auction):
         self.bundle = [task for task in self.bundle if self.z[task] == self.problem.agent]
 
     def _select(self) -> None:
-        """Choose the best task without a known bid as good as this robot's, if the robot has none."""
+        """If the robot has no task, choose the best task for which no known bid is as good as this robot's."""
         if not self.bundle:
             own = self.problem.agent
             offer = self.market.best(
@@ -147,7 +149,7 @@ class CBAA(Auction):
         self.choose_bundle()
 
     def _send_bids(self) -> None:
-        """Send each rival the bids that are above those sent to it, or received from it."""
+        """Send each rival the bids that are above those already sent to it or received from it."""
         for rival, tasks in self.market.shared.items():
             known = self._sent_bids[rival]
             news = [task for task in tasks if task in self.z and known.get(task) != (self.z[task], self.y[task])]

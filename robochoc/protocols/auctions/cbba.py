@@ -1,14 +1,14 @@
 """Consensus-Based Bundle Algorithm (CBBA).
 
-Each robot builds a bundle of tasks: it repeatedly adds the task that is worth most, given the bundle, of those where
-its bid is above the highest known bid. Robots send each other the winner and the bid of each task. A robot that is
-outbid gives up the task, and all tasks that it added later, as those bids depended on it.
+Each robot builds a bundle of tasks: it repeatedly adds the task that is worth most, given the bundle, among those for
+which its bid is above the highest known bid. Robots send each other the winner and the bid of each task. A robot that
+is outbid gives up the task, and all tasks that it added later, because those bids depended on it.
 
-- **When to use**: for task allocation, where robots do several tasks, and any robot may learn the others' bids.
-- **Guarantees**: incomplete: no proof of optimality. It ends with the outcome of the sequential greedy algorithm. Where
+- **When to use**: for task allocation in which robots do several tasks, and any robot may learn the others' bids.
+- **Guarantees**: incomplete: no proof of optimality. It ends with the outcome of the sequential greedy algorithm. If
   scores have diminishing marginal gain (`market.py`), the gain is at least half of the optimum. With loads and
   capacities there is no bound. If messages arrive in rounds, it needs at most `N_t D` rounds, for `N_t` tasks and a
-    network of diameter `D`. Two robots may have the same task for a while.
+  network of diameter `D`. Two robots may have the same task for a while.
 - **Reference**: Choi, Brunet, How: "Consensus-based decentralized auctions for robust task allocation", IEEE
   Transactions on Robotics 25(4), 2009, Section IV and Table I.
 
@@ -21,18 +21,18 @@ The paper's procedure:
 
 Choices that the paper leaves open, and differences:
 
-- A robot does both phases when messages come, not at fixed times. So it sends only news; and corrections to a robot
-  that is wrong about this robot's tasks, as that has reset it (Table I).
+- A robot executes both phases when messages arrive, not at fixed times. So it sends only news, and corrections to a
+  robot that is wrong about this robot's tasks, because that robot has reset them (Table I).
 - The paper's messages contain all of `y` and `z`. Here they contain what was not sent to the receiver before, and the
-  receiver stores it: Table I is applied to all tasks at each message. Where sender and receiver agree on a task, no row
-  of the table changes anything; so only the other tasks are examined.
-- There is no clock: `s` counts each robot's messages. Information from a later message of its sender is newer.
-- A robot rebuilds its bundle from the first task on. The paper's robots keep the tasks before a lost one, and append
-  to them. Where a task is freed that they would have added earlier, their outcome depends on delays.
-- Of equal bids that of the robot of higher priority counts.
-- Robots send their bids for a task only to robots that can do the task: all of these write to each other.
+  receiver stores it: Table I is applied to all tasks at each message. If sender and receiver agree on a task, no row of
+  the table changes anything; so only the other tasks are examined.
+- There is no clock: `s` counts each robot's messages. Information from a later message of the same sender is newer.
+- A robot rebuilds its bundle from the first task on. The paper's robots keep the tasks before a lost one, and append to
+  them. If a task becomes free that they would have added earlier, their outcome depends on delays.
+- If bids are equal, the robot with higher priority wins.
+- Robots send their bids for a task only to robots that can do the task: all of these send messages to each other.
 - Tasks have no order within a bundle: a task's score does not depend on when it is done, and there is no path (`p`).
-- Where scores lack diminishing marginal gain, bids are warped (`market.py`), so that the search also ends then.
+- If scores lack diminishing marginal gain, bids are warped (`market.py`), so that the search also ends then.
 - A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -86,7 +86,7 @@ class Bundles(wire.Message, frozen=True):
 
 
 class TableAction(Enum):
-    """An action of Table I: a change of the receiver's standing of a task."""
+    """An action in Table I: a change of the receiver's standing of a task."""
 
     UPDATE = "update"
     LEAVE = "leave"
@@ -94,7 +94,7 @@ class TableAction(Enum):
 
 
 class Standing(NamedTuple):
-    """The winner of a task and its bid; an empty name: no robot has it."""
+    """The winner of a task and its bid; an empty name if no robot has the task."""
 
     winner: str = ""
     amount: int = 0
@@ -105,13 +105,14 @@ NOBODY = Standing()
 
 @dataclass(frozen=True)
 class Rivalry:
-    """The rivals that share the same tasks with this robot. All of them get the same information.
+    """The rivals that share the same tasks with this robot. All of them receive the same information.
 
     Attributes:
-        tasks: These tasks.
-        near: All robots that can do one of them, in priority order, with this robot. Messages contain their `s`.
-        place: The place of each of these robots in `near`.
-        sent: The standing of each task that was last sent to these rivals; a task without an entry is nobody's.
+        tasks: The shared tasks.
+        near: All robots that can do one of these tasks, in priority order, including this robot. Messages contain their
+            `s`.
+        place: The index of each of these robots in `near`.
+        sent: The standing of each task that was last sent to these rivals; a task without an entry has no winner.
     """
 
     tasks: frozenset[int]
@@ -122,7 +123,7 @@ class Rivalry:
 
 @dataclass(frozen=True)
 class Stamps:
-    """The numbers `s` of a message, by robot."""
+    """The numbers `s` in a message, by robot."""
 
     place: Mapping[str, int]
     numbers: Sequence[int]
@@ -135,8 +136,8 @@ class Stamps:
 class CBBA(Auction):
     """One agent of CBBA.
 
-    State: the `standings`, by task the winning bid and its robot (`y` and `z`), and by robot the number of its last
-    message whose contents have reached this robot (`s`).
+    State: the `standings`, which are the winning bid and its robot for each task (`y` and `z`), and, for each robot,
+    the number of its last message whose contents have reached this robot (`s`).
     """
 
     messages = Bundles
@@ -160,22 +161,22 @@ class CBBA(Auction):
         self.s = dict.fromkeys([name for one in self.rivalries.values() for name in one.near], 0)
         seats = {names: {name: seat for seat, name in enumerate(names)} for names in rivals}
         self._seats = [seats[names] for names in rivals]
-        """By task the place of each rival among the task's rivals."""
+        """For each task, the index of each rival among the task's rivals."""
         self._last_standings = [[NOBODY] * len(names) for names in rivals]
-        """By task the last standing that each rival sent."""
+        """For each task, the last standing that each rival sent."""
         self._differing: dict[str, set[int]] = {rival: set() for rival in self.rivalries}
-        """By rival the tasks where its last standing differs from this robot's."""
+        """For each rival, the tasks for which its last standing differs from this robot's."""
         self._credited: dict[str, set[int]] = {rival: set() for rival in self.rivalries}
-        """By rival the tasks that this robot has, according to the rival's last message."""
+        """For each rival, the tasks that this robot has according to the rival's last message."""
         self._acknowledged: dict[str, int] = {}
-        """By rival with a message in this step, this robot's last message that the rival had processed."""
+        """For each rival with a message in this step, this robot's last message that the rival had processed."""
         self._numbers = dict.fromkeys(self.rivalries, 0)
-        """By rival the number of the last message to it."""
+        """For each rival, the number of the last message sent to it."""
         self._news: set[int] = set()
         """The tasks that may have changed since the last step."""
 
     def _rivalries(self) -> dict[str, Rivalry]:
-        """Return by rival the tasks that it shares with this robot."""
+        """Return, for each rival, the tasks that it shares with this robot."""
         found: dict[frozenset[int], Rivalry] = {}
         for tasks in map(frozenset, self.market.shared.values()):
             if tasks not in found:
@@ -237,7 +238,7 @@ class CBBA(Auction):
                     self._differing[rival].add(task)
 
     def _action(self, sender: str, task: int, received: Standing, stamps: Stamps) -> TableAction:
-        """Return the action of Table I, where `sender` is the paper's agent k, and this robot is agent i."""
+        """Return the action from Table I, where `sender` is the paper's agent k, and this robot is agent i."""
         match received.winner:
             case self.problem.agent:
                 return self._sender_names_receiver(sender, task, stamps)
@@ -334,14 +335,14 @@ class CBBA(Auction):
         self.choose_bundle()
 
     def _released(self) -> set[int]:
-        """Return the tasks to release: those of the bundle that no other robot has won.
+        """Return the tasks to release: those in the bundle that no other robot has won.
 
         They are added again, unless their bids depended on lost tasks.
         """
         return {task for task in self.bundle if self.standings[task].winner == self.problem.agent}
 
     def _send_news(self) -> None:
-        """Send each rival the news, and a correction where the rival is wrong about this robot's tasks."""
+        """Send each rival the news, and a correction if the rival is wrong about this robot's tasks."""
         own = self.problem.agent
         number = self.s[own] + 1
         messages: dict[int, Bundles | None] = {}
@@ -366,9 +367,9 @@ class CBBA(Auction):
         return tasks
 
     def _mistaken(self, rival: str) -> list[int]:
-        """Return the tasks where the rival, in a message of this step, is wrong about this robot's tasks.
+        """Return the tasks for which the rival, in a message of this step, is wrong about this robot's tasks.
 
-        None where a message on its way to the rival corrects that already.
+        Returns none if a message in transit to the rival already corrects them.
         """
         if self._acknowledged[rival] < self._numbers[rival]:
             return []

@@ -1,8 +1,8 @@
 """GRoup Agent Partitioning and placing Event (GRAPE).
 
-Each robot joins the coalition for one task, or none. What a robot gains by a task falls as its coalition grows. All
+Each robot joins the coalition for one task, or none. The gain of a robot from a task falls as its coalition grows. All
 robots store a partition into coalitions; a robot that would gain more elsewhere moves there, and sends the new
-partition. Of several partitions the one with the most moves counts; a random number breaks ties.
+partition. Among several partitions the one with the most moves is valid; a random number breaks ties.
 
 - **When to use**: for task allocation where several robots may do a task, and each gains less the more they are. The
   such protocol here; where a task is for one robot, `ssi` and `cbaa` gain more.
@@ -21,11 +21,12 @@ The paper's procedure:
 
 Choices that the paper leaves open, and differences:
 
-- A robot's utility in a task is what the task saves it alone, less half of the cost of its pairs with the others there.
-  So the utilities of all robots add up to what the team saves. Utilities are doubled, to be integers.
-- All start without a task. A robot that gains as much elsewhere stays.
-- Robots send a partition to those with whom they share tasks, when they have moved or adopted it.
-- Stamps have 32 bits. Of equal ones the robot of higher priority counts.
+- A robot's utility from a task is the cost that the task saves it alone, minus half of the cost of its pairs with the
+  other robots at the task. So the utilities of all robots add up to the total saving of the team. Utilities are
+  doubled, to be integers.
+- All robots start without a task. A robot that gains equally much elsewhere stays.
+- Robots send a partition to the robots with which they share tasks, when they have moved or adopted it.
+- Stamps have 32 bits. If stamps are equal, the robot with higher priority wins.
 - A robot that shares no task with others chooses its cheapest value.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -58,8 +59,8 @@ from robochoc.system.plain_text import listed
 class Partition(wire.Message, frozen=True):
     """A partition of the robots into coalitions, with its age (`Pi`, `r`, `s`).
 
-    `evolution` counts the moves that have led to it, `stamp` is the random number of the last move, which `mover` has
-    made. `coalitions` has each robot that does a task, with that robot's name for it.
+    `evolution` counts the moves that have led to it, `stamp` is the random number of the last move, which `mover` made.
+    `coalitions` contains each robot that does a task, with that robot's name for the task.
     """
 
     evolution: int
@@ -111,7 +112,7 @@ class GRAPE(Auction):
             self._send_partition()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Store a partition until all waiting messages are there.
+        """Store a partition until all waiting messages have been received.
 
         Raises:
             ValueError: for a partition that these robots cannot have made.
@@ -141,11 +142,11 @@ class GRAPE(Auction):
         self._received.clear()
 
     def _age(self, partition: Partition) -> tuple[int, int, int]:
-        """Return the key that orders partitions: the greatest is valid."""
+        """Return the key that orders partitions: the partition with the greatest key is valid."""
         return partition.evolution, partition.stamp, -self.order.rank.get(partition.mover, -1)
 
     def _decide(self) -> bool:
-        """Join the coalition with the highest utility; return whether that is a move."""
+        """Join the coalition with the highest utility; return whether this robot has moved."""
         own = self.problem.agent
         now = self.partition.coalitions.get(own)
         present = None if now is None else self._own[now]
@@ -166,7 +167,7 @@ class GRAPE(Auction):
         return True
 
     def _utility(self, task: int | None) -> float:
-        """Return twice the robot's gain by `task` in the present partition; None: without a task."""
+        """Return twice the robot's gain from `task` in the present partition; None means without a task."""
         score = 0 if task is None else self.market.score(task)
         if score is None:
             return -INFINITE
@@ -180,7 +181,7 @@ class GRAPE(Auction):
         return lot is not None and self.market.names(robot, lot) == task
 
     def _send_partition(self, but: set[str] | None = None) -> None:
-        """Send the partition to all rivals `but` those that know it."""
+        """Send the partition to all rivals except those in `but`, which know it already."""
         for rival in self.market.shared:
             if rival not in (but or ()):
                 self.send(rival, self.partition)

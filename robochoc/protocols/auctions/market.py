@@ -1,4 +1,4 @@
-"""Task allocation: the tasks, their value to a robot, and the base of the auction protocols.
+"""Task allocation: the tasks, their value to a robot, and the base class of the auction protocols.
 
 A *task* is done by one robot at most (`solver/exclusions.py`). A robot's *bundle* is the set of tasks that it does; of
 the robot's values with the same tasks only the cheapest counts. A task's *marginal score*, given the bundle, is the
@@ -27,9 +27,9 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import listed
 
 Lot = tuple[int, int]
-"""A robot's name for a task: the place of an interface variable, and its value.
+"""A robot's name for a task: the index of an interface variable, and its value.
 
-The receiver knows which of its own tasks that excludes.
+The receiver knows which of its own tasks this value excludes.
 """
 
 
@@ -43,9 +43,9 @@ def lot_in_words(words: Wording, robot: str, lot: Lot) -> str:
 
 
 def proofs_of_task(robot: str, lot: Lot, reception: Reception) -> list[Proof]:
-    """Return the proofs given by the fact that `robot` does a task which it calls `lot`: it can take that value.
+    """Return the proofs given by the fact that `robot` does the task that it calls `lot`: it can take that value.
 
-    The other values of a robot of several variables are not known: that proves nothing about a whole value.
+    For a robot with several variables, the other values are not known: this proves nothing about a whole value.
     """
     place, value = lot
     if robot == reception.receiver or place != 0 or reception.width(robot) != 1:
@@ -56,8 +56,8 @@ def proofs_of_task(robot: str, lot: Lot, reception: Reception) -> list[Proof]:
 def proofs_of_bid(robot: str, lot: Lot, amount: int, reception: Reception) -> list[Proof]:
     """Return the proofs given by a bid of `robot` for the task that it calls `lot`.
 
-    The bid is the cost of its value for the task less that of the cheapest value without a task, which is not above the
-    largest cost. A robot of one variable has one task at most, so no other bid has been subtracted.
+    The bid is the cost of its value for the task minus the cost of the cheapest value without a task, which is at most
+    the largest cost. A robot with one variable has at most one task, so no other bid has been subtracted.
     """
     does = proofs_of_task(robot, lot, reception)
     if not does:
@@ -68,7 +68,7 @@ def proofs_of_bid(robot: str, lot: Lot, amount: int, reception: Reception) -> li
 def proofs_of_next_bid(robot: str, amount: int, reception: Reception) -> list[Proof]:
     """Return the proofs given by a bid of `robot` for an unnamed task: one value is cheaper than another by the amount.
 
-    This also holds where the robot has other tasks: the bid is never above the value of the next task.
+    This also holds if the robot has other tasks: the bid is never above the value of the next task.
     """
     return [SomeValuePays(robot, {}, reception.max_cost - amount)] if amount > 0 else []
 
@@ -89,13 +89,14 @@ class Market:
     """The tasks of one robot, by number.
 
     Attributes:
-        rivals: For each task the other robots that can do it, in priority order.
+        rivals: For each task, the other robots that can do it, in priority order.
         shared: For each rival, the tasks that both can do.
-        congestion: For each task the cost of each pair of robots that does it; infinite: one robot does it at most.
-        idle: The place of this robot's cheapest value without a task. None: it has no value at all.
+        congestion: For each task, the cost of each pair of robots that do it; infinite if at most one robot may do it.
+        idle: The index of this robot's cheapest value without a task. None if it has no value at all.
 
     Raises:
-        UnsupportedError: if the robot's constraints allocate no tasks, or it has no value without a task.
+        UnsupportedError: if the robot's constraints do not describe a task allocation, or it has no value without a
+            task.
     """
 
     def __init__(self, problem: LocalProblem, *, congestion: bool = False) -> None:
@@ -122,7 +123,7 @@ class Market:
             raise UnsupportedError(f"{problem.agent} has no value without a task, but may win none: add such a value")
 
     def _cheapest(self, problem: LocalProblem) -> dict[frozenset[int], int]:
-        """Return the place of the cheapest value for each set of tasks that the robot can do together."""
+        """Return the index of the cheapest value for each set of tasks that the robot can do together."""
         task_of = {choice: number for number, own in enumerate(self._own) for choice in own}
         found: dict[frozenset[int], int] = {}
         for index, value in enumerate(problem.values):
@@ -134,7 +135,7 @@ class Market:
         return found
 
     def _lot(self, problem: LocalProblem, task: int) -> Lot:
-        """Return how this robot does `task` if it does nothing else; if it cannot, the first way."""
+        """Return how this robot does `task` if it does nothing else; if that is impossible, the first way."""
         index = self._places.get(frozenset((task,)))
         value = () if index is None else problem.values[index]
         own = self._own[task]
@@ -156,7 +157,7 @@ class Market:
         return number
 
     def score(self, task: int) -> int | None:
-        """Return the score of `task` for a robot that does nothing else; None if it cannot do it."""
+        """Return the score of `task` for a robot that does nothing else; None if it cannot do the task."""
         bundle = frozenset((task,))
         return int(self._charge(frozenset()) - self._charge(bundle)) if bundle in self._places else None
 
@@ -165,7 +166,7 @@ class Market:
         return self._named.get(robot, _NONE).get(lot)
 
     def place(self, bundle: Collection[int]) -> int:
-        """Return the place of this robot's cheapest value with the tasks of `bundle`; there must be one."""
+        """Return the index of this robot's cheapest value with the tasks in `bundle`; there must be one."""
         return self._places[frozenset(bundle)]
 
     def best(self, bundle: Collection[int], limit: int, admits: Callable[[int, int], bool]) -> Offer | None:
@@ -183,7 +184,7 @@ class Market:
         return None
 
     def _scores(self, bundle: frozenset[int]) -> list[tuple[int, int]]:
-        """Return the tasks that can be added to `bundle` with their scores then, the best first."""
+        """Return the tasks that can be added to `bundle`, with their resulting scores, the best first."""
         if bundle not in self._scored:
             before = self._charge(bundle)
             more = [(task, bundle | {task}) for task in range(len(self._own)) if task not in bundle]
@@ -205,10 +206,10 @@ class Auction(Protocol):
 
     @abstractmethod
     def start_auction(self) -> None:
-        """Start to bid, for a robot that has values, and neighbours."""
+        """Start to bid; called for a robot that has values and neighbours."""
 
     def start(self) -> None:
-        """Start; a robot without values ends the search, one without rivals chooses its cheapest value."""
+        """Start; a robot without values ends the search, a robot without rivals chooses its cheapest value."""
         if self.market.idle is None:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.market.shared:
@@ -218,20 +219,20 @@ class Auction(Protocol):
             self.start_auction()
 
     def choose_bundle(self) -> None:
-        """Choose the value with the tasks of the bundle."""
+        """Choose the value with the tasks in the bundle."""
         self.value = self.market.place(self.bundle)
 
     def refuse_winner(self, task: int, winner: str, amount: int) -> None:
-        """Raise `ValueError` for a bid that no robot can have made for `task`."""
+        """Raise `ValueError` for a bid for `task` that no robot can have made."""
         if winner != self.problem.agent and winner not in self.market.rivals[task]:
             raise ValueError(f"{winner} cannot have won a task that it does not share")
         if amount <= 0:
             raise ValueError(f"{winner} cannot have won a task for {amount}")
 
     def outbids(self, robot: str, amount: int, other: str | None, most: int) -> bool:
-        """Return whether a bid of `amount` of `robot` beats the bid `most` of `other`; None: there is no other bid.
+        """Return whether a bid of `amount` by `robot` beats the bid `most` by `other`; None: there is no other bid.
 
-        Of equal bids that of the robot of higher priority counts.
+        If bids are equal, the robot with higher priority wins.
         """
         if other is None:
             return True

@@ -3,11 +3,11 @@
 Tasks are sold one after the other. Each robot bids for the task that is worth most to it, given the tasks that it has
 won before; the highest bid wins. Then all robots bid again.
 
-- **When to use**: for task allocation, if a good answer with few messages is enough. Two robots are never assigned the
-  same task, so the answer can be used at any moment.
-- **Guarantees**: incomplete: no proof of optimality. The outcome is that of the sequential greedy algorithm. Where
-  scores have diminishing marginal gain (`market.py`), the gain is at least half of the optimum, as of greedy
-  allocation to submodular bidders (Lehmann, Lehmann, Nisan, GEB 55, 2006). With loads and capacities there is no bound.
+- **When to use**: for task allocation, if a good result with few messages is enough. Two robots are never assigned the
+  same task, so the result can be used at any moment.
+- **Guarantees**: incomplete: no proof of optimality. The outcome is that of the sequential greedy algorithm. If scores
+  have diminishing marginal gain (`market.py`), the gain is at least half of the optimum, as for greedy allocation to
+  submodular bidders (Lehmann, Lehmann, Nisan, GEB 55, 2006). With loads and capacities there is no bound.
 - **References**: Koenig, Tovey, Lagoudakis, Markakis, Kempe, Keskinocak, Kleywegt, Meyerson, Jain: "The power of
   sequential single-item auctions for agent coordination", AAAI 2006; Lagoudakis et al.: "Auction-based multi-robot
   routing", RSS 2005.
@@ -21,11 +21,11 @@ The papers' procedure:
 Choices that the papers leave open, and differences:
 
 - There are no rounds. A robot's bids never rise, so the last bids of the robots that can do the same task bound their
-  future bids. As soon as a robot's bid is above all of these, it buys. So independent sales happen at the same time,
-  and the outcome is as if there were rounds.
-- A bid does not name its task: no robot needs to know it before the sale.
-- Bids of 0 or less are not made. Of equal bids that of the robot of higher priority wins.
-- Bids may rise where scores lack diminishing marginal gain: they are warped (`market.py`).
+  future bids. As soon as a robot's bid is above all of these, it buys the task. So independent sales happen at the same
+  time, and the outcome is the same as with rounds.
+- A bid does not name its task: no robot needs to know the task before the sale.
+- Bids of 0 or less are not made. If bids are equal, the robot with higher priority wins.
+- Bids might rise if scores lack diminishing marginal gain, so they are warped (`market.py`).
 - The papers' robots plan tours, and minimise costs. Here a task's score is computed from the constraints.
 - A robot that shares no task with others chooses its cheapest value.
 
@@ -68,7 +68,7 @@ def _next_bid_in_words(amount: int) -> str:
 
 
 class Bid(wire.Message, frozen=True):
-    """The sender's highest bid, for a task that is not named; 0: it bids for no other task."""
+    """The sender's highest bid, for an unnamed task; 0 means that it bids for no other task."""
 
     amount: int
 
@@ -82,7 +82,7 @@ class Bid(wire.Message, frozen=True):
 
 
 class Won(wire.Message, frozen=True):
-    """The sender has won the tasks that it calls `lots`; `amount` is its highest bid for the others."""
+    """The sender has won the tasks that it calls `lots`; `amount` is its highest bid for the other tasks."""
 
     lots: list[Lot]
     amount: int
@@ -94,7 +94,7 @@ class Won(wire.Message, frozen=True):
         return f"{lots} {'is' if len(self.lots) == 1 else 'are'} mine, and {_next_bid_in_words(self.amount)}"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        # The sender can do the tasks. Its former bids for them may be unknown.
+        # The sender can do the tasks. Its former bids for these tasks may be unknown.
         won = [proof for lot in self.lots for proof in proofs_of_task(reception.sender, lot, reception)]
         return [*won, *proofs_of_next_bid(reception.sender, self.amount, reception)]
 
@@ -102,7 +102,7 @@ class Won(wire.Message, frozen=True):
 class SSI(Auction):
     """One agent of SSI.
 
-    State: this robot's `offer`, the `sold` tasks (its own included), and the last `bids` of the other robots.
+    State: this robot's `offer`, the `sold` tasks (including its own), and the last `bids` of the other robots.
     """
 
     messages = Bid | Won
@@ -166,11 +166,11 @@ class SSI(Auction):
             self.sold.add(task)
 
     def _bid(self) -> None:
-        """Find the task that is worth most, of those for sale."""
+        """Find the task that is worth most, among the tasks for sale."""
         self.offer = self.market.best(self.bundle, self._limit, lambda task, _: task not in self.sold)
 
     def _has_the_best_bid(self, offer: Offer) -> bool:
-        """Return whether no robot that can do the task has a bid as good, or can have one later."""
+        """Return whether no robot that can do the task has an equally good bid, or can have one later."""
         own = self.problem.agent
         rivals = self.market.rivals[offer.task]
         return all(rival in self.bids and self.outbids(own, offer.amount, rival, self.bids[rival]) for rival in rivals)
@@ -183,7 +183,7 @@ class SSI(Auction):
         self._bid()
 
     def _send_sales(self, bought: list[int]) -> None:
-        """Send the tasks bought to the robots that can do them, and a changed bid to all rivals."""
+        """Send the bought tasks to the robots that can do them, and a changed bid to all rivals."""
         amount = self.offer.amount if self.offer else 0
         if not bought and amount == self._last_sent:
             return

@@ -1,1 +1,1 @@
-"""Protocols that improve all values cycle by cycle, and prove nothing: one file each."""
+"""Protocols that improve all values cycle by cycle and prove nothing, one file each."""

@@ -1,30 +1,31 @@
 """Asynchronous Distributed Stochastic Algorithm (A-DSA).
 
-DSA without cycles: each robot acts in ticks of its own, and waits for nobody. In a tick it finds its best value against
-the last known values of its neighbours, decides as in DSA, and sends its value, changed or not.
+DSA without cycles: each robot acts in its own ticks, and waits for no other robot. In a tick it finds its best value
+given the last known values of its neighbours, decides as in DSA, and sends its value, changed or not.
 
-- **When to use**: as DSA, if some robots or links are much slower than others: nobody has to wait for them.
+- **When to use**: as DSA, if some robots or links are much slower than others: no robot has to wait for them.
 - **Guarantees**: incomplete; each robot stops after `cycles` ticks, without a proof of optimality. It always ends. The
-  result is the cheapest of the assignments that the robots had after equally many of their ticks. A robot with an empty
-  domain proves that there is no solution.
+  result is the cheapest of the assignments that the robots had after the same number of their ticks. A robot with an
+  empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `variant` (A to E; default B), `probability` (p; default 0.7), `cycles` (the number of ticks
   of a robot; default 100).
 - **References**: Fitzpatrick, Meertens: "Distributed coordination through anarchic optimization", in: Distributed
   Sensor Networks, 2003; for ticks without cycles: Rust, Picard, Ramparany: "pyDCOP: a DCOP library for dynamic IoT
   systems", OptLearnMAS 2019 (its `adsa`).
 
-In the paper, a tick comes from the robot's clock. A protocol has no clock here. A robot makes a tick whenever it has
+In the paper, a tick comes from the robot's clock. Here a protocol has no clock: a robot makes a tick whenever it has
 processed all messages that were waiting for it, once it knows a value of each neighbour. So a robot that is busy, or
-receives messages seldom, makes few ticks in the same time; if several values of a neighbour are waiting, it uses the
-last one. If messages arrive one by one (`--schedule random`), robots make a tick for each, and often use old values.
+receives messages seldom, makes few ticks in the same time; if several values from a neighbour are waiting, it uses the
+last one. If messages arrive one by one (`--schedule random`), robots make a tick for each message, and often use old
+values.
 
-Differences, and why it ends:
+Differences, and why the search ends:
 
-- A robot stops after `cycles` ticks, and its last message says so (`last`). No more messages are sent to it.
-- A robot whose neighbours have all stopped makes its remaining ticks at once: nothing can change around it.
-- Of two active neighbours, each answers the other's message by a tick. So in the end all have made all their ticks.
-- The robots' values after their n-th ticks may belong to different times. They are an assignment all the same, and its
-  cost is known: the cheapest one is the answer.
+- A robot stops after `cycles` ticks, and its last message reports this (`last`). No more messages are sent to it.
+- A robot whose neighbours have all stopped makes its remaining ticks at once, because nothing can change around it.
+- Of two active neighbours, each answers the other's message with a tick. So in the end all have made all their ticks.
+- The robots' values after their n-th ticks may belong to different times. They still form an assignment, and its cost
+  is known: the cheapest assignment is the result.
 - If messages are lost and no more arrive, each robot makes a tick with the values that it knows.
 - The first value is chosen at random and sent at once. Constraints may be n-ary; hard constraints are as in `dsa`.
 
@@ -52,7 +53,7 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class ADSASettings(DSASettings, frozen=True):
-    """The settings of `dsa`, but `cycles` are ticks of a robot; no `anytime`, as robots are not synchronized."""
+    """The settings of `dsa`, but `cycles` are ticks of a robot; no `anytime`, because robots are not synchronized."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -125,14 +126,14 @@ class ADSA(DSA):
             self._tick()
 
     def go_on(self) -> bool:
-        """Make a tick with the known values, as messages were lost and no more will arrive."""
+        """Make a tick with the known values, because messages were lost and no more will arrive."""
         if self.finished or self.verdict is not None or self.value is None:
             return False
         self._tick()
         return True
 
     def _tick(self) -> None:
-        """Move or stay, against the last known values; send the value to all active neighbours."""
+        """Move or stay, given the last known values; send the value to all active neighbours."""
         if self.finished:
             return
         places, probability = self.proposal(self.problem.lexicographic_costs(self.view))

@@ -1,19 +1,20 @@
 """Cooperative Constraint Approximation (CoCoA).
 
-No cycles: each robot chooses one value, once. Before that it asks all neighbours without a value for the least cost of
-each of its values to them, and chooses the value with the least sum. If too many values are equally good, it waits
-(HOLD) until a neighbour has chosen a value. If no robot around can continue, it accepts more equally good values.
+Without cycles: each robot chooses one value, once. Before that it asks all neighbours without a value for the least
+cost to them of each of its values, and chooses the value with the least sum. If too many values are equally good, it
+waits (HOLD) until a neighbour has chosen a value. If no robot around it can continue, it accepts more equally good
+values.
 
-- **When to use**: costs, also asymmetric ones, few messages: a fair answer from a number of messages that does not
+- **When to use**: costs, also asymmetric ones, few messages: a fair result from a number of messages that does not
   depend on cycles.
 - **Guarantees**: incomplete, no proof of optimality. It always ends: a robot with d neighbours and v values becomes
   active at most d + v times, so it sends at most 2 d (d + v) messages, and one answer for each inquiry that it
-  receives; with asymmetric costs d more inquiries. No robot changes its value. A robot with an empty domain proves that
-  there is no solution.
+  receives; with asymmetric costs it sends d more inquiries. No robot changes its value. A robot with an empty domain
+  proves that there is no solution.
 - **Parameters**: none.
 - **Reference**: van Leeuwen, Pawelczak: "CoCoA: a non-iterative approach to a local search (A)DCOP solver", AAAI 2017.
 
-Its states and steps:
+The states and steps:
 
     IDLE      not asked to act yet                          an active robot asks its neighbours      `_activate`
     ACTIVE    waits for its neighbours' answers             a neighbour answers                      `_answer`
@@ -23,20 +24,23 @@ Its states and steps:
 Choices that the paper leaves open, and differences:
 
 - Robots that have a higher priority than all their neighbours start. So each connected part of the team has at least
-  one; several do no harm.
-- An idle robot becomes active when a neighbour has chosen, and also when one waits. Otherwise the search could stop.
-- Neighbours that are DONE are not asked, as the robot itself knows their constraints' costs. Their value arrives before
-  any answer that is still in transit, and that answer is not used.
-- If all neighbours are DONE, nothing more can become known: a random one of the best values is chosen, however many
+  one such robot; several do no harm.
+- An idle robot becomes active when a neighbour has chosen a value, and also when a neighbour waits. Otherwise the
+  search could stop.
+- Neighbours that are DONE are not asked, because the robot itself knows the costs of their common constraints. Their
+  value arrives before any answer that is still in transit, and that answer is not used.
+- If all neighbours are DONE, nothing more can become known: one of the best values is chosen at random, however many
   there are.
-- A constraint of more than two robots counts when all but one or two have values, once: unknown robots charge nothing.
-- Asymmetric costs (ADCOP): an answer counts the neighbour's side only, and contains the neighbour's value for which it
-  is least. The asking robot adds its own side at this value. A neighbour that is DONE is asked, too, once: only this
-  neighbour knows its side for its value. If it is DONE only after its answer, it is asked again.
+- A constraint between more than two robots counts when all but one or two have values, and it counts once: unknown
+  robots add no cost.
+- Asymmetric costs (ADCOP): an answer counts the neighbour's side only, and contains the neighbour's value for which
+  this cost is least. The asking robot adds its own side at this value. A neighbour that is DONE is asked, too, once:
+  only this neighbour knows its side for its value. If the neighbour becomes DONE only after its answer, it is asked
+  again.
 - Fewer violated hard constraints are always better, so plain DisCSPs work, too.
 
-It ends: in a connected part of the team, the last robot to choose or to wait finds all its neighbours DONE or in HOLD,
-and continues. So no robot remains in HOLD, or IDLE beside a robot that is not.
+Why it ends: in a connected part of the team, the last robot to choose or to wait finds all its neighbours DONE or in
+HOLD, and continues. So no robot remains in HOLD, or remains IDLE next to a robot that is not IDLE.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -79,7 +83,7 @@ from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted
 
 Burden = tuple[int, int | float]
-"""Broken hard constraints, and the cost of all others."""
+"""Broken hard constraints, and the cost of all other constraints."""
 
 
 class Inquiry(wire.Message, frozen=True):
@@ -102,7 +106,7 @@ class Inquiry(wire.Message, frozen=True):
 
 
 class Costs(wire.Message, frozen=True):
-    """The answer to an inquiry: for each value in it, the least cost to the sender."""
+    """The answer to an inquiry: for each value in the inquiry, the least cost to the sender."""
 
     burdens: list[Burden]
 
@@ -118,7 +122,8 @@ class Costs(wire.Message, frozen=True):
     def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the sender's costs for the receiver's values, given others' final values.
 
-        If it shares constraints with the receiver only, and has no final value, all its values cost that much.
+        If the sender shares constraints with the receiver only, and has no final value, all its values cost at least
+        that much.
         """
         asked = reception.last(Inquiry, reception.receiver, reception.sender)
         if asked is None:
@@ -172,7 +177,7 @@ class FinalSide(wire.Message, frozen=True):
         return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} costs my side least: {price}"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        """Return the costs of the sender's side, for its value and all values of the inquiry."""
+        """Return the costs of the sender's side, for its value and all values in the inquiry."""
         asked = reception.last(Inquiry, reception.receiver, reception.sender)
         final = reception.last(SetValue, reception.sender, reception.receiver)
         if asked is None or final is None:
@@ -301,7 +306,7 @@ class CoCoA(Protocol):
             pass
 
     def _make_step(self) -> bool:
-        """Make the next step, if there is one: send inquiries, or choose; return whether there was one."""
+        """Make the next step, if there is one: send inquiries, or choose; return whether there was a step."""
         match self.state:
             case SearchState.ACTIVE if len(self.answers) == len(self._asked):
                 self._choose_or_wait()
@@ -356,11 +361,11 @@ class CoCoA(Protocol):
             self.send(sender, Costs(least))
 
     def _own_sides(self, sender: str, values: list[wire.Value]) -> list[Burden]:
-        """Return the cost of this robot's side for each of its values, with the sender's value at the same place."""
+        """Return the cost of this robot's side for each of its values, with the sender's value at the same index."""
         return [self.problem.own_side(place, sender, value) for place, value in enumerate(values)]
 
     def _check_values(self, values: Iterable[tuple[str, wire.Value]]) -> None:
-        """Raise `ValueError` for a value outside a neighbour's domain; other robots' values are not used here."""
+        """Raise `ValueError` for a value outside a neighbour's domain; values of other robots are not used here."""
         for name, value in values:
             if name in self.states:
                 self.problem.refuse_value(name, value)

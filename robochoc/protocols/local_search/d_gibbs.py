@@ -1,37 +1,39 @@
 """Distributed Gibbs (D-Gibbs).
 
-Sampling on a pseudo-tree. In each cycle the robots draw new values, from the root down: a cheap value with a high
-probability, given the values that all neighbours have. Neighbours never draw at the same time. From the leaves up they
-add up the changes of cost by the sample. So the root knows which sample was the best, though no robot knows its cost,
-and in the end all robots choose their values of that sample.
+Sampling on a pseudo-tree. In each cycle the robots draw new values, from the root down: a cheap value has a high
+probability, given the values of all neighbours. Neighbours never draw at the same time. From the leaves up, the robots
+add up the changes in cost caused by the sample. So the root knows which sample was the best, though no robot knows its
+cost, and in the end all robots choose their values in that sample.
 
-- **When to use**: costs, and little memory: good answers where local search is stuck, as dearer values are drawn too.
+- **When to use**: costs, and little memory: good results where local search is stuck, because more expensive values are
+  drawn too.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The values at the end are
-  those of the best sample of each pseudo-tree. Memory is linear in the number of neighbours. A robot with an empty
+  those in the best sample of each pseudo-tree. Memory is linear in the number of neighbours. A robot with an empty
   domain proves that there is no solution.
-- **Parameters (`--set`)**: `temperature` (default 1: as the paper), `cooling` (the factor that multiplies it after each
-  cycle; default 1), `hard` (default 4), `cycles` (default 100).
+- **Parameters (`--set`)**: `temperature` (default 1: as in the paper), `cooling` (the factor that multiplies it after
+  each cycle; default 1), `hard` (default 4), `cycles` (default 100).
 - **Reference**: Nguyen, Yeoh, Lau: "Distributed Gibbs: a memory-bounded sampling-based DCOP algorithm", AAMAS 2013.
 
-Its parts:
+The parts of the algorithm:
 
     build the pseudo-tree       `dfs.TreeProtocol`    BACKTRACK, from the leaves up    `_send_difference`
     VALUE, from the root down   `_sample`             the root keeps the best          `_record_sample`
 
 A value is drawn with a probability proportional to exp(-cost / temperature), where the cost is that of all constraints
-of the robot with its neighbours' present values. Robots above have already drawn in this cycle, robots below have not.
-So the samples are those of robots that draw one after the other, and the change of the cost is exactly the sum of the
-robots' changes. In the paper, temperature is 1.
+between the robot and its neighbours, given their present values. Robots above have already drawn in this cycle, robots
+below have not. So the samples are those of robots that draw one after the other, and the change in cost is exactly the
+sum of the robots' changes. In the paper, the temperature is 1.
 
 Choices that the paper leaves open, and differences:
 
 - The first value is chosen at random. Robots send it to the neighbours above before the first cycle.
-- A value that breaks more hard constraints than another is never better for the record, whatever its cost; it is drawn
-  e^`hard` times less often for each.
-- The next VALUE from the root says whether the last sample was the best. Then robots store their values of it.
-- The paper also records what the best value of each robot would have saved. Here the record is of samples only.
-- Constraints may be n-ary, as all robots of a scope are on one branch. Unconnected parts of the team have a tree and a
-  record each.
+- In the record, a value that breaks more hard constraints than another is never better, whatever its cost; for each
+  additional broken constraint it is drawn e^`hard` times less often.
+- The next VALUE from the root reports whether the last sample was the best. Then robots store their values in this
+  sample.
+- The paper also records what the best value of each robot would have saved. Here only samples are recorded.
+- Constraints may be n-ary, because all robots in a scope are on one branch. Unconnected parts of the team have a
+  separate tree and record each.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -106,7 +108,7 @@ class Value(wire.Message, frozen=True):
 
 
 class Difference(wire.Message, frozen=True):
-    """The change of the subtree's cost since the last sample: broken hard constraints, and costs (BACKTRACK).
+    """The change in the subtree's cost since the last sample: broken hard constraints, and costs (BACKTRACK).
 
     A reduction is negative.
     """
@@ -130,7 +132,7 @@ def _change(number: int, text: str) -> str:
 
 
 class Finish(wire.Message, frozen=True):
-    """The end: all robots choose their values of the best sample. `kept`: it is the last one."""
+    """The end: all robots choose their values in the best sample. `kept`: the last sample is the best."""
 
     kept: bool
 
@@ -178,7 +180,7 @@ class DGibbs(TreeProtocol):
         self._received = dict.fromkeys(problem.neighbours, 0)
         """The number of values received from each neighbour."""
         self._changes: dict[str, LexicographicCost] = {}
-        """The change of the cost of each child's subtree in this cycle."""
+        """The change in the cost of each child's subtree in this cycle."""
 
     def start_in_tree(self) -> None:
         """Choose a random value, and send it to the neighbours above; without neighbours, choose the cheapest value."""
@@ -212,7 +214,7 @@ class DGibbs(TreeProtocol):
                 assert_never(never)
 
     def decide(self) -> None:
-        """Draw a value, or add up the changes, as soon as all messages for it have arrived."""
+        """Draw a value, or add up the changes, as soon as all necessary messages have arrived."""
         going = True
         while going and self.cycle <= self.settings.cycles:
             going = False
@@ -224,7 +226,7 @@ class DGibbs(TreeProtocol):
                 going = True
 
     def _may_sample(self) -> bool:
-        """Return whether all robots above have drawn in this cycle, and all below in the previous one."""
+        """Return whether all robots above have drawn in this cycle, and all robots below in the previous cycle."""
         if not self.problem.neighbours or self.cycle >= self.settings.cycles:
             return False
         below = all(self._received[name] == self.cycle + 1 for name in self.descendants)
@@ -243,7 +245,7 @@ class DGibbs(TreeProtocol):
         self._send_value(self.problem.neighbours)
 
     def _draw(self, costs: list[LexicographicCost]) -> int:
-        """Return the place of a random value, drawn with the probabilities of its costs."""
+        """Return the index of a random value, drawn with the probabilities given by its costs."""
         broken, cost = min(costs)
         temperature = max(COLDEST, self.settings.temperature * self.settings.cooling**self.cycle)
         weights = [
@@ -254,7 +256,7 @@ class DGibbs(TreeProtocol):
         return next((place for place, end in enumerate(sums) if point < end), len(sums) - 1)
 
     def _send_difference(self) -> None:
-        """Send the parent the change in this subtree by this cycle; the root compares the sample with the best."""
+        """Send the parent the change in this subtree in this cycle; the root compares the sample with the best one."""
         self._sent_difference = True
         for broken, cost in self._changes.values():
             self.change = self.change[0] + broken, self.change[1] + cost
@@ -272,7 +274,7 @@ class DGibbs(TreeProtocol):
             self._finish()
 
     def _finish(self) -> None:
-        """Choose the value of the best sample, and make all robots below do so."""
+        """Choose the value in the best sample, and make all robots below do the same."""
         for child in self.children:
             self.send(child, Finish(self._kept))
         self._choose(self._present if self._kept else self.best)
@@ -283,7 +285,7 @@ class DGibbs(TreeProtocol):
             self.send(name, value)
 
     def _choose(self, index: int) -> None:
-        """Set this robot's value of the next cycle."""
+        """Set this robot's value for the next cycle."""
         self.cycle += 1
         if index != self.value:
             self.value = index
@@ -296,5 +298,5 @@ class DGibbs(TreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree, and this robot's value in every cycle."""
+        """The position in the tree, and this robot's value in every cycle."""
         return msgspec.structs.replace(super().findings, trail=Trail(list(self._trail), self.cycle))

@@ -1,11 +1,11 @@
 """The Distributed Stochastic Algorithm (DSA), variants A to E.
 
-Local search in cycles. In each cycle a robot finds its best value against its neighbours' values of the previous cycle,
+Local search in cycles. In each cycle a robot finds its best value given its neighbours' values in the previous cycle,
 and chooses it with a probability, so that not all neighbours move at once. The gain is the cost that a move saves.
 Variant A moves only if it gains. B also moves if it gains nothing and is in conflict. C also moves if it gains nothing
 at all. D and E are B and C in which a robot that gains always moves.
 
-- **When to use**: costs, a large team: good answers fast.
+- **When to use**: costs, a large team: good results fast.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime). A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `variant` (A to E; default B), `probability` (p; default 0.7), `cycles` (default 100). B
@@ -16,7 +16,7 @@ at all. D and E are B and C in which a robot that gains always moves.
   breakout: properties, comparison and applications to constraint optimization problems in sensor networks", AIJ 161,
   2005, Section 3.
 
-Its Algorithm 1, line by line:
+Algorithm 1 in the paper, line by line:
 
     randomly choose a value                                        `start_cycles`
     while no termination condition is met: send the value, if      `exchange_values`
@@ -26,11 +26,11 @@ Its Algorithm 1, line by line:
 Choices that the paper leaves open, and differences:
 
 - The value is sent in each cycle, even if it has not changed, so that neighbours know that the cycle is over.
-- A robot is in conflict when a shared constraint is violated or charges any cost.
-- Constraints may be n-ary; each robot of a scope counts the whole cost of the constraint.
+- A robot is in conflict when a shared constraint is violated or has any cost.
+- Constraints may be n-ary; each robot in a scope counts the whole cost of the constraint.
 - Fewer violated hard constraints are always better.
-- One of several best values is chosen at random.
-- For a lost message, the neighbour's last known value is used.
+- If there are several best values, one is chosen at random.
+- If a message is lost, the neighbour's last known value is used.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -66,7 +66,7 @@ class DSASettings(CycleSettings, frozen=True):
 
 
 class OnePhase(CycleProtocol):
-    """The common base of searches with one phase: all robots send their values, and each chooses its next one."""
+    """The common base of searches with one phase: all robots send their values, and each chooses its next value."""
 
     def start_cycles(self) -> None:
         """Choose a random value."""
@@ -75,7 +75,7 @@ class OnePhase(CycleProtocol):
 
     @abstractmethod
     def choice(self, costs: Sequence[LexicographicCost]) -> int:
-        """Return this robot's value of the next cycle, given the cost of each of its values."""
+        """Return this robot's value for the next cycle, given the cost of each of its values."""
 
     def _choose(self, messages: Mapping[str, Message]) -> None:
         """Move or stay, once all neighbours' values are known."""
@@ -103,7 +103,7 @@ class StochasticSearch(OnePhase):
         return [place for place, other in enumerate(costs) if other == cost and place != self.present]
 
     def in_conflict(self, now: LexicographicCost) -> bool:
-        """Return whether a shared constraint is violated or charges a cost, if the present value costs `now`."""
+        """Return whether a shared constraint is violated or has a cost, if the present value costs `now`."""
         return now != (0, self.problem.charges[self.present])
 
 
@@ -126,7 +126,7 @@ class DSA(StochasticSearch):
     )
 
     def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the best values, and the probability of the variant (Table 1)."""
+        """Return the best values, and the probability for this variant (Table 1)."""
         now, least = costs[self.present], min(costs)
         return self.places_of(least, costs), self._probability(now, least)
 

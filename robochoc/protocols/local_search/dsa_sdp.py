@@ -1,8 +1,9 @@
 """DSA with slope-dependent probabilities (DSA-SDP).
 
 DSA in which the probability of a move depends on its gain: the larger the part of its cost that a robot saves, the
-likelier it moves. Every `period`-th cycle all robots explore: robots without a gain may also choose the best of their
-other values, the likelier the less it costs more. So the search leaves local optima, and the best cycle counts.
+likelier it moves. In every `period`-th cycle all robots explore: robots without a gain may also choose the best of
+their other values; the less this raises their cost, the likelier they do so. So the search leaves local optima, and the
+best cycle counts.
 
 - **When to use**: as DSA, with time for many cycles.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
@@ -24,8 +25,10 @@ Choices that the paper leaves open, and differences:
 
 - Costs are pairs as in `mgm`, broken hard constraints first. If the move changes their number, r is a part of this
   number, otherwise of the costs.
-- A robot without costs has nothing to save, and does not explore either: any rise is more than all of its cost.
-- A robot explores only where its best other value saves nothing. One of several such values is chosen at random.
+- A robot without costs has nothing to save, and does not explore either, because any rise would be more than its whole
+  cost.
+- A robot explores only if its best other value saves nothing. If there are several such values, one is chosen at
+  random.
 - First values are random, and constraints may be n-ary, as in `dsa`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -90,7 +93,7 @@ class DSASDP(StochasticSearch):
     )
 
     def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the best other values, and the probability for their gain."""
+        """Return the best other values, and the probability that belongs to their gain."""
         now = costs[self.present]
         best = min((cost for place, cost in enumerate(costs) if place != self.present), default=None)
         if best is None:
@@ -113,7 +116,7 @@ class DSASDP(StochasticSearch):
 
     @property
     def _explores(self) -> bool:
-        """Whether the next cycle is one of exploration."""
+        """Whether the next cycle is a cycle of exploration."""
         return (self.cycle + 1) % self.settings.period == 0
 
 

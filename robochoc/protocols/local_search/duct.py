@@ -5,16 +5,16 @@ subtree (the context), chooses a value, and sends the context on. The costs of t
 robot counts for each context how often it has tried each value, and stores the costs. It tries the value with the best
 confidence bound: cheap values often, and rarely tried values now and then.
 
-- **When to use**: costs, and a pseudo-tree that is too wide for `dpop`: the more samples, the better.
-- **Guarantees**: incomplete; the cost at the end is no more than the best that the root knows. Memory is bounded by
+- **When to use**: costs, and a pseudo-tree that is too wide for `dpop`: the more samples, the better the result.
+- **Guarantees**: incomplete; the cost at the end is at most the best cost that the root knows. Memory is bounded by
   `contexts` times the size of the domain. A robot with an empty domain proves that there is no solution, and so does a
-  root without a value that has a solution below.
+  root if none of its values has a solution below.
 - **Parameters (`--set`)**: `samples` (default 300), `by` (`mean`, default, or `best`), `bound` (default 1), `error`
   (default 0.1), `confidence` (default 0.9), `contexts` (default 10,000).
 - **Reference**: Ottens, Dimitrakakis, Faltings: "DUCT: an upper confidence bound approach to distributed constraint
   optimization problems", AAAI 2012; ACM TIST 8(5), 2017.
 
-Its parts:
+The parts of the algorithm:
 
     build the pseudo-tree           `dfs.TreeProtocol`    COST, from the leaves up       `_record_cost`
     CONTEXT, from the root down     `_sample`             the value to be sampled        `Samples.next`
@@ -27,16 +27,17 @@ better by more than `error`, but after `samples` samples in this context at the 
 Choices that the paper leaves open, and differences:
 
 - Before the first sample, robots send their parents their separators, and the highest possible costs of their subtrees,
-  which normalise the costs.
+  which are used to normalise the costs.
 - Values that were never tried come first, the cheapest of them by the known costs above. Ties go to the first value.
 - A value that breaks a hard constraint with robots above is never tried. A context with no other value is hopeless, and
   its parent never chooses its value in that context again. A broken constraint in a sample counts as the highest
   possible cost of the subtree.
 - Besides the cost of the sample, a robot sends the best cost that it knows for this context. The best costs of several
-  children add up even if they come from different samples, so the end may be better than every sample.
-- When `contexts` are in memory, none is removed: in new ones a robot chooses its cheapest value, which it can repeat.
-  So the costs that a robot has reported as possible remain so. A leaf stores nothing, as it knows its costs.
-- Constraints may be n-ary, as all robots of a scope are on one branch. The lowest of them pays.
+  children add up even if they come from different samples, so the result may be better than every sample.
+- When `contexts` are in memory, none is removed: in new contexts a robot chooses its cheapest value, which it can
+  repeat. So the costs that a robot has reported as possible remain possible. A leaf stores nothing, because it knows
+  its costs.
+- Constraints may be n-ary, because all robots in a scope are on one branch. The lowest of them pays.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -119,7 +120,7 @@ class Separator(wire.Message, frozen=True):
 
 
 class SampleContext(wire.Message, frozen=True):
-    """The values of the receiver's separator in this sample (CONTEXT)."""
+    """The values in the receiver's separator in this sample (CONTEXT)."""
 
     values: dict[str, wire.Value]
 
@@ -135,8 +136,8 @@ class SampleContext(wire.Message, frozen=True):
 class SampleCost(wire.Message, frozen=True):
     """The cost of the sample in the sender's subtree: broken hard constraints, and costs (COST).
 
-    `best`: the least known cost for these values without a broken one; None if there is none yet. `hopeless`: there is
-    none, whatever values the subtree has.
+    `best`: the least known cost for these values without a broken constraint; None if there is none yet. `hopeless`:
+    there is no such cost, whatever values the subtree has.
     """
 
     broken: int
@@ -157,7 +158,8 @@ class SampleCost(wire.Message, frozen=True):
     def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the proofs that the sender pays no more than its subtree does.
 
-        If all its neighbours are in the context, no robot is below, and a hopeless context breaks its own constraints.
+        If all its neighbours are in the context, no robot is below it, and a hopeless context breaks its own
+        constraints.
         """
         asked = reception.last(SampleContext, reception.receiver, reception.sender)
         if asked is None:
@@ -173,7 +175,7 @@ class SampleCost(wire.Message, frozen=True):
 
 
 class Fixed(wire.Message, frozen=True):
-    """The final values of the receiver's separator: from now on it samples for these only."""
+    """The final values in the receiver's separator: from now on the receiver samples only for these."""
 
     values: dict[str, wire.Value]
 
@@ -187,7 +189,7 @@ class Fixed(wire.Message, frozen=True):
 
 
 class Samples:
-    """The samples of one context.
+    """The samples in one context.
 
     `local` are the costs of this robot's values with those above, and `options` the values that are still tried: they
     break nothing above, and no context below them was hopeless. `scale` is the highest possible cost of the subtree; a
@@ -197,7 +199,7 @@ class Samples:
     def __init__(self, local: Sequence[LexicographicCost], scale: int) -> None:
         self.options = [place for place, (broken, _) in enumerate(local) if not broken]
         self.taken = 0
-        """The number of samples, of all values."""
+        """The number of samples, for all values together."""
         self._local = local
         self._scale = max(1, scale)
         self._tries = [0] * len(local)
@@ -229,14 +231,14 @@ class Samples:
             self._least[place] = int(self._local[place][1]) + sum(best for best in below if best is not None)
 
     def next(self, settings: DUCTSettings) -> int:
-        """Return the value for the next sample: the cheapest that was never tried, or that with the least bound."""
+        """Return the value for the next sample: the cheapest value never tried, or the value with the least bound."""
         new = [place for place in self.options if not self._tries[place]]
         if new or not self.options:
             return self._cheapest(new or range(len(self._local)))
         return min(self.options, key=lambda place: self._measure(place, settings) - self._margin(place, settings))
 
     def final(self) -> int:
-        """Return the value of the best solution; if there is none, the one with the least mean cost."""
+        """Return the value in the best solution; if there is none, the value with the least mean cost."""
         if self.best is not None:
             return next(place for place in self.options if self._least[place] == self.best)
         tried = [place for place in self.options if self._tries[place]]
@@ -269,14 +271,14 @@ class Samples:
         return self._mean(place) if settings.by == "mean" or least is None else least / self._scale
 
     def _margin(self, place: int, settings: DUCTSettings) -> float:
-        """Return by how much a value may be better than its samples; it falls with the number of tries."""
+        """Return by how much a value may be better than its samples; this margin falls with the number of tries."""
         return settings.bound * math.sqrt(2 * math.log(2 * self.taken) / self._tries[place])
 
 
 MOST_ROBOTS = 100_000
-"""The most robots of a separator."""
+"""The maximum number of robots in a separator."""
 Key = tuple[wire.Value, ...]
-"""The values of a separator, in its order."""
+"""The values in a separator, in its order."""
 
 
 class DUCT(TreeProtocol):
@@ -284,7 +286,7 @@ class DUCT(TreeProtocol):
 
     State: `separators` of the children, this robot's `separator`, `dearest` (the highest possible cost of the subtree),
     `known` (the samples of each context), and of the present sample the `view` (the context) and its `samples`.
-    `fixed`: the robots above have chosen. `chosen`: this one has, too.
+    `fixed`: the robots above have chosen their values. `chosen`: this robot has chosen, too.
     """
 
     messages = TreeMessage | Separator | SampleContext | SampleCost | Fixed
@@ -310,7 +312,7 @@ class DUCT(TreeProtocol):
         self.samples = Samples([], 0)
         self.fixed = self.chosen = False
         self._costs: dict[str, SampleCost] = {}
-        """The children's costs of the present sample."""
+        """The children's costs in the present sample."""
         self._sampling = False
 
     def start_in_tree(self) -> None:
@@ -364,7 +366,7 @@ class DUCT(TreeProtocol):
     # Contexts, from the root down
 
     def _enter_context(self, sender: str | None, values: Mapping[str, wire.Value]) -> None:
-        """Make a context the present one, with its stored samples or new ones."""
+        """Make a context the present one, with its stored samples or without samples if it is new."""
         if sender != self.parent or self._sampling or self.fixed:
             raise ValueError(f"{sender} requested an unexpected sample from {self.problem.agent}")
         if values.keys() != {*self.separator}:
@@ -409,7 +411,7 @@ class DUCT(TreeProtocol):
             self._record_cost()
 
     def _context_of(self, child: str) -> dict[str, wire.Value]:
-        """Return the values of a child's separator."""
+        """Return the values in a child's separator."""
         values = {**self.view, self.problem.agent: self.problem.values[self._present]}
         return {name: values[name] for name in self.separators[child]}
 

@@ -1,9 +1,9 @@
 """The Generalized Distributed Breakout Algorithm (GDBA).
 
 Local search in cycles: MGM in which constraints weigh more the longer they keep robots in a local minimum. Each robot
-has its own modifiers for the entries of its constraints' tables; a cost combined with its modifier is the effective
+has its own modifiers for the entries in its constraints' tables; a cost combined with its modifier is the effective
 cost. All robots send their values, then the reduction of their effective cost by their best move; among neighbours the
-one with the largest reduction moves. If neither a robot nor one of its neighbours can reduce its cost (a quasi-local
+robot with the largest reduction moves. If neither a robot nor any of its neighbours can reduce its cost (a quasi-local
 minimum), the robot raises the modifiers of its violated constraints.
 
 - **When to use**: costs, a large team, time for many cycles: it leaves the local optima in which MGM ends.
@@ -22,15 +22,16 @@ The paper's three choices, 24 variants in all:
     scope of a raise: entry, row, column, table (E, R, C, T)        `scope`, `_key`
     send value, send improvement, raise or move                     `exchange_values`, `_send_improve`, `_move`
 
-With A and R, or A and T, all values of a robot are raised alike, so no decision changes: these variants are exactly
+With A and R, or A and T, all values of a robot are raised equally, so no decision changes: these variants are exactly
 MGM. E and C leave minima fastest, but never settle; their last cycle may be far from the best one.
 
 Choices that the paper leaves open, and differences:
 
-- A row (R) is all values of the robot against the others' current values, a column (C) its value against all of theirs.
-- Constraints may be n-ary; then the others' current values are those of all other robots of the scope.
-- A broken hard constraint counts as a cost larger than all others: costs are pairs as in `mgm`, and a broken
-  constraint is raised by one broken constraint (A) or weighs as one more (M).
+- A row (R) contains all values of the robot with the others' current values, a column (C) the robot's value with all
+  values of the others.
+- Constraints may be n-ary; then the others' current values are those of all other robots in the scope.
+- A broken hard constraint counts as a cost larger than all others: costs are pairs as in `mgm`, and raising a broken
+  constraint adds one broken constraint (A) or makes it count once more (M).
 - A robot's private costs are not shared constraints, and are never raised.
 - First values, equally good values, equal reductions and lost messages are treated as in `mgm`.
 
@@ -123,7 +124,7 @@ class GDBA(Gainers):
         self.exchange_values(self._send_improve)
 
     def _send_improve(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the reduction of this robot's best move, once all neighbours' values are known."""
+        """Send the reduction by this robot's best move, once all neighbours' values are known."""
         self._charged = self.problem.charged(self.checked_values(messages))
         self.find_best_move(self._effective_costs())
         broken, cost = self.gain
@@ -189,7 +190,7 @@ class GDBA(Gainers):
         return cost > least if self.settings.violation == "NM" else cost == most
 
     def _key(self, code: int, others: OtherValues) -> Key:
-        """Return the key of all entries that are raised together with that of `code` and the others' values."""
+        """Return the key of all entries that are raised together with the entry for `code` and the others' values."""
         scope = self.settings.scope
         return code if scope in "EC" else None, others if scope in "ER" else None
 

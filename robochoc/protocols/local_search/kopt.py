@@ -1,11 +1,11 @@
 """k-optimal local search in rounds (KOPT).
 
 MGM for groups: in each cycle every robot, as the centre of a group, finds the best joint move of at most `k` connected
-robots, including itself. Of moves that would touch each other only the one with the largest gain is made. So the cost
-falls by the gain of each move, until no `k` connected robots can gain.
+robots, including itself. Among moves that would affect each other, only the move with the largest gain is made. So the
+cost falls by the gain of each move, until no `k` connected robots can gain.
 
-- **When to use**: as MGM or MGM-2, for better answers: a bound on how good a k-optimum is grows with k. A robot
-  enumerates the values of k robots, and learns the constraints of those around it.
+- **When to use**: as MGM or MGM-2, for better results: the guaranteed quality of a k-optimum grows with k. A robot
+  enumerates the values of k robots, and learns the constraints of the robots around it.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
   one cycle to the next (anytime). When no more moves are found, no k connected robots can do better by moving
   together (k-optimum). A robot with an empty domain proves that there is no solution.
@@ -23,15 +23,15 @@ at most r links from one of them, their centre:
     the best move of each centre         2 r + 1 links                  `_offer`, `_select_move`
     selected moves                       r links                        `_select_move`, `_move`
 
-That is 4 r + 2 messages to each neighbour in a cycle. With k = 1 it is MGM.
+This takes 4 r + 2 messages to each neighbour in a cycle. With k = 1 it is MGM.
 
 Choices that the papers leave open, and differences:
 
-- A centre alone decides whether its group moves: it knows all moves that touch its own, which move one of its robots or
-  their neighbours. Of equal gains the one of the first centre in the priority order wins. In KOPT the robots of a group
+- A centre alone decides whether its group moves: it knows all moves that affect its own, which move one of its robots
+  or their neighbours. If gains are equal, the first centre in the priority order wins. In KOPT the robots in a group
   vote.
-- The first value is chosen at random. Of moves with equal gains a centre offers one with the fewest robots.
-- Constraints may be n-ary: all robots of a scope are one link apart.
+- The first value is chosen at random. Among moves with equal gains, a centre offers one with the fewest robots.
+- Constraints may be n-ary: all robots in a scope are one link apart.
 - A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
 - Constraints are sent as tables, each by the robot of highest priority in its scope. If the values of a group have more
   than 2^20 combinations, or a robot is in more than 20,000 groups, the run ends before the search starts.
@@ -90,9 +90,9 @@ Place = Annotated[int, msgspec.Meta(ge=0)]
 
 
 class CostList(msgspec.Struct, frozen=True, array_like=True):
-    """The costs of a constraint for all combinations of values of `scope`, the last robot's place changing first.
+    """The costs of a constraint for all combinations of values of `scope`; the last robot's index changes first.
 
-    The robots are in priority order. `inf` is a violated hard constraint.
+    The robots are in priority order. `inf` means a violated hard constraint.
     """
 
     scope: list[str]
@@ -122,13 +122,14 @@ class Region(wire.Message, frozen=True):
     def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return the costs of single values and of pairs of robots' values.
 
-        Constraints of more robots are left out, as other messages may contain others of the same robots.
+        Constraints between more robots are left out, because other messages may contain other constraints of the same
+        robots.
         """
         return [proof for robot, part in self.parts.items() for proof in _part_proves(robot, part, reception)]
 
 
 class Values(wire.Message, frozen=True):
-    """The places of the values of robots that have moved, if they are new to the sender."""
+    """The values of robots that have moved, as indices, if they are new to the sender."""
 
     places: dict[str, Place]
 
@@ -141,7 +142,7 @@ class Values(wire.Message, frozen=True):
 
 
 class Offer(msgspec.Struct, frozen=True, array_like=True):
-    """A move of several robots: the places of their new values, and the gain (broken hard constraints, and costs)."""
+    """A move of several robots: the indices of their new values, and the gain (broken hard constraints, and costs)."""
 
     broken: int
     cost: int | float
@@ -154,7 +155,7 @@ class Offers(wire.Message, frozen=True):
     offers: dict[str, Offer]
 
     act = Act(Performative.PROPOSE, "the savings of robots around by moving together")
-    proves_nothing = True  # the moves are those of several robots
+    proves_nothing = True  # the moves involve several robots
 
     def in_words(self, _: Wording) -> str:
         if not self.offers:
@@ -167,7 +168,7 @@ class Offers(wire.Message, frozen=True):
 
 
 class MoveTogether(wire.Message, frozen=True):
-    """The selected moves: the places of the robots' new values, if they are new to the sender."""
+    """The selected moves: the indices of the robots' new values, if they are new to the sender."""
 
     moves: dict[str, Place]
 
@@ -179,7 +180,7 @@ class MoveTogether(wire.Message, frozen=True):
 
 
 def _part_proves(robot: str, part: ProblemPart, reception: Reception) -> Iterator[Proof]:
-    """Yield the proofs of a robot's part, if the receiver knows the values of its places."""
+    """Yield the proofs in a robot's part, if the receiver knows the values that its indices refer to."""
     values = reception.values(robot)
     if values is None:
         return
@@ -204,7 +205,7 @@ def _pairs(robot: str, part: ProblemPart) -> dict[str, list[int | float]]:
 
 
 MOST_COMBINATIONS = 1 << 20
-"""The most combinations of a group's values: more would need gigabytes and minutes."""
+"""The maximum number of combinations of a group's values: more would need gigabytes and minutes."""
 
 
 MOST_GROUPS = 20_000
@@ -217,25 +218,25 @@ Counts = NDArray[np.int64]
 
 
 Group = tuple[str, ...]
-"""In priority order."""
+"""A group of robots, in priority order."""
 
 
 class ConstraintCosts(NamedTuple):
-    """The costs of a constraint, with an axis for each robot of `scope`: broken hard constraints, and other costs."""
+    """The costs of a constraint, with an axis for each robot in `scope`: broken hard constraints, and other costs."""
 
     scope: Group
     broken: Counts
     cost: Counts
 
     def in_group(self, group: Group, sizes: Mapping[str, int], view: Mapping[str, int]) -> tuple[Counts, Counts]:
-        """Return the costs with an axis for each robot of `group`; all others keep their values of `view`."""
+        """Return the costs with an axis for each robot in `group`; all others keep their values in `view`."""
         index = tuple(slice(None) if name in group else view[name] for name in self.scope)
         shape = [sizes[name] if name in self.scope else 1 for name in group]
         return self.broken[index].reshape(shape), self.cost[index].reshape(shape)
 
 
 class GroupMove(NamedTuple):
-    """A joint move: its gain, and the places of the new values of the moving robots."""
+    """A joint move: its gain, and the indices of the new values of the moving robots."""
 
     gain: LexicographicCost
     moves: dict[str, int]
@@ -244,8 +245,8 @@ class GroupMove(NamedTuple):
 class Neighbourhood:
     """The problem of the robots around a centre, and the groups that the centre may lead.
 
-    `groups` are the largest connected ones of at most `k` robots that include the centre and are at most `radius` links
-    away. Smaller ones are contained in them, as robots of a group may keep their values.
+    `groups` are the largest connected groups of at most `k` robots that include the centre and are at most `radius`
+    links away. Smaller groups are contained in them, because robots in a group may keep their values.
     """
 
     def __init__(
@@ -275,7 +276,7 @@ class Neighbourhood:
                 self._on[name].append(costs)
 
     def touched(self, group: Iterable[str]) -> dict[str, None]:
-        """Return the robots of a group and all that share a constraint with them, in a fixed order."""
+        """Return the robots in a group and all that share a constraint with them, in a fixed order."""
         return {name: None for member in group for costs in self._on[member] for name in costs.scope}
 
     def _reached(self, radius: int) -> dict[str, None]:
@@ -286,7 +287,7 @@ class Neighbourhood:
         return found
 
     def _connected(self, k: int) -> list[Group]:
-        """Return the connected groups of `k` robots, or of all if there are fewer."""
+        """Return the connected groups of `k` robots, or the group of all robots if there are fewer than `k`."""
         groups: dict[Group, None] = {(self._centre,): None}
         for _ in range(k - 1):
             larger: dict[Group, None] = {}
@@ -310,7 +311,7 @@ class Neighbourhood:
         return group
 
     def best(self, view: Mapping[str, int]) -> GroupMove:
-        """Return the group's move with the largest gain; of several, that of the fewest robots, then the first one."""
+        """Return the move with the largest gain; if there are several, the first one with the fewest robots."""
         moves = (self.best_of(group, view) for group in self.groups)
         return max(moves, key=lambda move: (move.gain, -len(move.moves)))
 
@@ -381,7 +382,7 @@ class KOpt(CycleProtocol):
 
     @property
     def radius(self) -> int:
-        """The most links between a group's centre and a robot of the group."""
+        """The maximum number of links between a group's centre and a robot in the group."""
         return self.settings.k // 2
 
     def start_cycles(self) -> None:
@@ -453,7 +454,7 @@ class KOpt(CycleProtocol):
         self._spread(Values, moved, self.radius + 1, self._offer)
 
     def _offer(self, moved: dict[str, int]) -> None:
-        """Send the best move of a group around this robot, once all values around are known."""
+        """Send the best move of a group around this robot, once all values around it are known."""
         region = self._known_region
         for name, place in moved.items():
             if place >= region.sizes.get(name, 0):
@@ -468,7 +469,7 @@ class KOpt(CycleProtocol):
         self._spread(Offers, offers, 2 * self.radius + 1, self._select_move)
 
     def _select_move(self, offers: dict[str, Offer]) -> None:
-        """Let this robot's group move if no other move that touches it gains more."""
+        """Let this robot's group move if no other move that affects it has a larger gain."""
         moves = self.offer.moves if self.offer and self._wins(self.offer, offers) else {}
         self._spread(MoveTogether, moves, self.radius, self._move)
 

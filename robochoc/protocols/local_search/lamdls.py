@@ -1,11 +1,12 @@
 """Latency-aware Monotonic Distributed Local Search (LAMDLS).
 
-Local search in which neighbours never move at the same time. First the robots colour themselves: neighbours have
-different colours. Then in each cycle a robot waits until its neighbours of smaller colours have moved, and chooses its
-best value against the present values of all neighbours. Robots of the same colour move at the same time, and no robot
-waits for others than its neighbours.
+Local search in which neighbours never move at the same time. First the robots colour themselves so that neighbours have
+different colours. Then in each cycle a robot waits until its neighbours with smaller colours have moved, and chooses
+its best value given the present values of all neighbours. Robots with the same colour move at the same time, and no
+robot waits for robots other than its neighbours.
 
-- **When to use**: as MGM: the cost never rises. A cycle needs half of MGM's messages, and every robot may move in it.
+- **When to use**: as MGM: the cost never rises. A cycle needs half as many messages as in MGM, and every robot may move
+  in it.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
   one cycle to the next (anytime), and it ends in a local optimum after enough cycles. The course of the search
   does not depend on message delays. A robot with an empty domain proves that there is no solution.
@@ -13,7 +14,7 @@ waits for others than its neighbours.
 - **Reference**: Rachmut, Zivan, Yeoh: "Communication-aware local search for distributed constraint optimization",
   IJCAI 2022.
 
-Its two phases:
+The two phases:
 
     the robots colour themselves          `_choose_colour`, `_start_first_step`
     a step, after the same step of all    `_wait_for_earlier`, `_move`, `_wait_for_later`
@@ -21,17 +22,17 @@ Its two phases:
 
 Choices that the paper leaves open, and differences:
 
-- A robot chooses its colour when all neighbours of higher priority have theirs: the smallest that is free. The first
+- A robot chooses its colour when all neighbours with higher priority have theirs: the smallest free colour. The first
   value, chosen at random, is sent with the colour.
-- A robot that cannot gain keeps its value. One of several best values is chosen at random.
+- A robot that cannot gain keeps its value. If there are several best values, one is chosen at random.
 - Values need no step number: from each neighbour they arrive in the order of its steps.
-- Constraints may be n-ary, as all robots of a scope are neighbours.
+- Constraints may be n-ary, because all robots in a scope are neighbours.
 - Fewer violated hard constraints are always better, so plain DisCSPs work, too.
-- For a lost value, the neighbour's last known value is used. A neighbour whose colour is lost moves before or after
-  this robot by its priority. Then neighbours may move at the same time, and the cost may rise.
+- If a value is lost, the neighbour's last known value is used. A neighbour whose colour is lost moves before or after
+  this robot depending on its priority. Then neighbours may move at the same time, and the cost may rise.
 
 The cost never rises, because a robot that moves knows its neighbours' present values, and none of them can move before
-it has sent its value. So the team saves as much by each move as the robot does.
+it has sent its value. So each move saves the team as much as it saves the robot.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -60,7 +61,7 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class Colour(wire.Message, frozen=True):
-    """The sender's first value, and its colour: a number that no neighbour has."""
+    """The sender's first value, and its colour: a number that none of its neighbours has."""
 
     value: wire.Value
     colour: Annotated[int, msgspec.Meta(ge=0)]
@@ -77,7 +78,8 @@ class Colour(wire.Message, frozen=True):
 class LAMDLS(CycleProtocol):
     """One agent of LAMDLS.
 
-    State: this robot's `colour`, the neighbours of smaller colours (`earlier`) and of larger ones (`later`), and the
+    State: this robot's `colour`, the neighbours with smaller colours (`earlier`) and with larger ones (`later`), and
+        the
     `view`: the neighbours' present values.
     """
 
@@ -99,13 +101,13 @@ class LAMDLS(CycleProtocol):
         own = order.rank[problem.agent]
         self.colour: int | None = None
         self.earlier = tuple(name for name in problem.neighbours if order.rank[name] < own)
-        """At first the neighbours of higher and lower priority: the order of colouring."""
+        """At first these are the neighbours with higher and lower priority: the order of colouring."""
         self.later = tuple(name for name in problem.neighbours if order.rank[name] > own)
         self.view: dict[str, wire.Value] = {}
         self._colours: dict[str, int] = {}
 
     def start_cycles(self) -> None:
-        """Choose a random value, and wait for the colours of all neighbours of higher priority."""
+        """Choose a random value, and wait for the colours of all neighbours with higher priority."""
         self.choose(self.any_value())
         self.listen(self.earlier, self._choose_colour)
 
@@ -128,7 +130,7 @@ class LAMDLS(CycleProtocol):
         self._wait_for_earlier()
 
     def _is_before(self, name: str, *, higher: bool) -> bool:
-        """Return whether a neighbour moves first: by its colour; if that is lost or the same, by its priority."""
+        """Return whether a neighbour moves first: by its colour, or, if that is lost or the same, by its priority."""
         colour, own = self._colours.get(name), self.colour
         return higher if colour is None or own is None or colour == own else colour < own
 
@@ -153,7 +155,7 @@ class LAMDLS(CycleProtocol):
         self.listen(self.earlier, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Choose the best value against the neighbours' values, and send it."""
+        """Choose the best value given the neighbours' values, and send it."""
         self.view |= self.checked_values(messages)
         costs = self.problem.lexicographic_costs(self.view)
         least = min(costs)
@@ -166,6 +168,6 @@ class LAMDLS(CycleProtocol):
             self.listen(self.later, self._wait_for_later)
 
     def _wait_for_later(self, messages: Mapping[str, wire.Message]) -> None:
-        """Start the next step, once all neighbours of larger colours have made the last one."""
+        """Start the next step, once all neighbours with larger colours have made the last one."""
         self.view |= self.checked_values(messages)
         self._wait_for_earlier()

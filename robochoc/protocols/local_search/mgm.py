@@ -1,8 +1,8 @@
 """Maximum Gain Message (MGM).
 
 Local search in cycles: distributed breakout (Yokoo, Hirayama 1996) without weights. All robots send their values, then
-the gain of their best move. Among neighbours only the one with the largest gain moves. So a move saves the team what it
-saves the robot.
+the gain of their best move. Among neighbours only the robot with the largest gain moves. So a move saves the team as
+much as it saves the robot.
 
 - **When to use**: as DSA, if the cost must never rise. It ends in a local optimum.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
@@ -11,7 +11,7 @@ saves the robot.
 - **References**: Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS
   2004, Section 3; Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007.
 
-The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
+The paper's procedures (Algorithm MGM, `allNeighbors`, `currentContext`):
 
     SendValueMessage, GetValueMessages   `exchange_values`, `_send_gain`
     BestUnilateralGain                   `best_unilateral`
@@ -20,11 +20,12 @@ The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
 
 Choices that the paper leaves open:
 
-- The first value is chosen at random, and so is one of several best values.
-- If neighbours have the same gain, the first one in the priority order moves.
-- Constraints may be n-ary, as all robots of a scope are neighbours.
+- The first value is chosen at random; if there are several best values, one of them is chosen at random.
+- If neighbours have the same gain, the first of them in the priority order moves.
+- Constraints may be n-ary, because all robots in a scope are neighbours.
 - A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
-- For a lost value, the neighbour's last known value is used; a robot that misses a gain stays. Then the cost may rise.
+- If a value is lost, the neighbour's last known value is used; a robot that misses a gain stays. Then the cost may
+  rise.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -62,7 +63,7 @@ class Gain(wire.Message, frozen=True):
     cost: int | float
 
     act = Act(Performative.INFORM, "the receiver learns the saving by the sender's move")
-    # A gain may be that of two robots that move together (MGM-2), weighted (GDBA), or contain transferred costs
+    # A gain may belong to two robots that move together (MGM-2), be weighted (GDBA), or contain transferred costs
     # (MCS-MGM). So it does not bound the sender's cost.
     proves_nothing = True
 
@@ -132,7 +133,7 @@ class MGM(Gainers):
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if this robot's gain is the largest of all neighbours' gains; stay if one of them is lost."""
+        """Move if this robot's gain is the largest among all neighbours; stay if one of their gains is lost."""
         moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
         self.choose(self.target if moves else self.present)
         if not self.finished:

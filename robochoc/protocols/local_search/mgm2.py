@@ -2,12 +2,12 @@
 
 MGM in which two neighbours may also move together. In each cycle a robot is an offerer with probability `threshold`
 (the paper's q). An offerer sends one random neighbour an offer: its gain for each pair of their values. The receiver
-adds its gain on constraints that do not include the offerer, so shared constraints count once. It accepts the best
-offer if its total gain is positive; then both robots are committed to the joint move. As in MGM, the robot with the
-largest gain among its neighbours moves. A committed pair moves if both have the largest gain, each among its neighbours
-without the partner.
+adds its gain on constraints that do not include the offerer, so shared constraints count once. The receiver accepts the
+best offer if its total gain is positive; then both robots are committed to the joint move. As in MGM, the robot with
+the largest gain among its neighbours moves. A committed pair moves if both have the largest gain, each among its
+neighbours without the partner.
 
-- **When to use**: as MGM, for better answers with more messages.
+- **When to use**: as MGM, if better results are worth more messages.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
   one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `threshold` (q; default 0.5), `cycles` (default 100).
@@ -24,16 +24,16 @@ The phases of a cycle:
 
 Choices that the paper leaves open, and differences:
 
-- An offer contains all pairs of values, also those with which the offerer alone does not gain. Without them, as in the
+- An offer contains all pairs of values, also pairs with which the offerer alone does not gain. Without these, as in the
   paper, some moves that save the team costs are missed. With them, a team in which no robot or pair can gain is at a
   2-optimum.
-- A robot that is not an offerer, or has no offer for a neighbour, sends an empty offer, as its neighbours wait for all
-  offers.
+- A robot that is not an offerer, or has no offer for a neighbour, sends an empty offer, because its neighbours wait for
+  all offers.
 - First values, equally good values and equal gains are treated as in `mgm`. Constraints may be n-ary.
-- For a lost value, the neighbour's last known value is used. A neighbour whose domain or value is unknown receives no
-  offer; a lost answer counts as a rejection; a robot that misses a gain, or its partner's `Go`, stays. If only one of a
-  pair moves, the cost may rise. Then the types of messages tell the phases apart, as answers and `Go` are sent to some
-  neighbours only.
+- If a value is lost, the neighbour's last known value is used. A neighbour whose domain or value is unknown receives no
+  offer; a lost answer counts as a rejection; a robot that misses a gain, or its partner's `Go`, stays. If only one
+  robot in a pair moves, the cost may rise. In this case the message types distinguish the phases, because answers and
+  `Go` are sent to some neighbours only.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -77,7 +77,7 @@ Gains = list[list[tuple[int, int | float]]]
 
 
 class Offer(wire.Message, frozen=True):
-    """An offer of a joint move: a row for each of the receiver's values, with a gain for each of the sender's.
+    """An offer of a joint move: a row for each of the receiver's values, with a gain for each of the sender's values.
 
     A gain is a pair: broken hard constraints, and costs. None: no offer (`offer`).
     """
@@ -96,7 +96,7 @@ class Offer(wire.Message, frozen=True):
         return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        """Return the costs of pairs of values above the cheapest pair, if no other robot's value is in them."""
+        """Return the costs of pairs of values above the cheapest pair, if they involve no other robot's value."""
         own = reception.last(Domain, reception.receiver, reception.sender)
         theirs = reception.last(Domain, reception.sender, reception.receiver)
         if own is None or theirs is None or not self.gains or not reception.is_only_neighbour():
@@ -117,7 +117,7 @@ class Offer(wire.Message, frozen=True):
 
 
 class Accept(wire.Message, frozen=True):
-    """The acceptance of an offer: the receiver's value at `place`, and the total gain (`accept`)."""
+    """The acceptance of an offer: the receiver's value at index `place`, and the total gain (`accept`)."""
 
     place: int
     broken: int
@@ -159,11 +159,11 @@ class Go(wire.Message, frozen=True):
 
 
 _DOMAINS, _VALUES, _OFFERS, _ANSWERS, _GAINS, _GO = range(-1, 5)
-"""The phases: the first one once, the others in each cycle."""
+"""The phases: the first occurs once, the others in each cycle."""
 _PHASES = 5
 """The phases of a cycle."""
 _MOST_AHEAD = 2
-"""The most phases that a neighbour can be ahead, as it waits for this robot in three of five."""
+"""The maximum number of phases that a neighbour can be ahead, since it waits for this robot in three of five phases."""
 
 
 def _phase_of(message: wire.Message) -> int:
@@ -184,7 +184,7 @@ def _phase_of(message: wire.Message) -> int:
 
 
 class JointMove(NamedTuple):
-    """A joint move: its gain, the partner, and the places of both values."""
+    """A joint move: its gain, the partner, and the indices of both values."""
 
     gain: LexicographicCost
     partner: str
@@ -234,7 +234,7 @@ class MGM2(Gainers):
         self.listen_for(_VALUES, self.problem.neighbours, self._offer)
 
     def _offer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Become an offerer or not, once all neighbours' values are known."""
+        """Become an offerer with the given probability, once all neighbours' values are known."""
         self.view = self.checked_values(messages)
         self.partner = None
         if self.chance() < self.settings.threshold:
@@ -253,7 +253,7 @@ class MGM2(Gainers):
         return [[gain(now, cost) for cost in row] for row in rows]
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
-        """Answer all offers: an offerer rejects them; other robots accept the best if it gains anything."""
+        """Answer all offers: an offerer rejects them; other robots accept the best offer if its gain is positive."""
         offers = {name: offer.gains for name, offer in messages.items() if isinstance(offer, Offer) and offer.gains}
         if self.partner is not None:
             self.multicast(offers, Reject())
@@ -277,7 +277,7 @@ class MGM2(Gainers):
     def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
         """Yield all offered moves with the total gain of both robots.
 
-        They are the offerer's gain plus this robot's gain on constraints that do not include the offerer.
+        The total gain is the offerer's gain plus this robot's gain on constraints that do not include the offerer.
         """
         costs = self.problem.lexicographic_costs({name: value for name, value in self.view.items() if name != offerer})
         now = costs[self.present]
@@ -325,7 +325,7 @@ class MGM2(Gainers):
     # Phases when messages are lost
 
     def listen_for(self, phase: int, names: Sequence[str], then: Then) -> None:
-        """Listen to the robots in `names` for messages of a phase."""
+        """Listen for messages of a phase from the robots in `names`."""
         self._phase = phase
         self.listen(names, then)
 
@@ -337,7 +337,7 @@ class MGM2(Gainers):
         return self._phase != _DOMAINS and (phase - self._phase) % _PHASES > _MOST_AHEAD
 
     def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
-        """Remove and return the next messages of this phase; messages of later phases remain for them."""
+        """Remove and return the next messages of this phase; messages of later phases stay stored."""
         waiting = [self._waiting[name] for name in self._names]
         for name, queue in zip(self._names, waiting, strict=True):
             while queue and (first := queue[0]) is not None and self.may_be_late(first):

@@ -1,9 +1,9 @@
 """DSA for hard and soft constraints (MixedDSA).
 
 DSA with separate probabilities for hard and soft constraints. A robot compares its values by the number of hard
-constraints that they violate, then by the cost of all others. A move that reduces this number is made with one
-probability, a move that only saves cost with another. So the team can satisfy its hard constraints fast, and reduce its
-costs with care.
+constraints that they violate, then by the cost of all other constraints. A move that reduces this number is made with
+one probability, a move that only saves cost with another. So the team can satisfy its hard constraints quickly, and
+reduce its costs with care.
 
 - **When to use**: hard and soft constraints together, a large team.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
@@ -11,13 +11,13 @@ costs with care.
 - **Parameters (`--set`)**: `hard` (the probability of a move if hard constraints are violated; default 0.7), `soft`
   (the probability of any other move; default 0.5), `variant` (A, B or C as in `dsa`; default B), `cycles` (default
   100).
-- **References**: the variant is that of the library pyDcop (Rust, Picard, Ramparany: "Using message-passing DCOP
+- **References**: this variant comes from the library pyDcop (Rust, Picard, Ramparany: "Using message-passing DCOP
   algorithms to solve energy-efficient smart environment configuration problems", IJCAI 2016, where devices have hard
   and soft constraints). For DSA: Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed
   breakout: properties, comparison and applications to constraint optimization problems in sensor networks", AIJ 161,
   2005.
 
-The rules, by the best value compared with the present one:
+The rules, depending on how the best value compares with the present one:
 
     fewer hard constraints violated              move with probability `hard`
     as many, but cheaper                         `soft`
@@ -25,8 +25,8 @@ The rules, by the best value compared with the present one:
     no better, some other constraint charges     `soft` (variants B and C)
     no better, nothing charges                   `soft` (variant C)
 
-A constraint is hard for a combination of values that breaks it (`inf`), and soft for one that it charges a cost; the
-same constraint may do both. First values are random, and constraints may be n-ary, as in `dsa`.
+A constraint is hard for a combination of values that breaks it (`inf`), and soft for a combination to which it assigns
+a cost; the same constraint may be both. First values are random, and constraints may be n-ary, as in `dsa`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -83,7 +83,7 @@ class MixedDSA(StochasticSearch):
     )
 
     def proposal(self, costs: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the best values, and the probability by the change that they bring."""
+        """Return the best values, and the probability that belongs to the resulting change."""
         now, least = costs[self.present], min(costs)
         return self.places_of(least, costs), self._probability(now, least)
 

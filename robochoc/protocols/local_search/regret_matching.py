@@ -1,8 +1,9 @@
 """Regret matching: plain (RM), clipped (RM+), and weighted with inertia (WRM-I).
 
-Local search in cycles. The regret of a value is the cost that a robot would have saved so far with that value instead
-of those that it had, against its neighbours' values at the time. In each cycle a robot draws a value with a probability
-proportional to its regret, if that is positive. So it prefers values that paid over many cycles, not only now.
+Local search in cycles. The regret of a value is the cost that a robot would have saved so far with this value instead
+of the values that it had, given its neighbours' values at the time. In each cycle a robot draws a value with a
+probability proportional to its regret, if that is positive. So it prefers values that paid over many cycles, not only
+in the last one.
 
 - **When to use**: as `dsa`, with time for thirty cycles or more.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
@@ -16,7 +17,7 @@ proportional to its regret, if that is positive. So it prefers values that paid 
   approximate best-response algorithms for distributed constraint optimization problems", Knowledge Engineering Review
   26, 2011 (WRM-I); Tammelin: "Solving large imperfect information games using CFR+", 2014 (RM+).
 
-The rules, where u is the cost of a value against the neighbours' values of the previous cycle:
+The rules, where u is the cost of a value given the neighbours' values of the previous cycle:
 
     regret(k) <- (1 - rho) regret(k) + rho (u(now) - u(k))    `_update_regrets`
     rm+: max(regret(k), 0) instead                            `_update_regrets`
@@ -29,8 +30,9 @@ Choices that the papers leave open, and differences:
   the robot's actual value, as in Hart and Mas-Colell, not with the mean of the values that it might have drawn.
 - A robot without a positive regret keeps its value, as in the paper of Marden and others. So a local optimum is kept,
   once all robots have learnt it.
-- A broken hard constraint costs 1 more than the dearest value of this robot so far, without broken constraints.
-- Regrets are integers, in 65,536ths of a cost, so nothing depends on a machine's rounding. Rounding is down.
+- A broken hard constraint costs 1 more than this robot's most expensive value so far, not counting broken constraints.
+- Regrets are integers, in units of 1/65,536 of a cost, so nothing depends on a machine's rounding. Values are rounded
+  down.
 - First values are random, and constraints may be n-ary, as in `dsa`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -76,7 +78,7 @@ class RegretMatchingSettings(CycleSettings, frozen=True):
 
 
 UNIT = 1 << 16
-"""The integer that represents a regret of one cost: integers represent its fractions exactly."""
+"""The integer that represents a regret of one cost; integers then represent fractions exactly."""
 
 CHANCES = 1 << 53
 """Random numbers are multiples of 1 / CHANCES."""
@@ -85,7 +87,7 @@ CHANCES = 1 << 53
 class RegretMatching(OnePhase):
     """One agent of regret matching. A cycle has one phase: all robots send their values.
 
-    `regrets`: for each of this robot's values, the cost that it would have saved, in 65,536ths.
+    `regrets`: for each of this robot's values, the cost that it would have saved, in units of 1/65,536.
     """
 
     messages = Value | AnytimeMessage
@@ -132,7 +134,7 @@ class RegretMatching(OnePhase):
             self.regrets[place] = max(regret, 0) if clipped else regret
 
     def _draw(self, regrets: Sequence[int]) -> int:
-        """Return a random place, each with a probability proportional to its regret."""
+        """Return a random index, each with a probability proportional to its regret."""
         sums = list(accumulate(regrets))
         point = int(self.chance() * CHANCES) * sums[-1] // CHANCES
         return bisect_right(sums, point)

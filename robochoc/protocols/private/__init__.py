@@ -1,1 +1,1 @@
-"""Private optimisation: protocols that hide more from robots than the constraints that they do not share."""
+"""Private optimisation: protocols that hide more information than the constraints that robots do not share."""

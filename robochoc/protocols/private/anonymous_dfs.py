@@ -1,4 +1,4 @@
-"""Pseudo-trees that robots build without names: messages contain no names of robots, nor numbers of neighbours.
+"""Pseudo-trees that robots build without names: messages contain no names of robots, and no numbers of neighbours.
 
 As in `shared/dfs.py` a root is elected by waves of all candidates (the echo algorithm with extinction; Tel,
 "Introduction to Distributed Algorithms", 2nd edition, 2000, Section 7.2), and a token goes depth first from there. The
@@ -72,11 +72,11 @@ AnonymousTreeMessage = Wave | Token | Bounce | Back
 
 
 SCORE = 16
-"""The bytes of a score: two robots have the same score once in 2^128 pairs."""
+"""The number of bytes of a score: two robots have the same score once in 2^128 pairs."""
 
 
 class AnonymousTreeProtocol(TreeProtocol):
-    """One agent that finds its place in a pseudo-tree without names, and then runs a protocol on it."""
+    """One agent that finds its position in a pseudo-tree without names, and then runs a protocol on the tree."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -88,10 +88,10 @@ class AnonymousTreeProtocol(TreeProtocol):
 
     @abstractmethod
     def start_in_tree(self) -> None:
-        """Start the search; the place in the tree is known."""
+        """Start the search; the position in the tree is known."""
 
     def leave_tree(self) -> None:
-        """Forget the place in the tree, but not the election: the next tree has another root."""
+        """Forget the position in the tree, but not the election: the next tree has another root."""
         self.parent = None
         self.pseudo_parents = self.children = self.pseudo_children = ()
         self.placed = False
@@ -154,7 +154,7 @@ class AnonymousTreeProtocol(TreeProtocol):
         if not self._visited:
             self.enter(sender)
             return
-        self._met.add(sender)  # below, as a pseudo-child
+        self._met.add(sender)  # it is below, as a pseudo-child
         self.send(sender, Bounce())
 
     def enter(self, parent: str | None) -> None:
@@ -166,7 +166,7 @@ class AnonymousTreeProtocol(TreeProtocol):
         self._send_token()
 
     def _send_token(self) -> None:
-        """Send the token to a neighbour that may not be in the tree, or back if there is none."""
+        """Send the token to a neighbour that may not be in the tree yet, or back if there is none."""
         while self._to_visit and self._to_visit[-1] in self._met:
             self._to_visit.pop()
         if self._to_visit:
@@ -178,7 +178,7 @@ class AnonymousTreeProtocol(TreeProtocol):
         self._complete_subtree()
 
     def _complete_subtree(self) -> None:
-        """Set the place in the tree, and start the search: the whole subtree is in the tree."""
+        """Set the position in the tree, and start the search: the whole subtree is in the tree."""
         above = {*self.ancestors}
         self.children = self._sorted(name for name in self.children if name not in above)
         known = above | {*self.children}

@@ -1,7 +1,7 @@
-"""The group in which private protocols encrypt: the points of prime order of Edwards25519, by libsodium.
+"""The group in which private protocols encrypt: the points of prime order on Edwards25519, by libsodium.
 
 Only this module uses PyNaCl (the extra `private`), which wraps libsodium. Points and scalars are 32 bytes, opaque to
-other modules. Points that libsodium rejects, off the curve or of low order, cause a `ValueError`.
+other modules. Points that libsodium rejects, because they are off the curve or of low order, cause a `ValueError`.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ NEEDS = ("nacl", "pip install 'robochoc[private]'")
 """The module of PyNaCl, and how to install it (`Traits.needs`)."""
 NO_ELEMENT = "these bytes are not an element of the group"
 Secret = Callable[[int], int]
-"""`Protocol.secret`."""
+"""The type of `Protocol.secret`."""
 
 
 class PrimeGroup(ABC):
     """A group of prime order in which discrete logarithms are hard, written additively."""
 
     size: int
-    """Bytes of an element."""
+    """The number of bytes of an element."""
     zero: bytes
     """The neutral element."""
     one: bytes
@@ -34,19 +34,19 @@ class PrimeGroup(ABC):
 
     @abstractmethod
     def scalar(self, secret: Secret) -> bytes:
-        """Draw a scalar; all are equally likely."""
+        """Draw a scalar; all scalars are equally likely."""
 
     @abstractmethod
     def multiple(self, scalar: bytes) -> bytes:
-        """Return the generator, `scalar` times."""
+        """Return the generator multiplied by `scalar`."""
 
     @abstractmethod
     def times(self, scalar: bytes, element: bytes) -> bytes:
-        """Return `element`, `scalar` times. Raises `ValueError` if it is not an element."""
+        """Return `element` multiplied by `scalar`. Raises `ValueError` if it is not an element."""
 
     @abstractmethod
     def check(self, element: bytes) -> None:
-        """Raise `ValueError` unless `element` is an element, and not the neutral one."""
+        """Raise `ValueError` unless `element` is an element other than the neutral one."""
 
     @abstractmethod
     def plus(self, first: bytes, second: bytes) -> bytes:
@@ -72,11 +72,11 @@ class Ed25519(PrimeGroup):
         return bytes(self._sodium.crypto_core_ed25519_scalar_reduce(secret(512).to_bytes(64, "little")))
 
     def multiple(self, scalar: bytes) -> bytes:
-        """Return the base point, `scalar` times."""
+        """Return the base point multiplied by `scalar`."""
         return bytes(self._sodium.crypto_scalarmult_ed25519_base_noclamp(scalar))
 
     def times(self, scalar: bytes, element: bytes) -> bytes:
-        """Return `element`, `scalar` times. Raises `ValueError` if it is not a point of prime order."""
+        """Return `element` multiplied by `scalar`. Raises `ValueError` if it is not a point of prime order."""
         return self._by(self._sodium.crypto_scalarmult_ed25519_noclamp, scalar, element)
 
     def check(self, element: bytes) -> None:
@@ -85,18 +85,18 @@ class Ed25519(PrimeGroup):
             raise ValueError(NO_ELEMENT)
 
     def plus(self, first: bytes, second: bytes) -> bytes:
-        """Return the sum of two points; raises `ValueError` for some invalid ones."""
+        """Return the sum of two points; raises `ValueError` for some invalid points."""
         return self._by(self._sodium.crypto_core_ed25519_add, first, second)
 
     def minus(self, first: bytes, second: bytes) -> bytes:
-        """Return the difference of two points; raises `ValueError` for some invalid ones."""
+        """Return the difference of two points; raises `ValueError` for some invalid points."""
         return self._by(self._sodium.crypto_core_ed25519_sub, first, second)
 
     @staticmethod
     def _by(function: Callable[[bytes, bytes], bytes], first: bytes, second: bytes) -> bytes:
         try:
             return bytes(function(first, second))
-        except (RuntimeError, TypeError, ValueError) as refused:  # PyNaCl's own errors are these, too
+        except (RuntimeError, TypeError, ValueError) as refused:  # these are also the errors that PyNaCl raises itself
             raise ValueError(NO_ELEMENT) from refused
 
 

@@ -1,13 +1,13 @@
 """ElGamal encryption to a whole team, n out of n: a cipher can be opened only if all robots help.
 
-Each robot has a share of the secret key, and sends its public half; the team's public key is their sum. A cipher of an
-element M is the pair (r G, M + r H), for a random r, the generator G and the team's key H. Any robot can encrypt a
-cipher again, so that it cannot be distinguished from others, and each can remove its own share. Without any shares, M
+Each robot has a share of the secret key, and sends its public half; the team's public key is the sum of these. A cipher
+of an element M is the pair (r G, M + r H), for a random r, the generator G and the team's key H. Any robot can encrypt
+a cipher again, so that it cannot be distinguished from others, and each can remove its own share. Without any shares, M
 is left. (Desmedt, Frankel: "Threshold cryptosystems", CRYPTO 1989.)
 
-Here M is a bit: the neutral element, or the generator; or a sum of bits, which is 0 only if all are, as there are fewer
-bits than elements. A cipher of a sum is the sum of ciphers. Before a sum is opened it is blinded: multiplied by random
-scalars, so that it shows only whether it is 0.
+Here M is a bit (the neutral element or the generator), or a sum of bits, which is 0 only if all bits are 0, because
+there are fewer bits than group elements. The sum of ciphers is a cipher of the sum. Before a sum is opened it is
+blinded: multiplied by random scalars, so that it shows only whether it is 0.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ class TeamKey:
         """The public half of this robot's share."""
         self.joint = group.zero
         self.size = 2 * group.size
-        """Bytes of a cipher."""
+        """The number of bytes of a cipher."""
 
     def added_to(self, shares: bytes) -> bytes:
-        """Return the sum of public halves including this robot's."""
+        """Return the sum of public halves, including this robot's."""
         self._group.check(shares)
         return self._group.plus(shares, self.share)
 
@@ -43,22 +43,22 @@ class TeamKey:
         return self.renewed((self._group.zero, self._group.one) if bit else self.nothing)
 
     def renewed(self, pair: tuple[bytes, bytes]) -> bytes:
-        """Return another cipher of the same element, encrypted again."""
+        """Return another cipher of the same element: `pair` encrypted again."""
         scalar = self._group.scalar(self._secret)
         pad = self._group.plus(pair[0], self._group.multiple(scalar))
         return pad + self._group.plus(pair[1], self._group.times(scalar, self.joint))
 
     def added(self, first: tuple[bytes, bytes], second: tuple[bytes, bytes]) -> tuple[bytes, bytes]:
-        """Return a cipher of the sum of two elements. For two bits it is 0 only if both are 0."""
+        """Return a cipher of the sum of two elements. For two bits, the sum is 0 only if both are 0."""
         return self._group.plus(first[0], second[0]), self._group.plus(first[1], second[1])
 
     def blinded(self, pair: tuple[bytes, bytes]) -> tuple[bytes, bytes]:
-        """Return a cipher of 0 if `pair` is one; otherwise of a random other element."""
+        """Return a cipher of 0 if `pair` is a cipher of 0; otherwise a cipher of a random other element."""
         scalar = self._group.scalar(self._secret)
         return self._group.times(scalar, pair[0]), self._group.times(scalar, pair[1])
 
     def stripped(self, pair: tuple[bytes, bytes]) -> bytes:
-        """Return a cipher without this robot's share."""
+        """Return a cipher without this robot's share of the key."""
         return pair[0] + self._group.minus(pair[1], self._group.times(self._own, pair[0]))
 
     def is_zero(self, stripped: bytes) -> bool:

@@ -1,8 +1,8 @@
-"""Tables of costs that no robot can read: each cell has a cipher for each cost, of whether this cost is sufficient.
+"""Tables of costs that no robot can read: each cell has a cipher for each cost, which hides whether the cost suffices.
 
-A cost is in unary code: bit c says whether a cost of at most c is possible, so an infinite one is all zeros. A known
-cost is added by moving bits up, and the smaller one of two costs has the bits of both: the sum of their ciphers, as a
-sum of bits is 0 only if all are. Two encrypted costs cannot be added.
+A cost is in unary code: bit c shows whether a cost of at most c is possible, so an infinite cost is all zeros. A known
+cost is added by moving bits up. The smaller of two costs has the bits of both: its ciphers are the sums of their
+ciphers, because a sum of bits is 0 only if all bits are 0. Two encrypted costs cannot be added.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.protocols.private.elgamal import TeamKey
 
 Pair = tuple[bytes, bytes]
 Sources = NDArray[np.intp]
-"""For each of this robot's values and each cell of the new table, a cell of the old one."""
+"""For each of this robot's values and each cell of the new table, a cell in the old table."""
 Costs = NDArray[np.float64]
 
 
@@ -30,7 +30,7 @@ class CostCipher:
 
     @property
     def size(self) -> int:
-        """The bytes of a cipher."""
+        """The number of bytes of a cipher."""
         return self._key.size
 
     def encrypted(self, costs: Costs) -> bytes:
@@ -39,7 +39,7 @@ class CostCipher:
         return b"".join([self._key.encrypt(bit=bool(bit)) for bit in bits.reshape(-1)])
 
     def cells(self, ciphers: bytes) -> list[list[Pair]]:
-        """Return the bits of each cell of a table."""
+        """Return the bits in each cell of a table."""
         pairs = self._key.pairs(ciphers)
         return [pairs[at : at + self.levels] for at in range(0, len(pairs), self.levels)]
 
@@ -75,7 +75,7 @@ class CostCipher:
         return self._least(cells, list(range(len(cells))), [0.0] * len(cells))
 
     def prefixes(self, cells: list[list[Pair]], cost: int) -> list[Pair]:
-        """Return, for each cell, whether `cost` is sufficient in it or in a previous one."""
+        """Return, for each cell, whether `cost` suffices in this cell or in a previous one."""
         return list(self._sums(cells, cost))
 
     def _sums(self, cells: list[list[Pair]], cost: int) -> Iterator[Pair]:

@@ -1,4 +1,4 @@
-"""The range of costs and the sizes of tables: the linear orders of P2-DPOP, before any table is made.
+"""The range of costs and the sizes of tables in the linear orders of P2-DPOP, before any table is made.
 
 There is a linear order for each turn: the circle, from the turn's root round to it. A plan goes along it: the axes of
 the later table. A robot asks its neighbours which of them come later. It will add the constraints whose other robots
@@ -32,11 +32,11 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_CIPHERS = 1_000_000
-"""A table with this many takes 64 MB, and each robot about eight minutes in each turn."""
+"""A table with this many ciphers takes 64 MB, and each robot about eight minutes in each turn."""
 
 
 class P2DPOPSettings(Settings, frozen=True):
-    """`ciphers`: the most ciphers of a table; a run that needs more ends. `spare`: as for P3/2-DPOP."""
+    """`ciphers`: the maximum number of ciphers in a table; a run that needs more ends. `spare`: as for P3/2-DPOP."""
 
     ciphers: int = 20_000
     spare: int = 2
@@ -75,7 +75,7 @@ class CostRange(Message, frozen=True):
 
 
 class Plan(Message, frozen=True):
-    """The axes of the sender's table in this turn: codenames, and their numbers of values."""
+    """The axes of the sender's table in this turn: codenames, each with its number of values."""
 
     turn: int
     axes: Shape
@@ -136,7 +136,7 @@ class OwnAxis(NamedTuple):
     order: Sequence[int]
 
     def codes(self, places: Mapping[int, int]) -> dict[int, int]:
-        """Return the codes of this robot's values, each with the value's place in the compiled domain."""
+        """Return the codes of this robot's values, each with the value's index in the compiled domain."""
         return {code: places[place] for code, place in enumerate(self.order) if place in places}
 
 
@@ -177,10 +177,10 @@ def own_costs(problem: LocalProblem) -> Costs:
 
 
 def own_places(problem: LocalProblem) -> dict[int, int]:
-    """Return, for each place among the declared values, the place of this robot's value; the cheapest, of several.
+    """Return, for each index among the declared values, the index of this robot's cheapest value that looks like it.
 
-    Several look alike only if no neighbour sees any variable. Declared values that the robot cannot choose are left
-    out.
+    Several values look alike only if no neighbour sees any variable. Declared values that the robot cannot choose are
+    left out.
     """
     costs = own_costs(problem)
     declared: dict[Value, int] = {value: place for place, value in enumerate(problem.declared(problem.agent))}
@@ -216,26 +216,26 @@ def costs_to_add(problem: LocalProblem, place: EliminationStep, codename: str, i
 
 
 def _aligned(table: NDArray[T], axes: Sequence[str], onto: Sequence[str]) -> NDArray[T]:
-    """Return `table` with its axes as in `onto`, of length 1 where it has none."""
+    """Return `table` with its axes as in `onto`, of length 1 if it lacks the axis."""
     table = table.transpose([axes.index(codename) for codename in onto if codename in axes])
     return table[tuple([slice(None) if codename in axes else np.newaxis for codename in onto])]
 
 
 CODENAME = 32
-"""The hexadecimal digits of a codename."""
+"""The number of hexadecimal digits in a codename."""
 MOST_AXES = 1_000
 SUM = 1 << 62
-"""Sums of costs are modulo this number; they begin with a random one below it."""
+"""Sums of costs are modulo this number; they begin with a random number below it."""
 
 
 class LinearOrderProtocol(RerootingProtocol):
-    """One agent that finds its place in the linear order of each turn, and then runs a protocol on these.
+    """One agent that finds its position in the linear order of each turn, and then runs a protocol on these orders.
 
-    State, besides the circle's, in the order in which it becomes known:
+    State besides that of the circle, in the order in which it becomes known:
 
     - `costs`: the least total cost, and the range above it;
-    - `step`: the number of rounds through an order: first one for each turn without tables, then with them;
-    - `axes`, this robot's axis of each turn, and `places`, the axes of the received and sent tables.
+    - `step`: the number of rounds through an order: first one round for each turn without tables, then with tables;
+    - `axes`, this robot's axis in each turn, and `places`, the axes of the received and sent tables.
     """
 
     settings: ClassVar[P2DPOPSettings] = P2DPOPSettings()
@@ -268,7 +268,7 @@ class LinearOrderProtocol(RerootingProtocol):
 
     @property
     def turn(self) -> int:
-        """The number of the present turn; each comes twice, first without tables."""
+        """The number of the present turn; each number occurs twice, first without tables."""
         return self.step % self.turns
 
     @property
@@ -287,7 +287,7 @@ class LinearOrderProtocol(RerootingProtocol):
     # The circle, and the range of costs
 
     def start_in_tree(self) -> None:
-        """Enter the circle; the first robot starts. A robot alone chooses its best value."""
+        """Join the circle; the first robot starts. A robot alone chooses its best value."""
         if not self.problem.neighbours:
             self.decide_alone()
             return
@@ -374,7 +374,7 @@ class LinearOrderProtocol(RerootingProtocol):
     # Plans: the axes and sizes of all tables
 
     def own_axis(self, turn: int) -> OwnAxis:
-        """Return this robot's axis of a turn; it is drawn at its first use. Raises `TooLargeError`."""
+        """Return this robot's axis in a turn; it is drawn on first use. Raises `TooLargeError`."""
         if turn not in self.axes:
             size = self.problem.declared_count(self.problem.agent)
             self._check_size(size, 1)
@@ -383,7 +383,7 @@ class LinearOrderProtocol(RerootingProtocol):
         return self.axes[turn]
 
     def _check_size(self, cells: int, axes: int) -> None:
-        """Raise `TooLargeError` if a table of these cells needs more ciphers than allowed."""
+        """Raise `TooLargeError` if a table with this many cells needs more ciphers than allowed."""
         levels = self.cipher.levels
         if cells * levels > self.settings.ciphers:
             raise TooLargeError(
@@ -417,7 +417,7 @@ class LinearOrderProtocol(RerootingProtocol):
             self.send(name, AskAxis(self.turn))
 
     def answer(self, sender: str, turn: int) -> None:
-        """Send a neighbour this robot's axis, or that this robot comes before it."""
+        """Send a neighbour this robot's axis, or a message that this robot comes before it."""
         if sender not in self.problem.neighbours or not 0 <= turn < self.turns:
             raise ValueError(f"{sender} sent an unexpected AskAxis for turn {turn}")
         if turn in self.places:
@@ -428,7 +428,7 @@ class LinearOrderProtocol(RerootingProtocol):
         self.send(sender, Axis(turn, own.codename, [values[place] for place in own.order]))
 
     def receive_answer(self, sender: str, answer: Axis | Gone) -> None:
-        """Once all have answered: plan this robot's table, and send the plan to the next robot."""
+        """Once all neighbours have answered, plan this robot's table, and send the plan to the next robot."""
         if self._pending is None or sender not in self.problem.neighbours or sender in self._answers:
             raise ValueError(f"{sender} sent an axis without a request")
         if answer.turn != self._pending.turn:
@@ -445,7 +445,7 @@ class LinearOrderProtocol(RerootingProtocol):
         self.send(ring.onward, Plan(plan.turn, step.outgoing))
 
     def _checked(self, sender: str, axis: Axis) -> Axis:
-        """Return an axis. Raises `ValueError` unless it has each declared value of its robot once."""
+        """Return `axis`. Raises `ValueError` unless it has each declared value of its robot exactly once."""
         if len(axis.codename) != CODENAME or len(axis.values) != self.problem.declared_count(sender):
             raise ValueError(f"{sender} sent an axis with {len(axis.values):,} values, or an invalid codename")
         if sorted(map(str, axis.values)) != sorted(map(str, self.problem.declared(sender))):

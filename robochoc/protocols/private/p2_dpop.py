@@ -7,14 +7,14 @@ known ones, not to each other: so there is one table, along a linear order, inst
 The root has some ciphers opened by all robots: by bisection it reads the minimum cost, and one of its values that
 attains it. It keeps the value; from then on its costs are those of that value.
 
-- **When to use**: costs, and nobody may learn a value, a domain or a cost. For small problems: a table has a cell for
-  each combination of values of the robots that come later and are linked to those before, and in each cell a cipher for
-  each possible total cost. All sizes are known before the first table is made.
+- **When to use**: costs, and no robot may learn a value, a domain or a cost. For small problems: a table has a cell for
+  each combination of values of the robots that come later and are linked to those before, and each cell has a cipher
+  for each possible total cost. All sizes are known before the first table is made.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
   to follow the protocol, not to combine their knowledge, and to have channels that nobody else reads.
-- **Parameters (`--set`)**: `ciphers`, the most ciphers of a table (default 20,000; each needs 64 bytes and about half a
-  millisecond, for each robot in each turn). `spare`, the largest number of additional turns (default 2), which hide the
-  number of robots: only the first of the ring knows how many there are.
+- **Parameters (`--set`)**: `ciphers`, the maximum number of ciphers in a table (default 20,000; each needs 64 bytes and
+  about half a millisecond, for each robot in each turn). `spare`, the largest number of additional turns (default 2),
+  which hide the number of robots: only the first robot in the ring knows how many there are.
 - **References**: Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making",
   JAIR 47, 2013. "Privacy-preserving multi-agent constraint satisfaction", PASSAT 2009 (opening by all). Desmedt,
   Frankel: "Threshold cryptosystems", CRYPTO 1989.
@@ -25,20 +25,20 @@ all values that are compatible with those chosen before, and chooses one that at
 are part of one optimum. There are as many turns as robots, up to `spare`, and each has a fixed number of messages: it
 ends.
 
-Why nothing else is disclosed: a robot receives only ciphers of a table, with fresh randomness of their sender, and for
-these a share of the key is always missing. An opened cipher was encrypted again by the root and blinded by all others:
-only the root reads its bit. The number of openings depends on public numbers. The following is disclosed:
+Why nothing else is disclosed: a robot receives only the ciphers of a table, with fresh randomness from their sender,
+and a share of the key is always missing for these. An opened cipher was encrypted again by the root and blinded by all
+others: only the root reads its bit. The number of openings depends on public numbers. The following is disclosed:
 
-- The range of all costs, as a sum over all robots, if there are three or more. With two robots it gives the other
-  one's range, as any sum of two does.
-- The optimum, and the number of connected robots, up to `spare`. The root also learns that no value declared before
-  its own attains the optimum.
-- The neighbours that come before a robot in a turn, so the direction of the root. A robot may guess more from the
-  number of axes of a table. Axes have new codenames, and values another order, in each turn.
-- Neighbours receive the declared values, which they know; not that private constraints forbid some of them.
+- The range of all costs, as a sum over all robots, if there are three or more. With two robots it gives the range of
+  the other robot, as any sum of two does.
+- The optimum, and the number of connected robots, up to `spare`. The root also learns that no value declared before its
+  own attains the optimum.
+- The neighbours that come before a robot in a turn, and so the direction of the root. A robot may guess more from the
+  number of axes of a table. In each turn axes have new codenames, and values have another order.
+- Neighbours receive the declared values, which they know, but not which of these are forbidden by private constraints.
 
 Encryption: ElGamal with a share of the key for each robot, in the group Edwards25519, by libsodium (PyNaCl: the extra
-`private`). Keys come from `Protocol.secret`, as P-DPOP's.
+`private`). Keys come from `Protocol.secret`, as in P-DPOP.
 
 The methods:
 
@@ -48,10 +48,11 @@ The methods:
 
 Choices that the paper leaves open, and differences (its text was not available; this follows its principle):
 
-- A bit is 0 or not: the sum of bits acts as "or". The paper's cost limit is computed, in a sum that begins with random
-  numbers: the difference of the largest and the least costs of all robots.
+- Only whether a sum is 0 matters: the sum of bits acts as "or". The paper's cost limit is computed, in a sum that
+  begins with random numbers: the difference between the largest and the least costs of all robots.
 - First all turns are executed without tables, for their sizes: a run that needs too much ends before it computes.
-- The root also sends the first table, of its own axis, so that the next robot cannot recognise that it is the first.
+- The root also sends the first table, which has its own axis, so that the next robot cannot recognise that it is the
+  first.
 - Ties go to the root's value that is declared first.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -100,7 +101,7 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class EncryptedTable(Message, frozen=True):
-    """The planned table: for each cell a cipher for each cost, of whether this cost is sufficient.
+    """The planned table: for each cell and each cost, a cipher of whether this cost is sufficient.
 
     The last axis changes fastest, in the order of the plan, and costs within cells.
     """
@@ -132,9 +133,9 @@ LinearMessage = CostSum | CostRange | Plan | AskAxis | Axis | Gone | EncryptedTa
 
 
 class Bisection:
-    """Finds the first of `places` for which something is true; from there on it is true for all.
+    """Finds the first of `places` for which a condition is true; the condition is also true for all later ones.
 
-    The number of questions is always the highest that can be necessary, to hide the place.
+    The number of questions is always the highest that can be necessary, to hide the result.
     """
 
     def __init__(self, places: int) -> None:
@@ -146,7 +147,7 @@ class Bisection:
 
     @property
     def place(self) -> int:
-        """The place to ask about next."""
+        """The index to ask about next."""
         return min((self._low + self._high) // 2, self._last)
 
     def receive_answer(self, *, true: bool) -> None:
@@ -167,7 +168,7 @@ class Bisection:
 class P2DPOP(LinearOrderProtocol):
     """One agent of P2-DPOP.
 
-    State, besides that of the linear orders:
+    State besides that of the linear orders:
 
     - `optimum`: the least cost of all connected robots, after this robot's first turn.
     """
@@ -192,13 +193,13 @@ class P2DPOP(LinearOrderProtocol):
         self.optimum: int | None = None
         self._cells: list[list[Pair]] = []
         self._questions: list[Pair] = []
-        """The root's ciphers, in which the first one that is not 0 is searched for."""
+        """The root's ciphers, among which it searches for the first one that is not 0."""
         self._bisection: Bisection | None = None
         self._cost: int | None = None
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for its root also the optimum, after its turn."""
+        """The position in the tree; for its root also the optimum, after its turn."""
         return msgspec.structs.replace(super().findings, bound=self.optimum if self.parent is None else None)
 
     def handle(self, sender: str, message: Message) -> None:
@@ -219,7 +220,7 @@ class P2DPOP(LinearOrderProtocol):
                 assert_never(never)
 
     def _receive_from_circle(self, sender: str, message: CostSum | Plan | EncryptedTable | Opening) -> None:
-        """Send on a message for another robot of the circle; process a message for this one."""
+        """Send on a message for another robot in the circle; process a message for this one."""
         ring, _ = self.in_ring()
         onward = ring.on_its_way(sender)
         if onward is not None:
@@ -249,7 +250,7 @@ class P2DPOP(LinearOrderProtocol):
     # Tables, from the root round to the root
 
     def send_first_table(self) -> None:
-        """As the root: send the private costs, encrypted; once there is a value, its costs only."""
+        """As the root: send the encrypted private costs; once there is a value, only its costs."""
         ring, _ = self.in_ring()
         own = self.own_axis(self.turn)
         costs = np.full(len(own.order), INFINITE)
@@ -260,7 +261,7 @@ class P2DPOP(LinearOrderProtocol):
 
     @property
     def _possible_values(self) -> Mapping[int, int]:
-        """The places of this robot's possible values: once a value is chosen, its place only."""
+        """The indices of this robot's possible values; once a value is chosen, only its index."""
         places = own_places(self.problem)
         return places if self.value is None else {place: i for place, i in places.items() if i == self.value}
 
@@ -330,7 +331,7 @@ class P2DPOP(LinearOrderProtocol):
         self._ask_team(self._bisection)
 
     def _choose(self, place: int) -> None:
-        """Choose the value at a place among the declared ones, without sending it."""
+        """Choose the value at an index among the declared values, without sending it."""
         self.value = self._possible_values[place]
         self._cells, self._questions, self._bisection = [], [], None
         self.end_turn()

@@ -7,24 +7,25 @@ the robots form a circle, along the first tree. Each has a vector of encrypted b
 and every robot shuffles it, in the same way for all vectors, and encrypts it again. Then all robots but its owner
 remove their shares of the key, and the owner reads its turn as the root.
 
-- **When to use**: costs, and nobody, not even a neighbour, may learn a value. The price: one P-DPOP for each robot, and
-  messages for the vectors by the square of the number of robots.
+- **When to use**: costs, and no robot, not even a neighbour, may learn a value. The price: one P-DPOP for each robot,
+  and messages for the vectors that grow with the square of the number of robots.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
   to follow the protocol, not to combine their knowledge, and to have channels that nobody else reads.
-- **Parameters (`--set`)**: `cells`, the most cells of a table (default 1,000,000). `spare`, the largest number of
-  additional turns (default 2), which hide the number of robots: only the first of the ring knows how many there are.
+- **Parameters (`--set`)**: `cells`, the maximum number of cells in a table (default 1,000,000). `spare`, the largest
+  number of additional turns (default 2), which hide the number of robots: only the first robot in the ring knows how
+  many there are.
 - **References**: Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making",
   JAIR 47, 2013. Desmedt, Frankel: "Threshold cryptosystems", CRYPTO 1989.
 
-Disclosed and hidden information, besides that of `p-dpop`:
+Disclosed and hidden information, besides that in `p-dpop`:
 
-- Messages contain no values. A robot whose subtree shares constraints with the receiver alone shows its table all the
-  same, and after its turn, the table of its value alone: the receiver may read the value from the difference.
+- Messages contain no values. However, a robot whose subtree shares constraints only with the receiver reveals its
+  table, and, after its turn, the table for its value alone: the receiver may derive the value from the difference.
 - All robots learn the optimum (each has been the root), and the number of connected robots, up to `spare`.
 - In each turn a robot learns the direction of the root.
 
 Encryption: ElGamal with a share of the key for each robot, in the group Edwards25519, by libsodium (PyNaCl: the extra
-`private`). Keys come from `Protocol.secret`, as P-DPOP's.
+`private`). Keys come from `Protocol.secret`, as in P-DPOP.
 
 The methods:
 
@@ -34,10 +35,10 @@ The methods:
 
 Choices that the paper leaves open, and differences:
 
-- Numbers in the circle count from a random offset, so that a number does not reveal the place; in the paper each robot
-  adds a random step, which makes vectors longer by that factor.
+- Numbers in the circle count from a random offset, so that a number does not reveal the robot's position; in the paper
+  each robot adds a random step, which makes vectors longer by that factor.
 - A robot has its whole vector opened at once, and so knows its turn from the start; it learns nothing else.
-- Additional turns are the first robot's: it is the root again.
+- Additional turns belong to the first robot: it is the root again.
 - Ties go to the first value in its domain.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -70,7 +71,7 @@ MOST = 1_000
 
 
 class P32DPOPSettings(PDPOPSettings, frozen=True):
-    """`cells`: as for P-DPOP. `spare`: the most additional turns, which hide the number of robots."""
+    """`cells`: as for P-DPOP. `spare`: the maximum number of additional turns, which hide the number of robots."""
 
     spare: int = 2
 
@@ -89,9 +90,9 @@ class Table(UTIL, frozen=True):
         return f"{super().in_words(words)}, for turn {self.turn + 1}"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        """Return P-DPOP's proofs; after the first turn none about every value of the sender.
+        """Return the proofs of P-DPOP; after the first turn, none about every value of the sender.
 
-        The sender may have had its turn since, and then the table is about one value.
+        The sender may have had its turn in the meantime, and then the table is about one value.
         """
         found = super().proves(reception)
         return found if self.turn == 0 else [one for one in found if not isinstance(one, EveryValuePays)]
@@ -100,7 +101,7 @@ class Table(UTIL, frozen=True):
 class P32DPOP(RerootingProtocol, PDPOP):
     """One agent of P3/2-DPOP.
 
-    State, besides the circle's and P-DPOP's of the present turn:
+    State besides that of the circle, and that of P-DPOP in the present turn:
 
     - `turn`: the number of completed turns.
     """
@@ -119,7 +120,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
         super().__init__(problem, order)
         self.turn = 0
         self._done = False
-        """This robot's table of this turn is sent, or its value chosen."""
+        """Whether this robot has sent its table in this turn, or chosen its value."""
         self._waiting: list[tuple[str, Message]] = []
 
     @property
@@ -129,7 +130,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
 
     @property
     def findings(self) -> Findings:
-        """The place in the last turn's tree; for its root also the optimum."""
+        """This robot's position in the tree of the last turn; for the root of that tree, also the optimum."""
         return super().findings if self.turn + 1 >= self.turns else NO_FINDINGS
 
     def receive(self, sender: str, message: Message) -> None:
@@ -151,7 +152,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
                 super().receive(sender, message)
 
     def start_in_tree(self) -> None:
-        """In the first tree: enter the circle. Later: run P-DPOP in the tree of this turn."""
+        """In the first tree: join the circle. Later: run P-DPOP in the tree of this turn."""
         if self.ring is not None or not self.problem.neighbours:
             super().start_in_tree()
             return
@@ -174,12 +175,12 @@ class P32DPOP(RerootingProtocol, PDPOP):
         self._done = True
 
     def joined(self) -> CellTable:
-        """Return P-DPOP's sums; once there is a value, its sums alone."""
+        """Return the sums of P-DPOP; once there is a value, only the sums for this value."""
         joined = super().joined()
         return joined if self.value is None else joined[self.value : self.value + 1]
 
     def decide_as_root(self) -> None:
-        """Choose the best value, unless there is one, without sending it."""
+        """Choose the best value, unless one has been chosen already, without sending it."""
         if self.value is None and self.choices is not None:
             self.value = int(self.choices.item())
         self._done = True
@@ -187,7 +188,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
             self._end_turn()
 
     def _end_turn(self) -> None:
-        """Inform the children, forget the turn, and start the next one."""
+        """Inform the children, forget this turn's state, and start the next turn."""
         for child in self.children:
             self.send(child, Next())
         self.leave_tree()
@@ -198,7 +199,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
             self.receive(sender, message)
 
     def leave_tree(self) -> None:
-        """Forget the tree, and P-DPOP's state in it. This robot's value remains."""
+        """Forget the tree, and the state of P-DPOP in it. This robot's value remains."""
         super().leave_tree()
         self.above = {}
         self.utils = {}

@@ -1,4 +1,4 @@
-"""Private DPOP (P-DPOP): DPOP whose tables are in codenames, codes and random keys.
+"""Private DPOP (P-DPOP): DPOP whose tables use codenames, codes and random keys.
 
 Dynamic programming on a pseudo-tree, as DPOP, for minimum cost. Each robot sends its neighbours below (`Codes`) a
 codename for itself, its values in a random order, and a random key for each value, another for each neighbour. Tables
@@ -7,10 +7,11 @@ each neighbour above, the key of that neighbour's value. Robots in between join 
 key depends on an axis that is still there. The robot with the codename knows all keys that were added for it, and
 subtracts them. From the root down, robots receive the codes of the values above them (VALUE).
 
-- **When to use**: costs, and constraints that third robots must not learn. Where DPOP's tables fit; it is slower.
+- **When to use**: costs, and constraints that third robots must not learn. It can be used if DPOP's tables fit into
+  memory; it is slower.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are assumed
   to follow the protocol, not to combine their knowledge, and to have channels that nobody else reads.
-- **Parameters (`--set`)**: `cells`, the most cells of a table (default 1,000,000).
+- **Parameters (`--set`)**: `cells`, the maximum number of cells in a table (default 1,000,000).
 - **References**: Faltings, Leaute, Petcu: "Privacy guarantees through distributed constraint satisfaction", IAT 2008;
   Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making", JAIR 47, 2013.
 
@@ -21,9 +22,9 @@ Disclosed and hidden information:
 - A cell over another robot's codename is hidden by that robot's key. Keys have 100 bits; a broken hard constraint
   counts 2^60 instead of infinity, so that it reveals no more than costs do: to 2^-20 for a million constraints, and
   less for fewer.
-- A robot sees the differences along its own axis, and the costs of a subtree that shares constraints with it alone.
-- Values are disclosed downwards: to robots that share a constraint with their owner. The root's choice and the tree
-  are not hidden from neighbours.
+- A robot sees the differences along its own axis, and the costs of a subtree that shares constraints only with it.
+- Values are disclosed downwards: to robots that share a constraint with their owner. The root's choice and the tree are
+  not hidden from neighbours.
 
 Where keys come from: `Protocol.secret` (`protocols/key_stream.py`). Across machines it is the operating system; in the
 simulator and in processes it follows from the seed, so that runs can be repeated.
@@ -35,12 +36,13 @@ The methods:
 
 Choices that the paper leaves open, and differences:
 
-- A robot has one codename and one order of values for all neighbours below (the paper's merged codenames): tables of
-  several branches can be joined. So the neighbours can find out that they share the same robot, if they compare.
+- A robot has one codename and one order of values for all neighbours below (the paper's merged codenames): tables from
+  several branches can be joined. So the neighbours can find out that they share the same robot, if they compare their
+  codenames.
 - The root is elected by random scores in asynchronous waves. The paper's rounds with lies, which hide how far away the
   root is, are left out: a robot sees through which neighbour the root's wave came first.
 - Ties go to the first value in its domain.
-- The costs of a robot, times the number of robots, must be below 2^53; a run with larger ones ends.
+- The costs of a robot, times the number of robots, must be below 2^53; a run with larger costs ends.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -79,11 +81,11 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
 MOST_CELLS = 100_000_000
-"""A table with this many takes gigabytes."""
+"""A table with this many cells takes gigabytes."""
 
 
 class PDPOPSettings(Settings, frozen=True):
-    """`cells`: the most cells of a table. A run that needs more ends."""
+    """`cells`: the maximum number of cells in a table. A run that needs more ends."""
 
     cells: int = 1_000_000
 
@@ -93,7 +95,7 @@ class PDPOPSettings(Settings, frozen=True):
 
 
 WIDTH = 16
-"""The bytes of a cell, and of a key."""
+"""The number of bytes of a cell, and of a key."""
 
 
 BROKEN = 1 << 60
@@ -101,13 +103,13 @@ BROKEN = 1 << 60
 
 
 Shape = dict[str, int]
-"""The axes of a table: codenames, and their numbers of codes."""
+"""The axes of a table: codenames, each with its number of codes."""
 
 
 class Codes(Message, frozen=True):
-    """Codes and keys for the sender's values, for the messages of a neighbour below that others must not understand.
+    """Codes and keys for the sender's values, for use by a neighbour below in messages that others must not understand.
 
-    `codename` represents the sender; the code of a value is its place in `values`, which are in a random order. `keys`
+    `codename` represents the sender; the code of a value is its index in `values`, which are in a random order. `keys`
     has a random key for each value, which is added to the value's costs in a table.
     """
 
@@ -125,7 +127,7 @@ class Codes(Message, frozen=True):
 
 
 class UTIL(Message, frozen=True):
-    """The sender's table, by codenames and codes: minimum costs of its subtree, each with keys added.
+    """The sender's table, with codenames and codes: minimum costs of its subtree, each with keys added.
 
     The last axis changes fastest. Cells have `WIDTH` bytes, little-endian.
     """
@@ -142,7 +144,7 @@ class UTIL(Message, frozen=True):
     def proves(self, reception: Reception) -> Sequence[Proof]:
         """Return bounds on the sender's costs, if no other robot's key is in the table.
 
-        Then all robots below the sender share constraints with the receiver alone, which can subtract its keys.
+        Then all robots below the sender share constraints only with the receiver, which can subtract its keys.
         """
         subtree = _without(reception)
         near = [robot for robot in sorted(subtree) if robot in reception.neighbours(reception.receiver)]
@@ -162,7 +164,7 @@ class UTIL(Message, frozen=True):
 
 
 class VALUE(Message, frozen=True):
-    """The codes of the values above the receiver, by the codenames of its table."""
+    """The codes of the values above the receiver, by the codenames in its table."""
 
     codes: Shape
 
@@ -195,12 +197,12 @@ def packed(cells: Iterable[int]) -> bytes:
 
 
 def cells_of(shape: Shape) -> int:
-    """Return the number of cells of a table, without allocating it."""
+    """Return the number of cells in a table, without allocating it."""
     return math.prod(shape.values())
 
 
 def _without(reception: Reception) -> set[str]:
-    """Return the robots that are connected with the sender without the receiver."""
+    """Return the robots that are connected with the sender by paths that avoid the receiver."""
     found = {reception.sender}
     waiting = [reception.sender]
     while waiting:
@@ -213,7 +215,7 @@ def _without(reception: Reception) -> set[str]:
 
 KEY_BITS = 100
 CODENAME = 32
-"""The hexadecimal digits of a codename."""
+"""The number of hexadecimal digits in a codename."""
 MOST_AXES = 1_000
 CellTable = NDArray[np.object_]
 """Integers of any size: keys are larger than numpy's own integers."""
@@ -224,10 +226,10 @@ class PDPOP(AnonymousTreeProtocol):
 
     State, in the order in which it becomes known:
 
-    - `codename`; `coded`, for each code the place of this robot's value; `keys`, for each code the sum of all keys
+    - `codename`; `coded`, for each code the index of this robot's value; `keys`, for each code the sum of all keys
       sent;
     - `above`, the codes of the neighbours above; `utils`, the children's tables;
-    - `axes` of this robot's table, and `choices`, for each of its cells this robot's best value;
+    - `axes` of this robot's table, and `choices`, this robot's best value for each cell of the table;
     - `optimum`: the cost of the whole tree (at its root).
     """
 
@@ -285,7 +287,7 @@ class PDPOP(AnonymousTreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; for a root also the optimum of its tree, once it has all tables."""
+        """The position in the tree; for a root also the optimum of its tree, once it has received all tables."""
         return msgspec.structs.replace(super().findings, bound=self.optimum)
 
     def _process_codes(self, sender: str, codes: Codes) -> None:
@@ -319,7 +321,7 @@ class PDPOP(AnonymousTreeProtocol):
             return
         self.axes = self._own_axes()
         joined = self.joined()
-        self.choices = np.asarray(joined.argmin(axis=0))  # numpy makes a number of a single cell
+        self.choices = np.asarray(joined.argmin(axis=0))  # numpy returns a scalar for a single cell
         cells = np.asarray(joined.min(axis=0), object)
         self._asked = {child: list(util.axes) for child, util in self.utils.items()}
         self.utils.clear()
@@ -336,7 +338,7 @@ class PDPOP(AnonymousTreeProtocol):
         self.send(parent, UTIL(self.axes, cells))
 
     def decide_as_root(self) -> None:
-        """Choose the best value, and send the values below from there."""
+        """Choose the best value, and send values down from the root."""
         self._choose({})
 
     def _own_axes(self) -> Shape:
@@ -386,7 +388,7 @@ class PDPOP(AnonymousTreeProtocol):
     # VALUE, from the root down
 
     def _choose(self, codes: Mapping[str, int]) -> None:
-        """Choose the best value for these codes, and send the children the codes of their tables."""
+        """Choose the best value for these codes, and send the children the codes for their tables."""
         if self.choices is None or not all(0 <= codes[codename] < size for codename, size in self.axes.items()):
             raise ValueError(f"{self.problem.agent} has no table for these codes: {dict(codes)}")
 

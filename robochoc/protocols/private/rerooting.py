@@ -1,10 +1,10 @@
-"""Robots in a circle that take turns at the root, in a secret order (P3/2-DPOP and P2-DPOP).
+"""Robots in a circle that take turns as the root, in a secret order (P3/2-DPOP and P2-DPOP).
 
-The circle is along the first tree. Each robot has a number in it, from a random offset, a share of the team's key, and
-a vector of encrypted bits, a bit for each turn: 0 where it is the root. The vector goes round, and every robot shuffles
-it, in the same way for all vectors, and encrypts it again. Then all robots but its owner remove their shares of the
-key, and the owner reads its turn as the root. (Leaute, Faltings: "Protecting privacy through distributed computation in
-multi-agent decision making", JAIR 47, 2013, rerooting.)
+The circle follows the first tree. Each robot has a number in it, counted from a random offset, a share of the team's
+key, and a vector of encrypted bits, one bit for each turn: 0 if it is the root in that turn. The vector goes round, and
+every robot shuffles it, in the same way for all vectors, and encrypts it again. Then all robots but its owner remove
+their shares of the key, and the owner reads its turn as the root. (Leaute, Faltings: "Protecting privacy through
+distributed computation in multi-agent decision making", JAIR 47, 2013, rerooting.)
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class VectorStage(IntEnum):
     TO_FIRST = 0
     """From its owner to the first robot of the ring."""
     MIXING = 1
-    """A whole round from there: each robot shuffles it."""
+    """A whole round from the first robot: each robot shuffles it."""
     HOME = 2
     """From the first robot to its owner."""
     OPENING = 3
@@ -39,7 +39,7 @@ class VectorStage(IntEnum):
 
 
 class Join(Message, frozen=True):
-    """A robot's place in the ring: its `number`, and the sum of the public keys of the robots before it."""
+    """A robot's position in the ring: its `number`, and the sum of the public keys of the robots before it."""
 
     number: int
     key: bytes
@@ -96,21 +96,22 @@ class Next(Message, frozen=True):
 
 
 RerootingMessage = Join | Setup | Vector | Next
-"""The messages by which roots take turns."""
+"""The messages with which robots take turns as the root."""
 
 
 TAG = 16
-"""The bytes of a tag: two vectors have the same tag once in 2^128 pairs."""
+"""The number of bytes of a tag: two vectors have the same tag once in 2^128 pairs."""
 NUMBER_BITS = 62
 
 
 class RerootingProtocol(AnonymousTreeProtocol):
-    """One agent that finds its place in the circle, and learns its turns as the root.
+    """One agent that finds its position in the circle, and learns its turns as the root.
 
-    State, besides the tree's:
+    State besides that of the tree:
 
-    - `ring`: the place in the circle;
-    - `number` in it; `turns`, their number; `own_turns`, those in which this robot is the root.
+    - `ring`: the position in the circle;
+    - `number`, the robot's number in it; `turns`, the number of turns; `own_turns`, those in which this robot is the
+      root.
     """
 
     group: ClassVar[type[PrimeGroup]] = Ed25519
@@ -136,7 +137,7 @@ class RerootingProtocol(AnonymousTreeProtocol):
         """Be the root, if it is known to be this robot's turn. Called once its turns are known."""
 
     def join_ring(self, ring: Ring) -> TeamKey:
-        """Enter the circle; draw this robot's share of the team's key, and return it."""
+        """Join the circle; draw this robot's share of the team's key, and return it."""
         self.ring = ring
         self._key = TeamKey(self._elements, self.secret)
         return self._key
@@ -192,7 +193,7 @@ class RerootingProtocol(AnonymousTreeProtocol):
         self._mix(Vector(VectorStage.TO_FIRST, self._tag, self._vector(own)))
 
     def _set_up(self, setup: Setup) -> None:
-        """Store the key, and send it down; all but the first robot send off their vectors."""
+        """Store the key, and send it down; all robots but the first send off their vectors."""
         ring, key = self.in_ring()
         if self.turns or not 1 < setup.turns <= len(self.order.names) + self.spare:
             raise ValueError(f"received an unexpected or invalid Setup of {setup.turns} turns")

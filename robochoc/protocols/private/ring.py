@@ -1,6 +1,6 @@
-"""The robots of a tree in a circle, depth first. Messages in the circle use the tree's edges: no new links are needed.
+"""A circle of the robots in a tree, depth first. Messages in the circle use the tree's edges: no new links are needed.
 
-A robot that sends something on does not know the next robot, only the neighbour on the way to it.
+A robot that sends a message on does not know the next robot, only the neighbour on the way to it.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 
 class Ring:
-    """One robot's place in the circle, from its place in the tree. The tree has at least two robots."""
+    """One robot's position in the circle, derived from its position in the tree. The tree has at least two robots."""
 
     def __init__(self, parent: str | None, children: Sequence[str]) -> None:
         self._parent = parent
@@ -17,7 +17,7 @@ class Ring:
 
     @property
     def is_first(self) -> bool:
-        """Whether the circle begins here: the tree's root."""
+        """Whether the circle begins at this robot, the root of the tree."""
         return self._parent is None
 
     @property
@@ -38,10 +38,10 @@ class Ring:
         return self.children[0] if self.children else self.parent
 
     def on_its_way(self, sender: str) -> str | None:
-        """Return the neighbour to which a message from `sender` is sent on; None: it is for this robot.
+        """Return the neighbour to which a message from `sender` is sent on; None if it is for this robot.
 
-        A message from above is for this robot; one from a child is for the next child, or on its way up, or back at
-        the first robot.
+        A message from above is for this robot; a message from a child is for the next child, or on its way up, or back
+        at the first robot.
         """
         if sender == self._parent:
             return None
