@@ -168,7 +168,7 @@ TWO_PHASES = 2
 
 
 class SyncABB(SyncBB):
-    """One agent of SyncABB. State: as in SyncBB; `values` are those of the robots before, with the cost `paid`."""
+    """One agent of SyncABB. State: as in SyncBB; `values` are those of the robots before it, which cost `paid`."""
 
     messages = CPA | CPABack | FullBack | Priced | TooCostly | Backtrack | Terminate
     settings: ClassVar[SyncABBSettings] = SyncABBSettings()

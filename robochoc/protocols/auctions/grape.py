@@ -4,11 +4,11 @@ Each robot joins the coalition for one task, or none. The gain of a robot from a
 robots store a partition into coalitions; a robot that would gain more elsewhere moves there, and sends the new
 partition. Among several partitions the one with the most moves is valid; a random number breaks ties.
 
-- **When to use**: for task allocation where several robots may do a task, and each gains less the more they are. The
-  such protocol here; where a task is for one robot, `ssi` and `cbaa` gain more.
+- **When to use**: for task allocation in which several robots may do a task, and each robot gains less the more robots
+  do it. It is the only such protocol here; if each task is for one robot, `ssi` and `cbaa` gain more.
 - **Guarantees**: incomplete: no proof of optimality. It ends in a Nash stable partition: no robot gains by moving
-  alone. Where the gain of a coalition never falls as robots join it, all gain at least half of the optimum together
-  (as in any valid utility game: Vetta, FOCS 2002). Where robots exclude each other there is no bound.
+  alone. If the gain of a coalition never falls as robots join it, the total gain is at least half of the optimum
+  (as in any valid utility game: Vetta, FOCS 2002). If robots exclude each other there is no bound.
 - **Reference**: Jang, Shin, Tsourdos: "Anonymous hedonic game for task allocation in a large-scale multiple agent
   system", IEEE Transactions on Robotics 34(6), 2018.
 

@@ -1,10 +1,11 @@
 """Task allocation: the tasks, their value to a robot, and the base class of the auction protocols.
 
-A *task* is done by one robot at most (`solver/exclusions.py`). A robot's *bundle* is the set of tasks that it does; of
+A *task* is done by at most one robot (`solver/exclusions.py`). A robot's *bundle* is the set of tasks that it does; of
 the robot's values with the same tasks only the cheapest counts. A task's *marginal score*, given the bundle, is the
-robot's cost without the task less its cost with the task: in maximised problems, the gain.
+robot's cost without the task minus its cost with the task: in maximised problems, the gain.
 
-they may rise, as with synergies, a bid is never higher than the robot's last one in the bundle (*bid warping*: Johnson,
+If the marginal score of a task never rises as the bundle grows, scores have *diminishing marginal gain* (DMG). If it
+may rise, as with synergies, a bid is never higher than the robot's last bid in the bundle (*bid warping*: Johnson,
 Choi, Ponda, How, "Allowing non-submodular score functions in distributed task allocation", CDC 2012). With DMG this
 changes nothing.
 """

@@ -217,7 +217,7 @@ class AsyncMaxSum(Protocol):
             self.owed.add(sender)
 
     def _send_changes(self, name: str, fresh: list[Row], kind: type[R | Q]) -> None:
-        """Send `fresh`, damped, if it has changed, or an answer is owed; but no empty rows, nor above the limit."""
+        """Send `fresh`, damped, if it has changed or is owed as an answer; never empty rows, or above the limit."""
         tolerance = self.settings.tolerance
         before = self.sent_rows.get(name)
         owed = name in self.owed

@@ -27,7 +27,7 @@ Width = Literal[1, 2, 4, 8]
 BLOCK = 1 << 17
 """The number of cells of a join that are made at a time, small enough for the processor's cache."""
 TEMPORARY = 32
-"""The most bytes for each of these: sums, a table's costs as they are added, and the search for the minimum."""
+"""The maximum bytes for each of these: sums, a table's costs as they are added, and the search for the minimum."""
 LONGEST = 16
 """The number of blocks that may form one block if a single axis needs it."""
 PIECE = 1 << 24
@@ -175,7 +175,7 @@ def _block(table: Table, place: Sequence[int]) -> Array:
 
 
 def costs_for(table: Table, value: int) -> Array:
-    """Return, as floats, the part of `table` for one place on its first axis; the whole table if that has length 1."""
+    """Return, as floats, the part of `table` at one index of its first axis; all of it if the axis has length 1."""
     return _block(table[value : value + 1] if len(table) > 1 else table, ()).reshape(table.shape[1:])
 
 

@@ -210,7 +210,7 @@ class MaxSumAD(FactorGraphProtocol):
         return True
 
     def _q(self) -> list[Row]:
-        """Return Q to each function: the cost of each value by all others; or the value alone, when it is sent."""
+        """Return Q to each function: the cost of each value in all other functions; or only the value, if sent."""
         rows = self._rows
         if self._sends_values:
             alone = [INFINITE] * len(self.preferred)

@@ -48,7 +48,7 @@ class Factor:
         return [cls(agents, charges) for agents, charges in sums.items()]
 
     def split(self, shares: Array) -> tuple[Factor, Factor]:
-        """Return two functions whose sum is this one: of each entry its share, between 0 and 1, and the rest.
+        """Return two functions whose sum is this one: one has its share (0 to 1) of each entry, one the rest.
 
         Forbidden combinations are forbidden in both functions.
         """
@@ -124,7 +124,7 @@ class Functions:
         self.q[name] = checked(rows, len(self.q[name]), self._sizes[name])
 
     def answers(self, own: Sequence[Row]) -> tuple[list[Row], dict[str, list[Row]]]:
-        """Return R to this robot's variable, and to each robot above; `own` are Q of this robot's variable."""
+        """Return R to this robot's variable, and to each robot above; `own` is its variable's Q."""
         q = {name: iter(rows) for name, rows in self.q.items()}
         mine: list[Row] = []
         theirs: dict[str, list[Row]] = {name: [] for name in self.q}

@@ -206,7 +206,7 @@ class MBDPOP(DPOP):
         self._final: Sequence[int] | None = None
 
     def start_in_tree(self) -> None:
-        """Send the place to the neighbours below; other robots than the root wait for their parent's place."""
+        """Send domain and depth to the neighbours below; all but the root wait for their parent's depth."""
         if self.parent is None:
             self._send_place()
             self._measure()
@@ -369,7 +369,7 @@ class MBDPOP(DPOP):
         return project([self._sizes[name] for name in axes], charges, tables, width_of(self._dearest))
 
     def _fixed(self, table: Table, axes: Sequence[str], context: Mapping[str, int]) -> tuple[Table, list[str]]:
-        """Return the part of `table` in `context`, and its axes; this robot's axis remains, with one place."""
+        """Return the part of `table` in `context`, and its axes; this robot's axis remains, with one index."""
         own = self.problem.agent
         index = tuple(
             slice(None) if name not in context

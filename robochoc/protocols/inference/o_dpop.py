@@ -238,7 +238,7 @@ class ODPOP(DPOP):
         return costs
 
     def _is_complete(self, child: str, places: Sequence[int]) -> bool:
-        """Return whether `child` has sent its good for these places of this robot's value and the separator's."""
+        """Return whether `child` has sent its good for these indices of this robot's and the separator's values."""
         view = dict(zip((self.problem.agent, *(self.separator or ())), places, strict=True))
         return not np.isnan(self.goods[child][tuple(view[name] for name in self._axes[child])])
 

@@ -215,7 +215,7 @@ def thinned(candidates: Mapping[str, Candidate], above: Mapping[str, int]) -> di
 
 
 class BestTables:
-    """The best of several tables, cell by cell: costs, this robot's value, and values of `cut` robots, as places."""
+    """The best of several tables, cell by cell: costs, this robot's values, those of `cut` robots, as indices."""
 
     def __init__(self, shape: Sequence[int], costs: np.dtype[Any], own: int, cut: Sequence[int]) -> None:
         self.costs: Codes = np.full(shape, np.iinfo(costs).max, costs)

@@ -130,7 +130,7 @@ T = TypeVar("T", bound=np.generic)
 
 
 class OwnAxis(NamedTuple):
-    """This robot's axis in a turn: its `codename`, and for each code the place of the value among the declared ones."""
+    """This robot's axis in a turn: its `codename`, and for each code the index of the declared value."""
 
     codename: str
     order: Sequence[int]

@@ -161,7 +161,7 @@ class Bisection:
 
     @property
     def found(self) -> int:
-        """The first place for which it is true, when no question is left; the number of places if there is none."""
+        """When no question is left: the first index for which it is true; the number of indices if none is."""
         return self._low
 
 
@@ -296,7 +296,7 @@ class P2DPOP(LinearOrderProtocol):
         self._ask_team(self._bisection)
 
     def _ask_team(self, bisection: Bisection) -> None:
-        """Have the next cipher opened, encrypted again, as the robot before the root knows the table's ciphers."""
+        """Encrypt the next cipher again, as the robot before the root knows the table's ciphers; have it opened."""
         ring, key = self.in_ring()
         if bisection.left:
             self.send(ring.onward, Opening(key.renewed(self._questions[bisection.place])))

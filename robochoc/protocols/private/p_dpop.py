@@ -380,7 +380,7 @@ class PDPOP(AnonymousTreeProtocol):
         return joined
 
     def _aligned(self, table: CellTable, axes: Sequence[str]) -> CellTable:
-        """Return `table` with this robot's axis first, then those of its table, of length 1 where it has none."""
+        """Return `table` with this robot's axis first, then those of its table (length 1 if missing)."""
         onto = (self.codename, *self.axes)
         table = table.transpose([axes.index(codename) for codename in onto if codename in axes])
         return table[tuple([slice(None) if codename in axes else np.newaxis for codename in onto])]

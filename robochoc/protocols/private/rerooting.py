@@ -66,7 +66,7 @@ class Setup(Message, frozen=True):
 
 
 class Vector(Message, frozen=True):
-    """One robot's encrypted bits, a bit for each turn: 0 where it is the root. Only its owner knows the `tag`."""
+    """One robot's encrypted bits, one for each turn: 0 if it is the root then. Only its owner knows the `tag`."""
 
     stage: VectorStage
     tag: bytes
@@ -143,7 +143,7 @@ class RerootingProtocol(AnonymousTreeProtocol):
         return self._key
 
     def in_ring(self) -> tuple[Ring, TeamKey]:
-        """Return the place in the circle, and this robot's share of the key. Raises `ValueError` if there are none."""
+        """Return the position in the ring, and this robot's share of the key. Raises `ValueError` if there are none."""
         if self.ring is None or self._key is None:
             raise ValueError("the first tree is not complete yet")
         return self.ring, self._key

@@ -368,7 +368,7 @@ class AAS(Protocol):
         return self.store[index] is None and self._gaps(index) == []
 
     def _choose_aggregate(self) -> tuple[list[int], dict[int, list[Gap]]]:
-        """Return the first values that are consistent with every combination of the view, and those with some."""
+        """Return the first values consistent with every combination in the view, and values consistent with some."""
         whole: list[int] = []
         partly: dict[int, list[Gap]] = {}
         for index in self.store.all_open():

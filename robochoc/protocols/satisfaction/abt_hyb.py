@@ -51,7 +51,7 @@ from robochoc.solver.local_problem import LocalProblem
 
 
 class ABTHyb(ABT):
-    """One agent of ABT-Hyb. State besides ABT's: `awaited`, the receiver of the last nogood, whose value is awaited."""
+    """One agent of ABT-Hyb. State besides ABT's: `awaited`, the receiver of the last nogood, which owes a value."""
 
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

@@ -59,7 +59,7 @@ from robochoc.system.compiling import mypyc_attr
 
 
 class StoredNogood(NamedTuple):
-    """A nogood as one of its robots stores it: the others' values and this robot's value that it rules out."""
+    """A nogood as one of its robots stores it: the others' values, and its own value that is ruled out."""
 
     others: LeftSide
     own: Value

@@ -458,7 +458,7 @@ class CompAPO(Protocol):
         self.replies[sender] = reply
 
     def _abandon(self, sender: str, session: int) -> None:
-        """End the session without a result: a robot is in one of higher priority, and will report when it is free."""
+        """End the session without a result: a robot is in a higher-priority one, and will report when it is free."""
         if self.holder != self.name or session != self.session:
             return
         self.waits_for = sender
@@ -483,7 +483,7 @@ class CompAPO(Protocol):
         self._end(found, changes, self.asked - {self.name})
 
     def _solved(self, places: Mapping[str, int]) -> dict[str, int] | None:
-        """Return values for the good_list, and add the robots in conflict with them; None: there are no values."""
+        """Return values for the good_list, and add the robots in conflict with them; None if there are none."""
         tables = self._known_tables()
         sizes = sizes_in(tables, places)
         mediation = Mediation(tables, {robot: sizes[robot] for robot in self._ranked(self.good_list)}, places)

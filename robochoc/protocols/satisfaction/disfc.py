@@ -197,7 +197,7 @@ class DisFC(Protocol):
     # The view
 
     def _update(self, agent: str, counter: int | None) -> None:
-        """Store a new assignment of `agent` (None: unknown); drop its old filter and nogoods with the old one."""
+        """Store a new assignment of `agent` (None: unknown); drop its old filter and the nogoods with it."""
         if counter is None:
             del self.view[agent]
             self.store.forget(agent)

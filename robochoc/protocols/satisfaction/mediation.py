@@ -47,7 +47,7 @@ class AllowedTable(msgspec.Struct, frozen=True, array_like=True):
 def own_tables(
     problem: LocalProblem, linked: Iterable[str], domains: Mapping[str, Sequence[Value]]
 ) -> tuple[AllowedTable, ...]:
-    """Return the constraints of `problem` with the robots `linked`, those over the same robots in one table."""
+    """Return the constraints of `problem` with robots in `linked`, with one table for each set of robots."""
     allowed: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
     for lowest in linked:
         for others, masks in problem.allowed(domains, lowest):
