@@ -80,6 +80,12 @@ def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files
     return re.sub(r"<code>(--?[a-z][^<\n]{0,28})</code>", r'<code class="option">\1</code>', html)
 
 
+def on_post_page(html: str, *, page: Page, config: MkDocsConfig) -> str:
+    """Return the page with a name for the search dialog, which the theme leaves out."""
+    del page, config
+    return html.replace('class="md-search"', 'class="md-search" aria-label="Search"', 1)
+
+
 def with_links(text: str, path: str, name: str) -> str:
     """Return `text`, the file `path` of the repository, with links as they have to be on the page `name`."""
 

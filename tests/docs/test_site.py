@@ -60,7 +60,27 @@ def test_search_works_from_files_and_asks_for_nothing_elsewhere(site: Path, brow
         assert not complaints
 
 
-@pytest.mark.parametrize("name", ["index", "guides/which-protocol", "reference/cli", "reference/protocols/abt"])
+def test_the_switch_to_dark_holds_on_the_next_page(site: Path, browser: Browser) -> None:
+    scheme = "document.body.getAttribute('data-md-color-scheme')"
+    with watched_page(browser, viewport={"width": 1280, "height": 800}, color_scheme="light") as (page, _, _):
+        page.goto((site / "index.html").as_uri())
+        assert page.evaluate(scheme) == "default"
+        page.click("label[title=Dark]")
+        page.goto((site / "gallery.html").as_uri())
+        assert page.evaluate(scheme) == "slate"
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "index",
+        "gallery",
+        "guides/coming-from/pydcop",
+        "guides/which-protocol",
+        "reference/cli",
+        "reference/protocols/abt",
+    ],
+)
 def test_pages_fit_a_telephone(site: Path, browser: Browser, name: str) -> None:
     with watched_page(browser, viewport={"width": 360, "height": 800}) as (page, _, _):
         page.goto((site / f"{name}.html").as_uri())
