@@ -15,14 +15,14 @@ LOCKED := $(PINNED) requirements/build.txt -r
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
-	@echo "Installing robochoc into $(VENV): about 300 MB, a third of it Java for the solver ACE. This takes half a minute."
+	@echo "Installing robochoc into $(VENV): about 250 MB, almost half of it Java for the solver ACE. This takes half a minute."
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/$(PIP) --quiet --no-compile $(LOCKED) requirements/run.txt
 	$(BIN)/$(PIP) --quiet --no-index --no-deps --no-build-isolation --editable .
 	@touch $@
 
 $(READY): $(RUN) requirements/dev.txt
-	@echo "Adding the development tools to $(VENV): about 430 MB more. This takes a minute."
+	@echo "Adding the development tools to $(VENV): about 800 MB more. This takes a minute."
 	$(BIN)/$(PIP) --quiet $(LOCKED) requirements/dev.txt
 	@touch $@
 
