@@ -1,13 +1,12 @@
-"""Graph colouring: hard, soft (as few neighbours as possible have the same colour), or weighted.
+"""Graph colouring: hard, soft (with as few neighbours of the same colour as possible), or weighted.
 
-* `soft` is the usual first benchmark of protocols that minimise (Modi et al., "Adopt", AIJ 161, 2005; Zhang et al.,
+* `soft` is the usual first benchmark for optimisation protocols (Modi et al., "Adopt", AIJ 161, 2005; Zhang et al.,
   "Distributed stochastic search and distributed breakout", AIJ 161, 2005): each violated constraint costs 1.
-* `weighted`: the weight of an edge, an integer or decimal drawn from 1 unit to a maximum, is the cost of equal colours
-  at its ends (Koljonen, Alava, Peltomaki and Tirkkonen, "Distributed generalized graph coloring", SASO 2010).
+* `weighted`: equal colours at the ends of an edge cost the weight of the edge, an integer or decimal drawn from 1 unit
+  to a maximum (Koljonen, Alava, Peltomaki and Tirkkonen, "Distributed generalized graph coloring", SASO 2010).
 * `hard` is a DisCSP: neighbours must have different colours.
 
-The graph has a given mean degree, and every such graph is as likely as any other; or it is any of
-`generators/graphs.py`.
+The graph is drawn uniformly among all graphs with a given mean degree, or is one of those in `generators/graphs.py`.
 """
 
 from __future__ import annotations
@@ -33,7 +32,7 @@ from robochoc.system.suggestions import member
 
 
 class Conflicts(StrEnum):
-    """The cost of neighbours of the same colour."""
+    """The cost of neighbours with the same colour."""
 
     SOFT = "soft"
     WEIGHTED = "weighted"
@@ -51,22 +50,22 @@ def coloring(
     max_cost: int = 10,
     places: int = 0,
 ) -> Team:
-    """Return the random graph colouring problem of `seed`, with `agents` robots and `degree` neighbours on average.
+    """Return a random graph colouring problem, with `agents` robots and `degree` neighbours on average.
 
-    `Robot3` owns `V3`. Two neighbours of the same colour have the cost that `conflicts` selects.
+    `Robot3` owns `V3`. `conflicts` selects the cost of two neighbours with the same colour.
 
     Args:
         agents: The number of robots.
         colors: The number of colours.
         degree: The average number of neighbours.
-        seed: The same seed makes the same problem on every machine.
+        seed: The same seed gives the same problem on every machine.
         connected: Whether graphs are drawn until one is connected.
-        conflicts: The cost of neighbours of the same colour: 1, a random weight, or infinite.
+        conflicts: The cost of neighbours with the same colour: 1, a random weight, or infinite.
         max_cost: The maximum weight.
         places: The decimal places of weights.
 
     Raises:
-        ValueError: if there is no such graph. The message names the number to change.
+        ValueError: There is no such graph. The message names the number to change.
     """
     check_bounds({"agents": (agents, 1, MAX_NODES), "colors": (colors, 1, MAX_VALUES)})
     if not 0 <= degree <= agents - 1:
@@ -84,10 +83,10 @@ def coloring_of(
     max_cost: int = 10,
     places: int = 0,
 ) -> Team:
-    """Return the problem of colouring `graph`, with the parameters of `coloring`.
+    """Return the problem of colouring `graph`; for the parameters see `coloring`.
 
     Raises:
-        ValueError: if a number is out of its bounds.
+        ValueError: A number is out of bounds.
     """
     conflicts = member(Conflicts, "conflicts", conflicts)
     check_bounds({"colors": (colors, 1, MAX_VALUES), "max-cost": (max_cost, 1, MAX_COST)})

@@ -1,8 +1,8 @@
 """Random numbers for all families of problems, and the limits of their sizes.
 
-A seed gives the same problem on every machine and with every version of Python: of `random.Random`, only the seeding by
-an integer and `random()` are used, which Python's documentation promises to keep. Costs are integers from the start, so
-nothing is rounded later.
+A seed gives the same problem on every machine and with every version of Python: only the methods of `random.Random`
+that the Python documentation promises to keep are used, seeding by an integer and `random()`. Costs are drawn as
+integers, so nothing is rounded later.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from robochoc.model.cost_units import MAX_PLACES
 from robochoc.model.problem import Constraint
 
 MAX_AGENTS = 1000
-"""The maximum number of robots, targets or meetings in families that enumerate all pairs of them."""
+"""The maximum number of robots, targets or meetings in families that enumerate all their pairs."""
 MAX_NODES = 1_000_000
 """The maximum number of robots on a graph."""
 MAX_EDGES = 5_000_000
@@ -23,26 +23,26 @@ MAX_EDGES = 5_000_000
 MAX_VALUES = 1000
 MAX_COST = 1_000_000
 MAX_CONSTRAINTS = 200_000
-"""The maximum number of constraints of a team."""
+"""The maximum number of constraints in a team."""
 
 
 def seeded(seed: int) -> Random:
-    """Return the random number generator of `seed`."""
+    """Return a random number generator with the given seed."""
     return Random(seed)  # noqa: S311 - a problem, not a secret
 
 
 def random_integer(chance: Random, least: int, most: int) -> int:
-    """Return an integer from `least` to `most`, each as likely as any other."""
+    """Return a uniformly random integer from `least` to `most`."""
     return least + int(chance.random() * (most - least + 1))
 
 
 def sample(chance: Random, size: int, count: int) -> list[int]:
-    """Return `count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
+    """Return `count` different numbers below `size`, chosen uniformly at random, in ascending order."""
     return sorted(_drawn(chance, size, count))
 
 
 def _drawn(chance: Random, size: int, count: int) -> Iterator[int]:
-    """Yield the first `count` numbers of a Fisher-Yates shuffle of all below `size`. Only moved numbers are stored."""
+    """Yield the first `count` numbers in a Fisher-Yates shuffle of range(size). Only moved numbers are stored."""
     moved: dict[int, int] = {}
     for left in range(size, size - count, -1):
         place = int(chance.random() * left)
@@ -58,7 +58,7 @@ def check_bounds(numbers: Mapping[str, tuple[float, float, float]]) -> None:
 
 
 def in_units(number: float, places: int) -> int:
-    """Return the decimal `number` in units of 10**-places: rounded, halves to the even one."""
+    """Return the decimal `number` in units of 10**-places, rounded with halves to even."""
     return round(Decimal(str(number)).scaleb(places))
 
 
@@ -68,10 +68,10 @@ def check_places(places: int) -> None:
 
 
 def limited(constraints: Iterable[Constraint]) -> list[Constraint]:
-    """Return all of `constraints`.
+    """Return `constraints` as a list.
 
     Raises:
-        ValueError: if there are more than `MAX_CONSTRAINTS`.
+        ValueError: There are more than `MAX_CONSTRAINTS`.
     """
     found: list[Constraint] = []
     for constraint in constraints:

@@ -45,7 +45,7 @@ def random(  # noqa: PLR0913 - parameters of a family, by their names
     graph: str = "random",
     **of_graph: Any,  # noqa: ANN401 - `GraphChoice`'s own
 ) -> Team:
-    """Return a random problem of Model B: see `generators/random_csp.py`."""
+    """Return a random Model B problem: see `generators/random_csp.py`."""
     if tightness is None and max_cost is None:
         raise ValueError("tightness is missing (without max_cost)")
     drawn = GraphChoice(kind=graph, agents=agents, **of_graph)
@@ -80,7 +80,7 @@ def coloring(
     graph: str = "random",
     **of_graph: Any,  # noqa: ANN401 - `GraphChoice`'s own
 ) -> Team:
-    """Return a graph to be coloured: see `generators/coloring.py`."""
+    """Return a graph colouring problem: see `generators/coloring.py`."""
     drawn = GraphChoice(kind=graph, agents=agents, **of_graph)
     on = drawn.graph("degree", degree)
     if on is not None:
@@ -109,7 +109,7 @@ def meetings(  # noqa: PLR0913 - parameters of a family, by their names
     required: bool = False,
     seed: int = 0,
 ) -> Team:
-    """Return meetings to be scheduled: see `generators/meetings.py`."""
+    """Return a meeting scheduling problem: see `generators/meetings.py`."""
     worth = None if required else max_value
     return schedules.meetings(
         agents, meetings, participants, slots, seed, max_length=max_length, max_value=worth, model=model
@@ -129,7 +129,7 @@ def grid_sensors(  # noqa: PLR0913 - parameters of a family, by their names
     compatibility: float = 1,
     seed: int = 0,
 ) -> Team:
-    """Return sensors on a grid: see `generators/sensors.py`."""
+    """Return a problem with sensors on a grid: see `generators/sensors.py`."""
     reach = sensor_networks.Reach(sight, hearing, visibility, compatibility)
     return sensor_networks.grid_sensors(rows, columns, targets, seed, reach=reach, needed=needed, model=model)
 
@@ -148,7 +148,7 @@ def tasks(  # noqa: PLR0913 - parameters of a family, by their names
     capacity: int = 3,
     seed: int = 0,
 ) -> Team:
-    """Return tasks to be allocated: see `generators/tasks.py`."""
+    """Return a task allocation problem: see `generators/tasks.py`."""
     travel = allocations.Travel(side, Distance(distance), places)
     robot_skills = allocations.Skills(skills, skilled)
     return allocations.tasks(
@@ -163,7 +163,7 @@ def coverage(
     seed: int = 0,
     **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
 ) -> Team:
-    """Return a map to be covered: see `generators/maps/coverage.py`."""
+    """Return a problem of covering a map: see `generators/maps/coverage.py`."""
     team, _ = coverages.coverage(MapChoice(**of_map), seed, sensing=sensing, worth=worth)
     return team
 
@@ -177,7 +177,7 @@ def formation(
     seed: int = 0,
     **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
 ) -> Team:
-    """Return a formation on a map: see `generators/maps/formation.py`."""
+    """Return a problem of forming a formation on a map: see `generators/maps/formation.py`."""
     team, _ = formations.formation(
         MapChoice(**of_map), seed, shape=shape, spacing=spacing, heading=heading, anchor=anchor
     )
@@ -194,7 +194,7 @@ def patrol(
     seed: int = 0,
     **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
 ) -> Team:
-    """Return the next visits of a patrol on a map: see `generators/maps/patrol.py`."""
+    """Return a problem of planning the next visits of a patrol: see `generators/maps/patrol.py`."""
     team, _ = patrols.patrol(
         MapChoice(**of_map), seed, points=points, visit=visit, idle=idle, rounds=rounds, apart=apart
     )
@@ -217,11 +217,11 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "tracking": trackings.tracking,
     }
 )
-"""The function that generates a problem of each family, with keyword parameters."""
+"""The function that generates problems of each family, with keyword parameters."""
 _CHOICES: Mapping[str, tuple[type, frozenset[str]]] = MappingProxyType(
     {"of_graph": (GraphChoice, frozenset({"kind", "agents"})), "of_map": (MapChoice, frozenset())}
 )
-"""Groups of parameters that families share: the class of a group, and its fields that families declare themselves.
+"""Groups of parameters shared by families: the class of a group, and the fields that families declare themselves.
 
 The keys are the names of the `**` parameters.
 """
@@ -229,7 +229,7 @@ The keys are the names of the `**` parameters.
 
 @cache
 def parameters_of(family: str) -> Mapping[str, tuple[type, ...]]:
-    """Return the parameters of a family, and the types that each may have."""
+    """Return the parameters of a family, and the possible types of each parameter."""
     make = FAMILIES[family]
     hints = get_type_hints(make)
     given = inspect.signature(make).parameters
@@ -242,7 +242,7 @@ def parameters_of(family: str) -> Mapping[str, tuple[type, ...]]:
 
 
 def required_of(family: str) -> tuple[str, ...]:
-    """Return the parameters of a family that have no default."""
+    """Return the parameters of a family without a default."""
     signature = inspect.signature(FAMILIES[family])
     found = [
         name
@@ -253,7 +253,7 @@ def required_of(family: str) -> tuple[str, ...]:
 
 
 def _types(hint: Any) -> tuple[type, ...]:  # noqa: ANN401 - whatever a parameter is declared as
-    """Return the plain types that a parameter may have; an integer is valid for a float."""
+    """Return the plain types that a parameter may have; floats may also be integers."""
     alternatives = get_args(hint) if isinstance(hint, UnionType) else (hint,)
     plain = [one for one in alternatives if one in {int, float, bool, str}]
     return tuple(dict.fromkeys([*plain, *([int] if float in plain else [])]))

@@ -1,7 +1,8 @@
-"""Choose a constraint graph: one of a random family, with its parameters, or a graph in a file that networkx reads.
+"""Chooses a constraint graph: from a random family, with its parameters, or from a file that networkx reads.
 
-Files are GraphML, GEXF, GML, Pajek, lists of edges or of neighbours. networkx is an extra, `robochoc[graphs]`. It only
-reads files: its random graphs may differ between versions, so `generators/graphs.py` draws them.
+File formats are GraphML, GEXF, GML, Pajek, edge lists and adjacency lists. networkx is an extra, `robochoc[graphs]`. It
+is only used for files: random graphs are drawn by `generators/graphs.py`, since those of networkx may differ between
+versions.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ READERS = {
     ".edges": "read_edgelist",
     ".adjlist": "read_adjlist",
 }
-"""The reader of networkx for each ending of a file's name."""
+"""The networkx reader for each file name extension."""
 
 
 KINDS = tuple(map(str, GraphKind))
@@ -41,7 +42,7 @@ _KINDS_OF = {
     "torus": (GraphKind.GRID,),
     "connected": (GraphKind.RANDOM, GraphKind.SMALL_WORLD),
 }
-"""The parameters that only some kinds of graphs have."""
+"""The parameters of only some kinds of graphs."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,11 +52,11 @@ class GraphChoice:
     Attributes:
         kind: One of `KINDS`, or the path of a file.
         agents: The number of robots. None: the number of nodes in the file.
-        links: scale-free: links of a new node.
+        links: scale-free: the number of links of a new node.
         neighbours: small-world: the number of nearest nodes to which each node is linked.
-        rewiring: small-world: the share of edges that are moved.
-        rows: grid: the number of rows. None: nearest to a square.
-        torus: grid: whether the borders meet.
+        rewiring: small-world: the fraction of edges that are moved.
+        rows: grid: the number of rows. None: as nearly square as possible.
+        torus: grid: whether opposite borders are joined.
         connected: random, small-world: whether graphs are drawn until one is connected.
     """
 
@@ -69,7 +70,7 @@ class GraphChoice:
     connected: bool = False
 
     def graph(self, density_name: str, density: float | None, dashes: str = "") -> Graph | None:
-        """Return the graph. None: it is a uniform random graph, which the family draws.
+        """Return the graph; None for a uniform random graph, which the family draws.
 
         Args:
             density_name: The family's name for the density of its random graphs.
@@ -77,8 +78,8 @@ class GraphChoice:
             dashes: The prefix of parameters in messages: `--` on the command line.
 
         Raises:
-            ValueError: if a parameter is missing, or does not apply to this graph.
-            InvalidInputError: if the file is not a valid graph.
+            ValueError: A parameter is missing, or does not apply to this graph.
+            InvalidInputError: The file is not a valid graph.
         """
         for name, kinds in _KINDS_OF.items():
             if getattr(self, name) not in {None, False} and self.kind not in kinds:
@@ -113,7 +114,7 @@ class GraphChoice:
                 return graphs.tree(agents)
 
     def _refuse_agents(self, dashes: str) -> None:
-        """Raise `ValueError` if the file does not exist, or `agents` are given too."""
+        """Raise `ValueError` if the file does not exist, or if `agents` is also given."""
         if not Path(self.kind).exists():
             near = difflib.get_close_matches(self.kind, KINDS, 1)
             hint = f"; did you mean {near[0]!r}?" if near else ""
@@ -128,10 +129,10 @@ class GraphChoice:
 def read_graph(path: Path) -> Graph:
     """Return the graph in the file `path`. Directions, parallel edges and attributes of edges are ignored.
 
-    Nodes are numbered from 1: in the order of their numbers if all are integers, otherwise in that of the file.
+    Nodes are numbered from 1, in ascending order if all their names are integers, otherwise in the order of the file.
 
     Raises:
-        InvalidInputError: if the file is not a valid graph, or networkx is not installed.
+        InvalidInputError: The file is not a valid graph, or networkx is not installed.
     """
     reader = READERS.get(path.suffix.lower())
     if reader is None:

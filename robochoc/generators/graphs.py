@@ -2,11 +2,11 @@
 
 networkx is not used, since its random graphs may differ between versions.
 
-* `uniform`: a given number of edges, every such graph as likely as any other (Model B; `random_csp`).
+* `uniform`: a given number of edges; all such graphs are equally likely (Model B; `random_csp`).
 * `scale_free`: Barabasi and Albert, "Emergence of scaling in random networks", Science 286 (1999).
 * `small_world`: Watts and Strogatz, "Collective dynamics of 'small-world' networks", Nature 393 (1998).
-* `grid`: four neighbours each; as a torus, the borders meet. Ising models live on it (`generators/ising.py`).
-* `tree`: every tree with numbered nodes as likely as any other, by its Pruefer sequence (Cayley's n**(n-2) trees).
+* `grid`: four neighbours each; in a torus, opposite borders are joined. Used by Ising models (`generators/ising.py`).
+* `tree`: all trees with numbered nodes are equally likely, by Pruefer sequences (Cayley's n**(n-2) trees).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MAX_GRAPH_DRAWS = 1000
 """The maximum number of graphs that are drawn to find a connected one."""
 
 Edge = tuple[int, int]
-"""Numbers of two robots, from 1, the smaller one first."""
+"""The numbers of two robots, from 1, the smaller number first."""
 
 
 class GraphKind(StrEnum):
@@ -43,8 +43,8 @@ class Graph:
 
     Attributes:
         agents: The number of nodes.
-        label: Its name, as a part of a team's name.
-        draw: Returns its edges, in ascending order.
+        label: The name of the graph in a team's name.
+        draw: Returns the edges, in ascending order.
         suffix: The end of a team's name.
     """
 
@@ -55,10 +55,10 @@ class Graph:
 
 
 def uniform(agents: int, edges: int, label: str, *, connected: bool = False) -> Graph:
-    """Return a graph with the number of `edges`, each choice as likely as any other; `connected`: drawn until it is.
+    """Return a uniformly random graph with `edges` edges; if `connected`, graphs are drawn until one is connected.
 
     Raises:
-        ValueError: if there are more than `MAX_EDGES`.
+        ValueError: There are more than `MAX_EDGES` edges.
     """
     check_bounds({"constraints": (edges, 0, MAX_EDGES)})
 
@@ -69,13 +69,13 @@ def uniform(agents: int, edges: int, label: str, *, connected: bool = False) -> 
 
 
 def scale_free(agents: int, links: int = 2) -> Graph:
-    """Return a scale-free graph, of links * (agents - links) edges. It is connected.
+    """Return a connected scale-free graph with links * (agents - links) edges.
 
-    The first node after `links` lone ones is linked to them; each later one is linked to `links` of those there, each
-    as likely as it has links.
+    The first `links` nodes are not linked to each other. The next node is linked to all of them; each later node is
+    linked to `links` existing nodes, with probabilities proportional to their numbers of links.
 
     Raises:
-        ValueError: if `links` is not from 1 to agents - 1.
+        ValueError: `links` is not from 1 to agents - 1.
     """
     check_bounds({"agents": (agents, 2, MAX_NODES), "links": (links, 1, agents - 1)})
     check_bounds({"constraints": (links * (agents - links), 1, MAX_EDGES)})
@@ -83,7 +83,7 @@ def scale_free(agents: int, links: int = 2) -> Graph:
     def draw(chance: Random) -> list[Edge]:
         edges = []
         ends: list[int] = []
-        """Each node once for each of its links."""
+        """Each node, repeated for each of its links."""
         chosen: Collection[int] = range(1, links + 1)
         for new in range(links + 1, agents + 1):
             edges += [(old, new) for old in chosen]
@@ -97,19 +97,19 @@ def scale_free(agents: int, links: int = 2) -> Graph:
 
 
 def small_world(agents: int, neighbours: int = 4, rewiring: float = 0.1, *, connected: bool = False) -> Graph:
-    """Return a small world of agents * neighbours / 2 edges.
+    """Return a small-world graph with agents * neighbours / 2 edges.
 
-    It is a ring in which each node is linked to its `neighbours` nearest ones; the far end of each edge is then moved,
-    with the probability `rewiring`, to a node that the near end is not yet linked to.
+    In a ring, each node is linked to its `neighbours` nearest nodes; then the far end of each edge is moved, with the
+    probability `rewiring`, to a node that is not yet linked to the near end.
 
     Args:
         agents: The number of nodes.
         neighbours: The number of nearest nodes; even.
-        rewiring: A probability: 0 leaves the ring.
+        rewiring: The probability that an edge is moved; 0 leaves the ring.
         connected: Whether graphs are drawn until one is connected.
 
     Raises:
-        ValueError: if `neighbours` is odd, or more than the number of other nodes.
+        ValueError: `neighbours` is odd, or more than the number of other nodes.
     """
     check_bounds({"agents": (agents, 3, MAX_NODES), "neighbours": (neighbours, 2, agents - 1)})
     check_bounds({"rewiring": (rewiring, 0, 1), "constraints": (agents * neighbours // 2, 1, MAX_EDGES)})
@@ -140,7 +140,7 @@ def _rewired_ring(chance: Random, agents: int, neighbours: int, rewiring: float)
 
 
 def _other_than(taken: Iterable[int], place: int) -> int:
-    """Return the number at `place` among all from 0 that are not `taken`, which is in ascending order."""
+    """Return the number at index `place` among all numbers from 0 that are not in `taken`, which is ascending."""
     for one in taken:
         if one > place:
             break
@@ -149,7 +149,7 @@ def _other_than(taken: Iterable[int], place: int) -> int:
 
 
 def grid(rows: int, columns: int, *, torus: bool = False) -> Graph:
-    """Return a grid, numbered row by row. In a `torus`, the last row is next to the first, and columns likewise."""
+    """Return a grid, numbered row by row. In a `torus`, the last row is next to the first row; so are the columns."""
     check_bounds({"rows": (rows, 1, MAX_NODES), "columns": (columns, 1, MAX_NODES)})
     check_bounds({"agents": (rows * columns, 1, MAX_NODES)})
     edges = grid_edges(rows, columns, torus=torus)
@@ -169,12 +169,12 @@ def grid_edges(rows: int, columns: int, *, torus: bool) -> list[Edge]:
 
 
 def nearest_to_a_square(agents: int) -> int:
-    """Return the number of rows, at most that of columns, of the most nearly square grid with `agents` nodes."""
+    """Return the number of rows, at most the number of columns, in the most nearly square grid with `agents` nodes."""
     return next(rows for rows in range(isqrt(agents), 0, -1) if agents % rows == 0)
 
 
 def tree(agents: int) -> Graph:
-    """Return a tree: agents - 1 edges."""
+    """Return a random tree, with agents - 1 edges."""
     check_bounds({"agents": (agents, 1, MAX_NODES)})
 
     def draw(chance: Random) -> list[Edge]:
@@ -187,7 +187,7 @@ def tree(agents: int) -> Graph:
 def _tree_of(sequence: list[int], agents: int) -> list[Edge]:
     """Return the tree of a Pruefer sequence."""
     missing = [0] * (agents + 1)
-    """The number of times that each node occurs in the rest of the sequence."""
+    """The number of occurrences of each node in the rest of the sequence."""
     for node in sequence:
         missing[node] += 1
     edges = []
@@ -205,7 +205,7 @@ def _tree_of(sequence: list[int], agents: int) -> list[Edge]:
 
 
 def random_graph(chance: Random, agents: int, count: int, *, connected: bool = False) -> list[Edge]:
-    """Return `count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
+    """Return `count` pairs of robots, chosen uniformly at random, in ascending order; see `random_csp`."""
     if connected and count < agents - 1:
         raise ValueError(
             f"a connected graph of {agents} robots needs {agents - 1} constraints, and the density makes {count}"
@@ -219,7 +219,7 @@ def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
 
 
 def _pairs_at(places: Iterable[int], agents: int) -> Iterator[Edge]:
-    """Yield the pairs at `places`, ascending, in the list of all pairs of robots in ascending order."""
+    """Yield the pairs at the ascending indices `places` in the ascending list of all pairs of robots."""
     higher, first = 1, 0
     for place in places:
         while place - first >= agents - higher:
@@ -229,7 +229,7 @@ def _pairs_at(places: Iterable[int], agents: int) -> Iterator[Edge]:
 
 
 def _until_connected(draw: Callable[[], list[Edge]], agents: int, wanted: bool) -> list[Edge]:  # noqa: FBT001 - a fact
-    """Return the first connected graph, or, if that is not `wanted`, the first graph.
+    """Return the first connected graph if this is `wanted`, else the first graph.
 
     Raises `ValueError` after `MAX_GRAPH_DRAWS` graphs.
     """

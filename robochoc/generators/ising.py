@@ -1,12 +1,12 @@
 """Ising models: spins on a torus, each with its own field and coupled to its four neighbours.
 
-The benchmark of belief propagation on graphs with many cycles (Cerquides, Emonet, Picard and Rodriguez-Aguilar,
-"Improving Max-Sum through decimation to solve cyclic distributed constraint optimization problems", 2018, arXiv
-1706.02209; pyDCOP generates it as well). Each spin is 0 or 1. Of a field k, drawn from [-rho, rho], the spin 0 costs k
-and the spin 1 costs -k; of a coupling k, drawn from [-beta, beta], equal spins cost k and different ones -k. The sum,
-which may be negative, is minimised.
+Ising models are a benchmark for belief propagation on graphs with many cycles (Cerquides, Emonet, Picard and
+Rodriguez-Aguilar, "Improving Max-Sum through decimation to solve cyclic distributed constraint optimization problems",
+2018, arXiv 1706.02209); pyDCOP generates them as well. Each spin is 0 or 1. With a field k, drawn from [-rho, rho], the
+spin 0 costs k and the spin 1 costs -k. With a coupling k, drawn from [-beta, beta], equal spins cost k and different
+spins cost -k. The sum, which may be negative, is minimised.
 
-Couplings and fields are decimals: with p places, each multiple of 10**-p in its range is as likely as any other.
+Couplings and fields are decimals: with p places, all multiples of 10**-p in the range are equally likely.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SPINS = Domain("Spin", (range(2),))
 def ising(
     rows: int, columns: int, seed: int = 0, *, coupling: float = 1.6, field: float = 0.05, places: int = 3
 ) -> Team:
-    """Return the random Ising model of `seed` with rows x columns spins.
+    """Return a random Ising model with rows x columns spins.
 
     `Robot2.3`, in row 2 and column 3, owns `V2.3`.
 
@@ -33,10 +33,10 @@ def ising(
         seed: The same seed gives the same problem on every machine.
         coupling: The strength of couplings, beta.
         field: The strength of fields, rho.
-        places: The decimal places of both.
+        places: The decimal places of couplings and fields.
 
     Raises:
-        ValueError: if a number is out of its bounds.
+        ValueError: A number is out of bounds.
     """
     check_bounds({"rows": (rows, 2, MAX_NODES), "columns": (columns, 2, MAX_NODES)})
     check_bounds({"rows x columns": (rows * columns, 4, MAX_NODES)})

@@ -1,20 +1,20 @@
 """Meetings: a distributed multi-event scheduling problem (DiMES), with time slots or events as variables.
 
 Maheswaran, Tambe, Bowring, Pearce and Varakantham, "Taking DCOP to the real world: efficient complete solutions for
-distributed multi-event scheduling", AAMAS 2004. For each person, a free slot has a value, and each of its meetings has
-a value per slot. A meeting needs all its participants at the same time, in consecutive slots; no person is in two
-meetings at once. A meeting need not take place. The sum over all meetings that take place is maximised: for each
-participant and slot, the value of the meeting minus that of the free slot.
+distributed multi-event scheduling", AAMAS 2004. For each person, free slots have values, and so have the slots of the
+person's meetings. A meeting needs all its participants at the same time, in consecutive slots; no person is in two
+meetings at once. Meetings need not take place. The maximised utility is a sum over the participants and slots of all
+meetings that take place: the value of the meeting minus the value of the free slot.
 
 The three models of the paper, with the same maximum:
 
 * `peav` (private events as variables): a robot is a person, with a variable for each of its meetings: the slot in which
-  the meeting starts, or 0 if it does not take place. The values of meetings and slots stay private. The variables of
-  the participants of a meeting are equal.
+  the meeting starts, or 0 if it does not take place. The values of meetings and slots stay private. All participants
+  in a meeting have equal values of its variables.
 * `eav` (events as variables): a robot is a meeting with one variable. Its utility is the sum over its participants.
   Meetings with a common participant do not overlap.
-* `tsav` (time slots as variables): a robot is a person, with a variable for each slot: 0 if it is free, or a part of
-  one of its meetings. A part is as long as a slot, and parts follow each other.
+* `tsav` (time slots as variables): a robot is a person, with a variable for each slot: 0 if the slot is free, or a part
+  of one of its meetings. A part is as long as a slot, and parts follow each other.
 
 Without preferences, all meetings must take place, and the problem is a DisCSP.
 """
@@ -55,7 +55,7 @@ AT_ONE_TIME = Predicate(
     _TERMS,
     parse("or(eq(X, Y), and(or(lt(X, i), gt(X, j)), or(lt(Y, i), gt(Y, j))))", _TERMS, Type.BOOLEAN),
 )
-"""If X or Y, the same slot of two persons, is one of the parts i to j of a meeting, both are equal."""
+"""If X or Y, the same slot of two persons, is one of the parts i to j of a meeting, X and Y are equal."""
 IN_A_ROW = Predicate(
     "next",
     _TERMS,
@@ -67,7 +67,7 @@ ONCE = Predicate("once", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"),
 
 
 class MeetingsModel(StrEnum):
-    """The meaning of a variable: a meeting of a person, a meeting, or a slot of a person."""
+    """The meaning of a variable: a person's meeting, a meeting, or a person's slot."""
 
     PEAV = "peav"
     EAV = "eav"
@@ -85,11 +85,11 @@ class Meeting:
 
 @dataclass(frozen=True)
 class Meetings:
-    """A problem of meetings.
+    """A meeting scheduling problem.
 
     Attributes:
         slots: The number of slots, which are numbered from 1.
-        free: By person: the value of each slot if it stays free.
+        free: The value of each slot if it stays free, by person.
         meetings: The meetings.
     """
 
@@ -118,25 +118,25 @@ def meetings(
     max_value: int | None = 10,
     model: MeetingsModel | str = MeetingsModel.PEAV,
 ) -> Team:
-    """Return the random problem of `seed` of scheduling `meetings` with `participants` each.
+    """Return a random problem of scheduling `meetings` with `participants` each.
 
     In `peav`, `Robot3` is a person, and `V3.2` is the start of meeting 2 for this person; there are no robots for
     persons without meetings. In `eav`, `Meeting2` owns `V2`. In `tsav`, `V3.2` is the part of a meeting in slot 2 of
-    `Robot3`: the parts of all meetings are numbered from 1, in their order.
+    `Robot3`, where the parts of all meetings are numbered consecutively from 1.
 
     Args:
         agents: The number of persons.
         meetings: The number of meetings.
-        participants: The number of persons in each meeting, any choice as likely as any other.
+        participants: The number of persons in each meeting, chosen uniformly at random.
         slots: The number of time slots.
         seed: The same seed gives the same problem on every machine, in all models.
         max_length: The maximum length of a meeting, in slots.
-        max_value: The maximum value of a meeting's slot, and of a free slot, for a participant. None: no preferences,
-            and all meetings must take place.
+        max_value: The maximum value of a meeting in a slot, and of a free slot, for a participant. None: there are no
+            preferences, and all meetings must take place.
         model: The meaning of a variable.
 
     Raises:
-        ValueError: if a number is out of its bounds.
+        ValueError: A number is out of bounds.
     """
     model = member(MeetingsModel, "model", model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "meetings": (meetings, 1, MAX_AGENTS)})
@@ -263,14 +263,14 @@ def _tsav(problem: Meetings, *, preferences: bool) -> _Parts:
 
 
 def _parts(problem: Meetings) -> dict[int, range]:
-    """Return the numbers of the parts of each meeting."""
+    """Return the numbers of each meeting's parts."""
     ends = itertools.accumulate((meeting.length for meeting in problem.meetings), initial=1)
     bounds = zip(problem.meetings, itertools.pairwise(ends), strict=True)
     return {meeting.number: range(begin, end) for meeting, (begin, end) in bounds}
 
 
 def _there(problem: Meetings, meeting: Meeting, parts: Mapping[int, range], slot: int) -> range:
-    """Return the parts of `meeting` that can be in a slot."""
+    """Return the parts of `meeting` that can be in `slot`."""
     numbers, starts = parts[meeting.number], problem.starts(meeting)
     return numbers[max(0, slot - starts[-1]) : min(meeting.length, slot)]
 
@@ -294,7 +294,7 @@ def _takes_place(person: int, meeting: Meeting, first: int, slots: int) -> Const
 
 
 def _starts(problem: Meetings, meeting: Meeting, *, preferences: bool) -> Domain:
-    """Return the slots in which `meeting` can start, and 0 if it need not take place."""
+    """Return the slots in which `meeting` can start, and 0 if the meeting need not take place."""
     starts = problem.starts(meeting)
     return Domain(f"Length{meeting.length}", (range(0 if preferences else 1, starts.stop),))
 

@@ -1,15 +1,15 @@
 """3D N^2 queens: n x n robots, one per cell, each choosing its level so that no two attack each other.
 
-Paper, Section 5.1, and Allison, Yee and McGaughey, TR 89/130 (1989). Two models:
+Paper, Section 5.1, and Allison, Yee and McGaughey, TR 89/130 (1989). There are two models:
 
-* `planar`, as in the XML of Figure 2: robots of a row or a column have different levels that are not on a diagonal;
+* `planar`, as in the XML of Figure 2: robots in a row or a column have different levels that are not on a diagonal;
   robots on a diagonal of the board (|di| = |dj|) have different levels.
-* `full` adds the space diagonals (|di| = |dj| = |dk| attacks too): Allison's queen, which moves in 26 directions.
+* `full` adds the space diagonals (|di| = |dj| = |dk| is also an attack) for Allison's queen, with 26 directions.
 
-The constraint C3 printed in the paper contradicts Figure 2, and is in neither model.
+The constraint C3 printed in the paper contradicts Figure 2, and is not used in either model.
 
-The team has a robot for every cell, as in the paper, or one for every row: a complex agent that flies n drones, whose
-private constraints are those within the row.
+The team has a robot for every cell, as in the paper, or one for every row. The latter is a complex agent that flies n
+drones, with private constraints within the row.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ Cell = tuple[int, int]
 
 
 class QueensModel(StrEnum):
-    """The attacks of a queen: as in Figure 2, or as Allison's."""
+    """The attacks of a queen: as in Figure 2, or of Allison's queen."""
 
     PLANAR = "planar"
     FULL = "full"
 
 
 class QueensRobots(StrEnum):
-    """The drones of a robot: that of a cell, or those of a row."""
+    """The drones of a robot: one for a cell, or all in a row."""
 
     CELLS = "cells"
     ROWS = "rows"
@@ -51,7 +51,7 @@ NOT_ATTACKING = Predicate(
     ("X", "Y", "i", "j"),
     parse("and(neq(X, Y), neq(abs(minus(X, Y)), abs(minus(i, j))))", ("X", "Y", "i", "j"), Type.BOOLEAN),
 )
-"""Figure 2's p1: levels X and Y differ, and are not on a diagonal at the distance |i - j|."""
+"""The predicate p1 in Figure 2: levels X and Y differ, and are not on a diagonal at the distance |i - j|."""
 
 
 def queens3d(
@@ -61,11 +61,11 @@ def queens3d(
 
     Args:
         n: The size of the cube, at most `MAX_N`.
-        model: The attacks of a queen: as in Figure 2 (`planar`), or in space as well (`full`).
-        robots: The drones of a robot: that of a cell (`cells`), or those of a row (`rows`).
+        model: The attacks of a queen: as in Figure 2 (`planar`), or also along space diagonals (`full`).
+        robots: The drones of a robot: one for a cell (`cells`), or all in a row (`rows`).
 
     Raises:
-        ValueError: if `n` is not from 1 to `MAX_N`, or the model or the robots are unknown.
+        ValueError: `n` is not from 1 to `MAX_N`, or `model` or `robots` is unknown.
 
     Example:
         >>> from robochoc.generators.queens3d import queens3d
@@ -133,7 +133,7 @@ def _attackable(cell: Cell, n: int) -> Iterator[Cell]:
 
 
 def _apart(parent: Cell, child: Cell, model: QueensModel) -> Constraint:
-    """Return the constraint between two cells. p1's i and j are the coordinates in which the cells differ."""
+    """Return the constraint between two cells. In p1, i and j are the coordinates in which the cells differ."""
     names = (_variable(parent), _variable(child))
     diagonal = parent[0] != child[0] and parent[1] != child[1]
     if diagonal and model == QueensModel.PLANAR:

@@ -3,21 +3,21 @@
 Gent, MacIntyre, Prosser, Smith and Walsh, "Random constraint satisfaction: flaws and structure", Constraints 6
 (2001), Section 2; Prosser, "An empirical study of phase transitions in binary constraint satisfaction problems", AIJ
 81 (1996). A problem <n, d, p1, p2> has n variables with d values each. Of the n(n-1)/2 pairs of variables exactly
-p1 n(n-1)/2 are constrained, and each constraint forbids exactly p2 d^2 pairs of values; every such problem is as
-likely as any other. Both numbers are rounded as Python's `round` does, halves to the even one.
+p1 n(n-1)/2 are constrained, and each constraint forbids exactly p2 d^2 pairs of values; all such problems are equally
+likely. Both numbers are rounded like Python's `round`, with halves to even.
 
-As the 2001 paper shows, problems with p2 >= 1/d are flawed when they are large enough: nearly all of them have a
-variable of which each value alone is ruled out by a neighbour. At the sizes that protocols are compared on (up to
-some tens of variables) that is rare.
+As the 2001 paper shows, problems with p2 >= 1/d are flawed if they are large enough: nearly all of them have a
+variable each of whose values is excluded by a single neighbour. This is rare at the sizes on which protocols are
+compared (up to some tens of variables).
 
 With `max_cost`, each pair of values that is not forbidden has a cost, drawn independently and uniformly from 0 to
-`max_cost`. With a tightness of 0 no pair is forbidden: the usual random DCOP. Costs may have decimal places, and
-may be utilities whose sum is maximised.
+`max_cost`. With a tightness of 0 no pair is forbidden, which gives the usual random DCOP. Costs may have decimal
+places, and may be utilities whose sum is maximised.
 
-With `asymmetric`, each robot of a pair has its own costs, drawn independently, and their sum is minimised: the usual
-random ADCOP (Grinshpoun, Grubshtein, Zivan, Netzer, Meisels, JAIR 47, 2013). Forbidden pairs are forbidden by both.
+With `asymmetric`, the two robots of a pair have separate costs, drawn independently, and their sum is minimised: the
+usual random ADCOP (Grinshpoun, Grubshtein, Zivan, Netzer, Meisels, JAIR 47, 2013). Both robots forbid the same pairs.
 
-Instead of p1, `random_on` has a graph: scale-free, small world, grid, tree, or from a file (`generators/graphs.py`).
+`random_on` has a graph instead of p1: scale-free, small world, grid, tree, or from a file (`generators/graphs.py`).
 
 A seed gives the same problem on every machine and with every version of Python (`generators/draws.py`).
 """
@@ -45,7 +45,7 @@ from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 
 MAX_FORBIDDEN_PAIRS = 1_000_000
-"""The maximum of all constraints together, for files of a readable size. With costs: the maximum of all pairs."""
+"""The maximum in all constraints together, for files of a readable size. With costs, the maximum of all pairs."""
 
 
 def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
@@ -60,23 +60,23 @@ def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
     costs: CostUnits = PLAIN_COSTS,
     asymmetric: bool = False,
 ) -> Team:
-    """Return the random problem <agents, domain, density, tightness> of `seed`.
+    """Return a random problem <agents, domain, density, tightness>.
 
-    `Robot3` owns `V3`, and lists its constraints with robots of smaller numbers.
+    `Robot3` owns `V3`, and its file has its constraints with robots of smaller numbers.
 
     Args:
         agents: The number of robots, each with one variable.
         domain: The number of values of each variable.
-        density: The share of constrained pairs of variables, from 0 to 1.
-        tightness: The share of forbidden pairs of values in a constraint, from 0 to 1.
-        seed: The same seed makes the same problem on every machine.
-        connected: Whether graphs are drawn until one is connected. Each connected graph is then as likely as any other.
-        max_cost: The maximum cost of pairs of values that are not forbidden: the team is a DisWCSP. None: no costs.
-        costs: The decimal places of costs, and whether they are utilities to be maximised.
-        asymmetric: Whether each robot of a pair has its own costs (partially known constraints).
+        density: The fraction of pairs of variables that are constrained, from 0 to 1.
+        tightness: The fraction of pairs of values that a constraint forbids, from 0 to 1.
+        seed: The same seed gives the same problem on every machine.
+        connected: Whether graphs are drawn until one is connected. All connected graphs are then equally likely.
+        max_cost: The maximum cost of pairs of values that are not forbidden, in a DCOP. None: no costs.
+        costs: The decimal places of costs, and whether costs are utilities to be maximised.
+        asymmetric: Whether the robots of a pair have separate costs (partially known constraints).
 
     Raises:
-        ValueError: if there is no such problem, or it is too large. The message names the number to change.
+        ValueError: There is no such problem, or it is too large. The message names the number to change.
 
     Example:
         >>> from robochoc.generators.random_csp import random_csp
@@ -101,10 +101,10 @@ def random_on(
     costs: CostUnits = PLAIN_COSTS,
     asymmetric: bool = False,
 ) -> Team:
-    """Return a random problem on `graph`, with the parameters of `random_csp`.
+    """Return a random problem on `graph`; for the parameters see `random_csp`.
 
     Raises:
-        ValueError: if there is no such problem, or it is too large. The message names the number to change.
+        ValueError: There is no such problem, or it is too large. The message names the number to change.
     """
     check_bounds({"domain": (domain, 1, MAX_VALUES), "tightness": (tightness, 0, 1)})
     check_places(costs.places)
@@ -140,7 +140,7 @@ def random_on(
 
 
 def places_label(costs: CostUnits) -> str:
-    """Return the decimal places in a team's name: empty, or `.000`."""
+    """Return the part of a team's name for decimal places: empty, or `.000`."""
     return f".{'0' * costs.places}" if costs.places else ""
 
 
@@ -153,9 +153,9 @@ def team_of_edges(
     costs: CostUnits = PLAIN_COSTS,
     parts: Mapping[str, Sequence[Constraint]] = MappingProxyType({}),
 ) -> Team:
-    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint.
+    """Return a team in which `Robot3` owns `V3`. The constraint on an edge belongs to the lower robot.
 
-    `parts` are the parts of partially known constraints, by the name of the robot that knows them.
+    `parts` are the parts of partially known constraints, by the name of the robot that knows each part.
     """
     values = Domain("D", (range(1, domain + 1),))
     variables = {f"Robot{number}": [Variable(f"V{number}", values)] for number in range(1, agents + 1)}
@@ -163,7 +163,7 @@ def team_of_edges(
 
 
 def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None) -> None:
-    """Raise `ValueError` if the constraints have too many pairs of values for files."""
+    """Raise `ValueError` if the constraints would have too many pairs of values for files."""
     forbidden = round(tightness * domain**2)
     if edges * forbidden > MAX_FORBIDDEN_PAIRS:
         raise ValueError(
@@ -178,7 +178,7 @@ def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None
 
 
 def _drawn(chance: Random, edge: Edge, domain: int, forbidden: int, sides: Sequence[int | None]) -> list[Constraint]:
-    """Return a constraint on `edge` for each of its `sides`: the maximum cost, or None to forbid only."""
+    """Return a constraint on `edge` for each of `sides`: a maximum cost, or None for no costs."""
     relation = _forbidding(edge, sample(chance, domain**2, forbidden), domain)
     scope = tuple(f"V{number}" for number in edge)
     relations = [relation if most is None else _charging(chance, relation, domain, most) for most in sides]
@@ -192,7 +192,7 @@ def _forbidding(edge: Edge, forbidden: list[int], domain: int) -> Relation:
 
 
 def _charging(chance: Random, relation: Relation, domain: int, most: int) -> Relation:
-    """Return `relation`, which forbids pairs of values, with random costs of at most `most` for all others."""
+    """Return `relation`, which forbids pairs of values, with random costs of at most `most` for all other pairs."""
     priced: dict[tuple[int, ...], float] = dict.fromkeys(relation.tuples, INFINITE)
     for pair in itertools.product(range(1, domain + 1), repeat=2):
         if pair not in priced:

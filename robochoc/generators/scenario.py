@@ -1,14 +1,14 @@
-"""Random scenarios: a sequence of events in which constraints, values and robots of a team come and go.
+"""Random scenarios: sequences of events that add and remove constraints, values and robots of a team.
 
-A dynamic problem is a sequence of problems, each from the one before by such changes (Verfaillie and Schiex, "Solution
-reuse in dynamic constraint satisfaction problems", AAAI 1994; of distributed optimisation: Yeoh, Varakantham, Sun and
-Koenig, "Incremental DCOP search algorithms for solving dynamic DCOPs", AAMAS 2011). The rate is the number of changes
-in an event, as a share of the team's shared constraints.
+A dynamic problem is a sequence of problems, each of which results from the previous problem by such changes (Verfaillie
+and Schiex, "Solution reuse in dynamic constraint satisfaction problems", AAAI 1994; for distributed optimisation: Yeoh,
+Varakantham, Sun and Koenig, "Incremental DCOP search algorithms for solving dynamic DCOPs", AAMAS 2011). The rate is
+the number of changes in an event, as a fraction of the number of the team's shared constraints.
 
 Removed values, constraints and robots are added again under their old names. If nothing was removed, a variable gets a
-value of the domain of another variable, two robots get a copy of a constraint that others share, and a copy of a robot
+value from the domain of another variable, two robots get a copy of a constraint between others, or a copy of a robot
 joins, with copies of its variables and of its constraints with the same robots. A domain keeps at least one value, and
-a team two robots.
+a team at least two robots.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from robochoc.system.suggestions import member
 
 MAX_EVENTS = 1000
 MAX_TRIES = 100
-"""The maximum number of kinds and places that are tried for one change."""
+"""The maximum number of attempts, with random kinds and objects, for one change."""
 MIN_ROBOTS = 2
 
 _One = TypeVar("_One")
@@ -80,8 +80,14 @@ def random_scenario(
         kinds: The kinds of changes, each as likely as any other.
         after: The number of messages after which an event happens. None: when the problem before it is solved.
 
+        rate: The number of changes in each event, as a fraction of the number of shared constraints, more than 0 and at
+            most 1. Each event has at least one change.
+        seed: The same seed gives the same scenario for the same team on every machine.
+        kinds: The kinds of changes, which are equally likely.
+        after: The number of messages after which an event happens. None: when the previous problem is solved.
+
     Raises:
-        ValueError: if the team has a scenario, a number is out of its bounds, or no change of these kinds is possible.
+        ValueError: The team has a scenario, a number is out of bounds, or no change of these kinds is possible.
     """
     check_bounds({"events": (events, 1, MAX_EVENTS), "rate": (rate, 0, 1)})
     if team.scenario:
@@ -99,7 +105,7 @@ def random_scenario(
 
 
 class _ScenarioBuilder:
-    """Draws one change after the other, and stores removed parts, so that they can be added again."""
+    """Draws changes one by one, and stores removed parts, so that these can be added again."""
 
     def __init__(self, chance: Random, team: Team, kinds: Sequence[ChangeKind]) -> None:
         self._chance = chance
@@ -119,7 +125,7 @@ class _ScenarioBuilder:
         }
 
     def change(self) -> Change:
-        """Return a possible change of the team, and apply it."""
+        """Return a possible change to the team, after applying it."""
         for _ in range(MAX_TRIES):
             change = self._make[self._one(self._kinds)]()
             if change is None:
@@ -137,7 +143,7 @@ class _ScenarioBuilder:
         return things[int(self._chance.random() * len(things))]
 
     def _note(self, change: Change) -> None:
-        """Store the part that `change` removes, and delete a stored part that it adds again."""
+        """Store the part removed by `change`, or delete the stored part that `change` adds again."""
         match change:
             case RemoveValue(variable, value):
                 self._values.append((variable, value))
@@ -197,7 +203,7 @@ class _ScenarioBuilder:
         return self._added(replace(_renamed(old, terms), name=f"Added{next(self._numbers)}", line=0))
 
     def _added(self, constraint: Constraint) -> AddConstraint:
-        """Return the change that adds `constraint` to the lowest robot of its scope, under the second lowest."""
+        """Return the change that adds `constraint` to the lowest robot in its scope, under the second lowest."""
         rank = {name: place for place, name in enumerate(self._team.order)}
         owners = sorted({self._team.owner[name] for name in constraint.variables}, key=rank.__getitem__)
         return AddConstraint(owners[-1], owners[-2], constraint)
@@ -219,7 +225,7 @@ class _ScenarioBuilder:
         )
 
     def _joining(self, robot: Robot, constraints: Iterable[Constraint]) -> Robot:
-        """Return `robot` with the lowest priority, and those of `constraints` whose other robots are in the team."""
+        """Return `robot` with the lowest priority, and with the `constraints` whose other robots are in the team."""
         own = {variable.name for variable in robot.variables}
         rank = {name: place for place, name in enumerate(self._team.order)}
         private, under = list[Constraint](), dict[str, list[Constraint]]()
@@ -244,7 +250,7 @@ class _ScenarioBuilder:
 
 
 def _known(constraint: Constraint) -> bool:
-    """Return whether it is totally known: a scenario cannot add other constraints."""
+    """Return whether `constraint` is totally known; scenarios cannot add other constraints."""
     return constraint.model != ConstraintModel.PKC
 
 

@@ -1,19 +1,20 @@
-"""SensorDCSP: several sensors that see it and hear each other track each target; a sensor tracks at most one.
+"""SensorDCSP: each target is tracked by several sensors that see it and hear each other; a sensor tracks one at most.
 
 Bejar, Domshlak, Fernandez, Gomes, Krishnamachari, Selman and Valls, "Sensor networks and distributed CSP:
-communication, computation and complexity", AIJ 161 (2005); CSPLib, problem 72. Three sensors a target triangulate it.
+communication, computation and complexity", AIJ 161 (2005); CSPLib, problem 72. Three sensors triangulate a target.
 
-* `sensors`, SensorDCSP: each target is visible to each sensor, and each pair of sensors compatible, with a given
-  probability.
+* `sensors`, SensorDCSP: targets are visible to sensors, and pairs of sensors are compatible, with given probabilities.
 * `grid_sensors`, GSensorDCSP: sensors are on the nodes of a grid and targets in its cells, at most one per cell.
-  Sensors see and hear up to given distances; each of these links may fail with a probability.
+  Sensors see and hear up to given distances; each of these links exists with a given probability.
 
-Two models, satisfiable together:
+There are two models, and a problem is satisfiable in both or in neither:
 
-* `targets` (the paper's; CSPLib's TaV): a robot is a target, with a variable for each sensor that it needs; the values
-  are sensors. Its variables are different and compatible (private); those of two targets are different.
-* `sensors` (as CSPLib's SaV): a robot is a sensor with one variable: the target that it tracks, or 0. At least the
-  needed number of the sensors that see a target track it (a constraint over all of them), and no two incompatible ones.
+* `targets` (in the paper; TaV in CSPLib): a robot is a target, with a variable for each sensor that it needs; the
+  values are sensors. The values of a target's variables are different and compatible (private constraints). Variables
+  of different targets have different values.
+* `sensors` (like SaV in CSPLib): a robot is a sensor with one variable: the target that it tracks, or 0. At least the
+  needed number of sensors track a target (a constraint over all sensors that see it), and no two of these are
+  incompatible.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ from robochoc.system.suggestions import member
 
 MAX_NEEDED = 10
 MAX_PAIRS = 1_000_000
-"""The maximum number of pairs of sensors that see the same target, of all targets together."""
+"""The maximum number of pairs of sensors that see the same target, summed over all targets."""
 
 NOT_BOTH = Predicate("notBoth", ("X", "Y", "t"), parse("or(ne(X, t), ne(Y, t))", ("X", "Y", "t"), Type.BOOLEAN))
 """X and Y do not both track the target t."""
@@ -51,10 +52,10 @@ class Reach:
     """The distances at which sensors on a grid see and hear.
 
     Attributes:
-        sight: The range of sight: with 1 the four cells around a sensor, with 2 the sixteen cells, and so on.
-        hearing: The maximum number of steps to a sensor that is heard, along the grid or diagonally.
-        visibility: The probability that a sensor that is near enough sees a target.
-        compatibility: The probability that two sensors that are near enough are compatible.
+        sight: The range of sight: 1 for the four cells around a sensor, 2 for sixteen cells, and so on.
+        hearing: The maximum number of steps, along the grid or diagonally, to a sensor that is heard.
+        visibility: The probability that a sensor sees a target within its range.
+        compatibility: The probability that two sensors within range of each other are compatible.
     """
 
     sight: int = 1
@@ -65,7 +66,7 @@ class Reach:
 
 @dataclass(frozen=True)
 class SensorNetwork:
-    """The targets that sensors see, and the sensors that they hear.
+    """The targets that sensors see, and the other sensors that they hear.
 
     Attributes:
         sensors: The number of sensors, which are numbered from 1.
@@ -90,7 +91,7 @@ def sensors(
     needed: int = 3,
     model: SensorsModel | str = SensorsModel.TARGETS,
 ) -> Team:
-    """Return the random SensorDCSP problem of `seed`.
+    """Return a random SensorDCSP problem.
 
     Args:
         sensors: The number of sensors.
@@ -127,14 +128,14 @@ def grid_sensors(
     needed: int = 3,
     model: SensorsModel | str = SensorsModel.TARGETS,
 ) -> Team:
-    """Return the random GSensorDCSP problem of `seed`.
+    """Return a random GSensorDCSP problem.
 
-    Sensors are numbered row by row. The cells between them are one row and one column fewer.
+    Sensors are numbered row by row. The cells between sensors have one row and one column fewer.
 
     Args:
         rows: The number of rows of sensors.
         columns: The number of columns of sensors.
-        targets: The number of targets, each in the middle of a cell of its own.
+        targets: The number of targets, each in the middle of a different cell.
         seed: The same seed gives the same problem on every machine, in both models.
         reach: The distances at which sensors see and hear.
         needed: The number of sensors that a target needs.

@@ -1,16 +1,16 @@
-"""Task allocation to robots: each task has a place, a required skill and a worth; travelling to it has a cost.
+"""Task allocation to robots: each task has a place, a required skill and a worth; travelling to a task has a cost.
 
 * `assignment`: a robot does at most one task, and a task is done by at most one robot. This is ST-SR-IA, the assignment
   problem, in Gerkey and Mataric, "A formal analysis and taxonomy of task allocation in multi-robot systems", IJRR 23
   (2004). A robot's variable is its task, or 0.
 * `several`: a robot does several tasks, within its capacity, and a task is done by at most one robot. This is the
-  generalised assignment problem of Scerri, Farinelli, Okamoto and Tambe, "Allocating tasks in extreme teams", AAMAS
-  2005. A robot has a variable for each task that it can do: 1 if it does it, else 0.
+  generalised assignment problem in Scerri, Farinelli, Okamoto and Tambe, "Allocating tasks in extreme teams", AAMAS
+  2005. A robot has a variable for each task that it can do: 1 if the robot does the task, else 0.
 
-The sum of the worth of all tasks that are done, less the ways of those who do them, is maximised. Ways are straight
-lines from the robot to the task, or along streets (Manhattan's); robots and tasks lie on points of whole numbers.
-Straight ones are decimals, rounded to so many places in integer arithmetic, halves up. Of several tasks each is reached
-from where the robot stands.
+The total worth of all tasks that are done, minus the distances travelled for them, is maximised. Distances are measured
+from the robot to the task, on a straight line or along streets (Manhattan distance); the coordinates of robots and
+tasks are integers. Straight distances are decimals, rounded to a given number of places in integer arithmetic, halves
+up. With several tasks, the distance to each task is measured from the robot's initial place.
 """
 
 from __future__ import annotations
@@ -49,12 +49,12 @@ MAX_SKILLS = 100
 
 @dataclass(frozen=True)
 class Travel:
-    """Where robots and tasks are, and how long ways are.
+    """The places of robots and tasks, and the distances between them.
 
     Attributes:
-        side: Robots and tasks lie in a square, at whole coordinates from 0 to `side`.
-        distance: How long a way is.
-        places: The decimal places of straight travel.
+        side: The largest coordinate: robots and tasks are in a square, at integer coordinates from 0 to `side`.
+        distance: The measure of distances.
+        places: The decimal places of straight distances.
     """
 
     side: int = 100
@@ -67,8 +67,8 @@ class Skills:
     """The skills of robots.
 
     Attributes:
-        number: The number of skills. A task requires one, each as likely as any other.
-        each: The number of skills of a robot, any choice as likely as any other.
+        number: The number of skills. A task requires one, chosen uniformly at random.
+        each: The number of skills per robot, chosen uniformly at random.
     """
 
     number: int = 1
@@ -77,10 +77,10 @@ class Skills:
 
 @dataclass(frozen=True)
 class DrawnTasks:
-    """A random problem of tasks.
+    """A random task allocation problem.
 
     Attributes:
-        profit: By robot and task that it has the skill for: the worth of the task minus the distance to it.
+        profit: The worth of a task minus the distance to it, by robot and by task for which the robot has the skill.
         load: The load of each task.
         capacity: The maximum load of a robot.
     """
@@ -101,23 +101,23 @@ def tasks(
     model: TasksModel | str = TasksModel.ASSIGNMENT,
     capacity: int = 3,
 ) -> Team:
-    """Return the random problem of `seed` of allocating `tasks` to robots.
+    """Return a random problem of allocating `tasks` to robots.
 
-    In `assignment`, `Robot3` owns `V3`. In `several`, `V3.2` is 1 if it does task 2; robots that can do no task are
-    left out.
+    In `assignment`, `Robot3` owns `V3`. In `several`, `V3.2` is 1 if `Robot3` does task 2; robots that can do no task
+    are left out.
 
     Args:
         agents: The number of robots.
         tasks: The number of tasks.
         seed: The same seed gives the same problem on every machine.
         worth: The maximum worth of a task; the minimum is 1.
-        travel: Where robots and tasks are, and how distances are measured.
+        travel: The places of robots and tasks, and the measure of distances.
         skills: The skills of robots.
         model: Whether a robot does at most one task, or several.
         capacity: The maximum load of a robot in `several`; the load of a task is from 1 to 3.
 
     Raises:
-        ValueError: if a number is out of its bounds, or no robot has a required skill.
+        ValueError: A number is out of bounds, or no robot has a required skill.
     """
     model = member(TasksModel, "model", model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "tasks": (tasks, 1, MAX_AGENTS)})
@@ -150,7 +150,7 @@ def tasks(
 def drawn_tasks(
     chance: Random, numbers: tuple[int, int, int], travel: Travel, skills: Skills, capacity: int
 ) -> DrawnTasks:
-    """Return random tasks; `numbers` are those of robots and of tasks, and the maximum worth of a task."""
+    """Return random tasks; `numbers` are the numbers of robots and tasks, and the maximum worth of a task."""
     agents, count, most = numbers
 
     def point() -> tuple[int, int]:

@@ -1,12 +1,13 @@
-"""Target tracking by mobile sensors: robots choose their cells, so that targets are covered.
+"""Target tracking by mobile sensors: robots choose their cells so that they cover targets.
 
-One step of DCOP_MST: Zivan, Yedidsion, Okamoto, Glinton and Sycara, "Distributed constraint optimization for teams of
-mobile sensing agents", JAAMAS 29 (2015); first in Zivan, Glinton and Sycara, "Distributed constraint optimization for
-large teams of mobile sensing agents", IAT 2009. A robot's variable is its cell in the field, within its mobility. A
-target has a requirement; each robot within the sensing range covers as much of it as its credibility. The uncovered
-rest is the cost, whose sum is minimised: for each target one function over all robots that can get near enough.
+This is one step of DCOP_MST: Zivan, Yedidsion, Okamoto, Glinton and Sycara, "Distributed constraint optimization for
+teams of mobile sensing agents", JAAMAS 29 (2015); first in Zivan, Glinton and Sycara, "Distributed constraint
+optimization for large teams of mobile sensing agents", IAT 2009. A robot's variable is its cell in the field, within
+its mobility. A target has a coverage requirement; each robot within the sensing range covers an amount equal to its
+credibility. The sum of the uncovered remainders is minimised; each target has one cost function over all robots that
+can get near enough.
 
-Cells are numbered row by row from 0; distances are Euclid's between cells.
+Cells are numbered row by row from 0; distances between cells are Euclidean.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from robochoc.model.problem import Constraint, Domain, Function, ProblemKind, Te
 MAX_SIDE = 100
 MAX_REQUIREMENT = 1000
 MAX_CELLS = 1_000_000
-"""The maximum number of cells that all robots together can go to."""
+"""The maximum number of cells that robots can reach, summed over all robots."""
 MAX_COMBINATIONS = 1_000_000
 """The maximum number of combinations of cells of the robots near a target."""
 
@@ -36,10 +37,10 @@ class Field:
 
     Attributes:
         side: The number of rows, and of columns.
-        starts: The first cell of each robot.
-        credibility: The part of a requirement that each robot covers.
+        starts: The initial cell of each robot.
+        credibility: The amount of coverage by each robot.
         targets: The cell of each target.
-        mobility: The distance that robots can go, in cells.
+        mobility: The maximum distance that robots can travel, in cells.
         sensing: The distance at which robots see targets, in cells.
     """
 
@@ -56,7 +57,7 @@ class Field:
         return (i - k) ** 2 + (j - m) ** 2 <= distance**2
 
     def cells(self, robot: int) -> list[int]:
-        """Return the cells that a robot can get to."""
+        """Return the cells that a robot can reach."""
         start, side, reach = self.starts[robot], self.side, self.mobility
         rows, columns = (range(max(0, at - reach), min(side, at + reach + 1)) for at in divmod(start, side))
         return [
@@ -75,7 +76,7 @@ def tracking(
     requirement: int = 100,
     credibility: int = 30,
 ) -> Team:
-    """Return the random problem of `seed` of tracking `targets` in a field of side x side cells.
+    """Return a random problem of tracking `targets` in a field of side x side cells.
 
     `Robot3` owns `V3`. All robots start in different cells, and all targets are in different cells.
 
@@ -84,13 +85,13 @@ def tracking(
         targets: The number of targets.
         side: The number of rows and columns of the field.
         seed: The same seed gives the same problem on every machine.
-        mobility: The distance that a robot can go, in cells.
+        mobility: The maximum distance that a robot can travel, in cells.
         sensing: The distance at which a robot sees a target, in cells.
-        requirement: The coverage that each target needs.
-        credibility: The maximum coverage by a robot; each number from 1 on is as likely as any other.
+        requirement: The required coverage of each target.
+        credibility: The maximum coverage by a robot; its coverage is uniformly random from 1 to this value.
 
     Raises:
-        ValueError: if a number is out of its bounds, or too many robots can get near one target.
+        ValueError: A number is out of bounds, or too many robots can get near one target.
     """
     check_bounds({"side": (side, 1, MAX_SIDE), "agents": (agents, 1, min(MAX_AGENTS, side**2))})
     check_bounds({"targets": (targets, 1, side**2), "mobility": (mobility, 0, side), "sensing": (sensing, 0, side)})
@@ -131,7 +132,7 @@ def tracking(
 
 
 def drawn_field(chance: Random, numbers: tuple[int, int, int], credibility: int, mobility: int, sensing: int) -> Field:
-    """Return a random field; `numbers` are those of robots and targets, and of the rows."""
+    """Return a random field; `numbers` are the numbers of robots, targets and rows."""
     agents, targets, side = numbers
     starts = sample(chance, side**2, agents)
     credible = [random_integer(chance, 1, credibility) for _ in range(agents)]
@@ -139,7 +140,7 @@ def drawn_field(chance: Random, numbers: tuple[int, int, int], credibility: int,
 
 
 def _uncovered(number: int, field: Field, near: list[int], requirement: int) -> Constraint:
-    """Return the uncovered rest of a target's requirement as a function of the cells of the robots `near`."""
+    """Return the uncovered remainder of a target's requirement, as a function of the cells of the robots `near`."""
     row, column = divmod(field.targets[number - 1], field.side)
     covered = (
         Apply("if", (_sees(Name(f"X{robot + 1}"), row, column, field), Constant(field.credibility[robot]), Constant(0)))
@@ -152,7 +153,7 @@ def _uncovered(number: int, field: Field, near: list[int], requirement: int) -> 
 
 
 def _sees(cell: Expression, row: int, column: int, field: Field) -> Expression:
-    """Return the condition that `cell` is within the sensing range of the cell in that row and column."""
+    """Return the condition that `cell` is within the sensing range of the cell in `row` and `column`."""
     side = Constant(field.side)
     away = [Apply("sub", (Apply(name, (cell, side)), Constant(at))) for name, at in (("div", row), ("mod", column))]
     squares = Apply("add", tuple(Apply("mul", (one, one)) for one in away))

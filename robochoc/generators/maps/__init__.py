@@ -1,1 +1,1 @@
-"""Families of problems on a map: a robot's values are the cells that it can reach, at the cost of travel times."""
+"""Problem families on a map: a robot's values are the cells that it can reach, and travel times are costs."""

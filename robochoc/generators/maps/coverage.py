@@ -1,14 +1,14 @@
-"""Coverage of a map: robots choose their cells, so that they see much of it together and do not travel far.
+"""Coverage of a map: robots choose their cells so that together they see much of the map and do not travel far.
 
-The aim is that of Cortes, Martinez, Karatas and Bullo, "Coverage control for mobile sensing networks", IEEE
-Transactions on Robotics and Automation 20 (2004), and of mobile sensing teams (Zivan and others, JAAMAS 29, 2015): one
-step, in which each robot chooses among the cells that it can reach.
+The aim is the same as in Cortes, Martinez, Karatas and Bullo, "Coverage control for mobile sensing networks", IEEE
+Transactions on Robotics and Automation 20 (2004), and for mobile sensing teams (Zivan and others, JAAMAS 29, 2015),
+for one step, in which each robot chooses among the cells that it can reach.
 
-A robot sees the free cells within its sensing range to which a straight line is free. Seen area is worth travel time.
-The area that the team sees, a union, is a function over all robots. Here it is approximated by pairs: the sum of the
-areas that the robots see, minus the areas that pairs of robots see twice. The union is never smaller (the second
-Bonferroni inequality, 1936), and equal if no cell is seen by three robots. So constraints are binary, and the cost is
-never less than the travel time and the worth of the unseen area.
+A robot sees the free cells within its sensing range to which a straight line is free. The worth of seen area is
+measured in travel time. The area seen by the team is a union, and thus a function over all robots. Here it is
+approximated by pairs: the sum of the areas seen by robots, minus the areas seen by both robots of a pair. The union is
+never smaller (the second Bonferroni inequality, 1936), and equal if no cell is seen by three robots. So constraints are
+binary, and the cost is never less than the travel time and the worth of the unseen area.
 """
 
 from __future__ import annotations
@@ -38,26 +38,26 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
 
 MAX_TUPLES = 1_000_000
-"""The maximum number of pairs of cells that robots could choose and overlap, of all pairs of robots together."""
+"""The maximum number of pairs of cells with overlapping views, summed over all pairs of robots."""
 
 Seen = Mapping[int, frozenset[int]]
-"""The cells that are seen from each cell."""
+"""The cells seen from each cell."""
 
 
 def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: float = 10.0) -> tuple[Team, GroundMap]:
-    """Return the problem of covering a map, and the map as the flight reads it.
+    """Return the problem of covering a map, and the map in the form for flights.
 
-    `Robot3` owns `V3`, a number of a cell. Costs are seconds.
+    `Robot3` owns `V3`, the number of a cell. Costs are in seconds.
 
     Args:
         choice: The map and the robots.
-        seed: The same seed draws the same places of robots on every machine.
+        seed: The same seed gives the same places of robots on every machine.
         sensing: The sensing range of robots, in metres.
-        worth: The worth of a square metre, or on a three-dimensional map of a cubic metre, in seconds of travel time.
+        worth: The worth of a square metre, or of a cubic metre on a three-dimensional map, in seconds of travel time.
 
     Raises:
         InvalidInputError: A file is not a valid map.
-        ValueError: A number is out of its bounds, or a robot cannot reach any cell.
+        ValueError: A number is out of bounds, or a robot cannot reach any cell.
     """
     range_m, seconds = exact("sensing", sensing, 0, 1000), exact("worth", worth, 0, 10_000)
     reachability = reachability_of(choice, seeded(seed))
@@ -85,13 +85,13 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
 
 
 def worth_of_a_cell(reachability: Reachability, seconds: Fraction) -> int:
-    """Return the utility of seeing a cell, in units of costs, from the utility of a square or cubic metre."""
+    """Return the worth of seeing a cell, in units of costs, from the worth of a square or cubic metre in `seconds`."""
     exactly: Fraction = reachability.cells.side ** len(reachability.cells.first) * seconds * 10**PLACES
     return floor(exactly + Fraction(1, 2))
 
 
 def _overlaps(values: Sequence[Mapping[int, int]], seen: Seen, a_cell: int) -> Iterator[Constraint]:
-    """Yield the costs of cells that both robots of a pair see."""
+    """Yield the costs of cells that are seen by both robots of a pair."""
     bits = {cell: sum(1 << other for other in others) for cell, others in seen.items()}
     left = MAX_TUPLES
     for (one, own), (other, others) in combinations(enumerate(values, 1), 2):

@@ -1,13 +1,12 @@
 """Formations on a map: robots are assigned to the slots of a shape, with the minimum sum of travel times.
 
 The shapes are those of Balch and Arkin, "Behavior-based formation control for multirobot teams", IEEE Transactions on
-Robotics and Automation 14 (1998): line, column and wedge; also a circle and a square grid, or a file of offsets. The
+Robotics and Automation 14 (1998), line, column and wedge, and also a circle, a square grid, or offsets from a file. The
 slots are assigned to robots (ST-SR-IA in Gerkey and Mataric, IJRR 23, 2004): no two robots have the same slot, and the
-sum of their travel times is minimised. All slots have the same worth, and a robot chooses among those that it can get
-to.
+sum of their travel times is minimised. All slots have the same worth, and a robot chooses among the slots that it can
+reach.
 
-A slot of the shape may be in a wall, or unreachable: it is moved to the nearest cell that a robot can reach and that
-no slot before it has.
+A slot that is in a wall or unreachable is moved to the nearest cell that a robot can reach and that has no slot yet.
 """
 
 from __future__ import annotations
@@ -44,11 +43,11 @@ MAX_SPACING = 1000.0
 MAX_BYTES = 64 * 1024
 MAX_SLOTS = MAX_ROBOTS
 _MM = 1000
-"""Offsets are rounded to millimetres, so that last digits of sines, which differ between machines, do not matter."""
+"""Offsets are rounded to millimetres, since the last digits of sines differ between machines."""
 _OFFSET = re.compile(r"([+-]?\d{1,6}(?:\.\d{1,6})?)[,\s]\s*([+-]?\d{1,6}(?:\.\d{1,6})?)")
 
 Offset = tuple[float, float]
-"""Metres ahead of the anchor, and to its left."""
+"""The distances ahead of the anchor and to its left, in metres."""
 
 
 class FormationShape(StrEnum):
@@ -73,21 +72,21 @@ def formation(
     heading: float = 0.0,
     anchor: str = "",
 ) -> tuple[Team, GroundMap]:
-    """Return the problem of assigning the slots of a formation, and the map as the flight reads it.
+    """Return the problem of assigning the slots of a formation, and the map in the form for flights.
 
-    `Robot3` owns `V3`, a number of a cell. Costs are seconds.
+    `Robot3` owns `V3`, the number of a cell. Costs are in seconds.
 
     Args:
         choice: The map and the robots.
-        seed: The same seed draws the same places of robots on every machine.
-        shape: One of `SHAPES`, or the path of a file with offsets in metres: `ahead,left` in each line.
-        spacing: Metres between neighbours in the shape.
+        seed: The same seed gives the same places of robots on every machine.
+        shape: One of `SHAPES`, or the path of a file with offsets in metres, `ahead,left` in each line.
+        spacing: The distance between neighbours in the shape, in metres.
         heading: The direction of the formation, in degrees counterclockwise from the x axis.
-        anchor: The middle of the shape, `X,Y` or `X,Y,Z`; it is level there. Empty: the mean of all robots.
+        anchor: The centre of the shape, `X,Y` or `X,Y,Z`; the shape is level. Empty: the mean place of all robots.
 
     Raises:
         InvalidInputError: A file is not a valid map, or not a valid list of offsets.
-        ValueError: A number is out of its bounds, or a robot cannot reach any slot.
+        ValueError: A number is out of bounds, or a robot cannot reach any slot.
     """
     check_bounds({"spacing": (spacing, 0.001, MAX_SPACING), "heading": (heading, -360, 360)})
     middle = places_in(anchor, "anchor")
@@ -121,12 +120,12 @@ def formation(
 
 
 def slots_of(reachability: Reachability, offsets: Sequence[Offset], anchor: Place, heading: float) -> list[int]:
-    """Return the cell of each slot: the nearest one that a robot can reach and no slot before it has.
+    """Return the cell for each slot: the nearest cell that a robot can reach and that has no slot yet.
 
-    Of cells that are equally near, the one of the lowest number.
+    Of equally near cells, the cell with the lowest number is used.
 
     Raises:
-        ValueError: There are fewer such cells than slots.
+        ValueError: There are fewer reachable cells than slots.
     """
     left = set(reachability.reached)
     if len(left) < len(offsets):
@@ -147,7 +146,7 @@ def _turned(offsets: Sequence[Offset], heading: float) -> Iterator[tuple[Fractio
 
 
 def _offsets(shape: str, agents: int, spacing: float) -> list[Offset]:
-    """Return the slots of a shape around its anchor, one per robot; a file may have more."""
+    """Return the slots of a shape around its anchor, one per robot; a file may have more slots."""
     numbers = range(agents)
     middle = (agents - 1) / 2
     match shape:
@@ -155,7 +154,7 @@ def _offsets(shape: str, agents: int, spacing: float) -> list[Offset]:
             return [(0.0, (number - middle) * spacing) for number in numbers]
         case FormationShape.COLUMN:
             return [((middle - number) * spacing, 0.0) for number in numbers]
-        case FormationShape.WEDGE:  # the first at the tip, the others behind it, left and right in turn
+        case FormationShape.WEDGE:  # the first slot at the tip, the others behind it, alternately left and right
             ranks = [(number + 1) // 2 for number in numbers]
             return [(-rank * spacing, rank * spacing * (1 - 2 * (number % 2))) for number, rank in enumerate(ranks)]
         case FormationShape.CIRCLE:

@@ -27,7 +27,7 @@ MAX_ROBOTS = 100
 MAX_CELLS = 1000
 USUAL_CELLS = 100
 HEIGHT = 1
-"""The z of waypoints on a map of the ground, in sides of a cell: drones fly at this height above the floor."""
+"""The z of waypoints on a two-dimensional map, in cells: drones fly at this height above the floor."""
 _PART = re.compile(r"[+-]?\d{1,7}(?:\.\d{1,6})?")
 
 
@@ -38,13 +38,14 @@ class MapChoice:
     Attributes:
         map: The path of the map's YAML file, or of an OctoMap.
         agents: The number of robots. None: the number of places in `at`.
-        at: The places of the robots: `X,Y X,Y`, on an OctoMap `X,Y,Z X,Y,Z`. Empty: drawn from the free cells,
-            each choice as likely as any other.
+        at: The places of the robots: `X,Y X,Y`, or `X,Y,Z X,Y,Z` on an OctoMap. Empty: drawn uniformly from the free
+            cells.
         radius: The radius of a robot.
         speed: The speed of a robot, in m/s.
         within: The longest travel time of a robot to a cell, in seconds. None: unlimited.
-        cell: The side of a cell. None: the smallest multiple of the map's resolution with at most `cells` free cells.
-        cells: The maximum number of free cells. None: `USUAL_CELLS`, or `MAX_CELLS` for cells of a given side.
+        cell: The side length of a cell. None: the smallest multiple of the map's resolution with at most `cells` free
+            cells.
+        cells: The maximum number of free cells. None: `USUAL_CELLS`, or `MAX_CELLS` if `cell` is given.
     """
 
     map: str
@@ -58,7 +59,7 @@ class MapChoice:
 
 
 def variables_of(reachability: Reachability, values: Sequence[Iterable[int]]) -> dict[str, list[Variable]]:
-    """Return a variable for each robot, `V1` and so on, with these cells as its values."""
+    """Return a variable for each robot, `V1` and so on, with the robot's cells in `values`."""
     return {
         name: [Variable(f"V{number}", Domain(f"Cells{number}", tuple(range(one, one + 1) for one in sorted(own))))]
         for number, (name, own) in enumerate(zip(reachability.names, values, strict=True), 1)
@@ -66,9 +67,9 @@ def variables_of(reachability: Reachability, values: Sequence[Iterable[int]]) ->
 
 
 def waypoints_of(reachability: Reachability, suffix: str = "") -> Extras:
-    """Return the waypoints of all robots: formulas over the numbers of cells, the values of the variables `V1`...
+    """Return the waypoints of all robots, as formulas over the variables `V1` and so on, whose values are cell numbers.
 
-    With a suffix the variables are `V1` and the suffix.
+    With a suffix, the variables are named `V1` followed by the suffix.
     """
     cells = reachability.cells
     return Extras(
@@ -95,11 +96,11 @@ def _moved(expression: Expression, by: int) -> Expression:
 
 
 def reachability_of(choice: MapChoice, chance: Random) -> Reachability:
-    """Return the cells that the robots of a choice can reach.
+    """Return the cells that the robots in `choice` can reach.
 
     Raises:
         InvalidInputError: A file is not a valid map.
-        ValueError: A number is out of its bounds, or a robot does not fit at its place.
+        ValueError: A number is out of bounds, or a robot does not fit at its place.
     """
     places = places_in(choice.at, "at")
     agents = _agents(choice.agents, places)
@@ -165,7 +166,7 @@ def cost_constraint(name: str, variable: str, costs: Mapping[int, int]) -> Const
 
 
 def exact(name: str, number: float, least: float, most: float) -> Fraction:
-    """Return a number as the exact value of its decimal notation. Raises `ValueError` if it is out of bounds."""
+    """Return the exact value of a number's decimal notation. Raises `ValueError` if the number is out of bounds."""
     check_bounds({name: (number, least, most)})
     return Fraction(str(number))
 

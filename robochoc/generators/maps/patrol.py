@@ -1,16 +1,16 @@
 """Patrols on a map: the next visits of robots to points of interest.
 
-The time since the last visit of a point is its idleness, by which patrols are measured: Machado, Ramalho, Zucker and
+Patrols are measured by the idleness of points, the time since a point's last visit: Machado, Ramalho, Zucker and
 Drogoul, "Multi-agent patrolling: an empirical analysis of alternative architectures", MABS 2002; Portugal and Rocha,
 "Multi-robot patrolling algorithms: examining performance and scalability", Advanced Robotics 27 (2013). Here robots
-plan their next visits, one in each of `rounds`:
+plan their next visits, one in each round:
 
 - each robot visits a point in each round, and no point is visited twice;
-- the cost is the travel time of all robots, and the idleness of the points that are not visited;
-- two robots nearer to each other than `apart` after a round have a cost: the time to drive the missing metres.
+- the cost is the sum of the travel times of all robots and the idleness of points that are not visited;
+- two robots nearer to each other than `apart` after a round have a cost: the time to drive the missing distance.
 
-Points of interest are given, or drawn: the first by chance, and each of the others as far from those before it as can
-be (Gonzalez, "Clustering to minimize the maximum intercluster distance", TCS 38, 1985).
+Points of interest are given, or drawn: the first at random, and each other point as far as possible from the points
+before it (Gonzalez, "Clustering to minimize the maximum intercluster distance", TCS 38, 1985).
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ from robochoc.model.problem import INFINITE, ProblemKind, Team
 MAX_POINTS = 100
 MAX_ROUNDS = 4
 MAX_PLANS = 100_000
-"""The maximum number of plans of a robot: points to the power of rounds."""
+"""The maximum number of plans per robot: the number of points to the power of the number of rounds."""
 MAX_IDLE = 1_000_000
 _MM = 1000
 """Distances are rounded down to millimetres."""
@@ -64,24 +64,24 @@ def patrol(
     rounds: int = 1,
     apart: float = 2.0,
 ) -> tuple[Team, GroundMap]:
-    """Return the problem of the next visits of a patrol, and the map as the flight reads it.
+    """Return the problem of planning the next visits of a patrol, and the map in the form for flights.
 
-    `Robot3` owns `V3`, the cell of the point that it visits; with several rounds `V3.1`, `V3.2` and so on. Its waypoint
-    is the first. Costs are seconds.
+    `Robot3` owns `V3`, the cell of the point that it visits; with several rounds `V3.1`, `V3.2` and so on, of which the
+    first determines its waypoint. Costs are in seconds.
 
     Args:
-        choice: The map and the robots. Each leg takes at most the time `within`.
+        choice: The map and the robots. The travel time of each leg is at most `within`.
         seed: The same seed gives the same problem on every machine.
         points: The number of points that are drawn.
-        visit: The points, `X,Y X,Y` or `X,Y,Z X,Y,Z`, in metres; each is the nearest cell that a robot can get
-            to. Empty: drawn.
-        idle: The maximum idleness of a point, in seconds; each number from 0 on is as likely as any other.
+        visit: The points, `X,Y X,Y` or `X,Y,Z X,Y,Z`, in metres; each is moved to the nearest cell that a robot can
+            reach. Empty: points are drawn.
+        idle: The maximum idleness of a point, in seconds; idleness is uniformly random from 0 to this value.
         rounds: The number of visits that each robot plans.
         apart: The desired minimum distance between robots, in metres.
 
     Raises:
         InvalidInputError: A file is not a valid map.
-        ValueError: A number is out of its bounds, or a robot cannot reach any point.
+        ValueError: A number is out of bounds, or a robot cannot reach any point.
     """
     chance = seeded(seed)
     given = places_in(visit, "visit")
@@ -107,7 +107,7 @@ def patrol(
         *(one for plan in plans for one in plan.private(reachability, idleness, legs)),
         *_between(plans, _crowding(reachability, chosen, metres, choice.speed)),
     ]
-    # The constraint on a visit charges the largest idleness minus that of the visited point.
+    # The cost of a visit includes the largest idleness minus the idleness of the visited point.
     unvisited = sum(idleness.values()) - agents * rounds * max(idleness.values())
     team = assemble(
         f"patrol-{label_of(choice.map)}-{agents}-{count}-{rounds}-{seed}",
@@ -121,7 +121,7 @@ def patrol(
 
 
 def drawn_points(reachability: Reachability, count: int, chance: Random) -> list[int]:
-    """Return points of interest that are spread over the cells that robots can reach."""
+    """Return points of interest spread over the cells that robots can reach."""
     cells = reachability.reached
     found = [cells[random_integer(chance, 0, len(cells) - 1)]]
     away = dict.fromkeys(cells, MAX_IDLE**2)
@@ -135,7 +135,7 @@ def drawn_points(reachability: Reachability, count: int, chance: Random) -> list
 
 
 class _Plan:
-    """The visits of a robot: a variable for each round, whose values are the points that it can reach."""
+    """The visits of a robot: a variable for each round, whose values are the points that the robot can reach."""
 
     def __init__(self, reachability: Reachability, number: int, points: Sequence[int], rounds: int) -> None:
         self.number = number
@@ -147,7 +147,7 @@ class _Plan:
 
     @property
     def variables(self) -> list[Variable]:
-        """The robot's variables, one a round."""
+        """The robot's variables, one per round."""
         return [
             Variable(name, Domain(f"Points{name.removeprefix('V')}", tuple(range(one, one + 1) for one in values)))
             for name, values in zip(self.names, self.values, strict=True)
@@ -155,11 +155,11 @@ class _Plan:
 
     @property
     def values(self) -> list[Sequence[int]]:
-        """The points that can be visited, round by round."""
+        """The points that can be visited in each round."""
         return [self.first, *[self._points] * (len(self.names) - 1)]
 
     def private(self, reachability: Reachability, idleness: Mapping[int, int], legs: Legs) -> Iterator[Constraint]:
-        """Yield the costs of the robot's visits: travel times, and the largest idleness minus that of the point."""
+        """Yield the costs of the robot's visits: travel times, and the largest idleness minus the point's idleness."""
         longest = max(idleness.values())
         seconds = reachability.seconds[self.number - 1]
         for name, values in zip(self.names, self.values, strict=True):
@@ -181,7 +181,7 @@ class _Plan:
 
 
 def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) -> Iterator[Constraint]:
-    """Yield the constraints that no two robots visit the same point, and the costs of being near after a round."""
+    """Yield the constraints that no two robots visit the same point, and the costs of robots near to each other."""
     for one, other in combinations(plans, 2):
         for scope, (values, others) in zip(
             product(one.names, other.names), product(one.values, other.values), strict=True
@@ -198,7 +198,7 @@ def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) ->
 
 
 def _nearest(reachability: Reachability, places: Sequence[Place]) -> list[int]:
-    """Return distinct cells of the given points."""
+    """Return distinct cells for the given points."""
     left, found = set(reachability.reached), []
     for place in places:
         found.append(reachability.nearest(place, left))
@@ -218,7 +218,7 @@ def _legs(reachability: Reachability, points: Sequence[int]) -> dict[int, dict[i
 def _crowding(
     reachability: Reachability, points: Sequence[int], apart: Fraction, speed: float
 ) -> dict[tuple[int, int], int]:
-    """Return, for two points nearer than `apart`, the time to drive the missing metres."""
+    """Return, for pairs of points nearer than `apart`, the time to drive the missing distance."""
     found = {}
     for one, other in combinations(points, 2):
         square = squared(reachability.cells.centre(one), reachability.cells.centre(other))
