@@ -1,1 +1,1 @@
-"""The command line: parse, call, print. Commands import what they need when they run, as start-up counts."""
+"""The command line: parse, call, print. To start fast, commands import the modules they need when they run."""

@@ -49,9 +49,9 @@ COMMANDS = {
     "solve": ("solve", "Solve teams, each robot in its own process."),
     "validate": ("validate", "Check teams and print all errors with file and line."),
 }
-"""Each command: its function in the module of the same name, and its line in `robochoc --help`.
+"""Each command: the name of its function in the module with the same name, and its line in `robochoc --help`.
 
-The lines are here so that `robochoc --help` imports no command.
+The lines are stored here so that `robochoc --help` need not import any command.
 """
 
 
@@ -62,14 +62,14 @@ POSIX_COMMANDS = frozenset(
 
 
 class Commands(click.Group):
-    """The group of commands. Each command is imported when it is used."""
+    """The group of commands. Each command is imported when it is needed."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002 - click's
         """Return all names, sorted."""
         return [*COMMANDS]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:  # noqa: ARG002 - click's
-        """Return the command of that name, or None."""
+        """Return the command with this name, or None."""
         if cmd_name not in COMMANDS:
             return None
         command: click.Command = resolve_name(f"robochoc.cli.commands.{cmd_name}:{COMMANDS[cmd_name][0]}")
@@ -83,7 +83,7 @@ class Commands(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Resolve the command; for an unknown name, suggest the nearest one. On Windows, refuse `POSIX_COMMANDS`."""
+        """Resolve the command. For an unknown name, suggest a similar one. On Windows, refuse `POSIX_COMMANDS`."""
         if args[0] in POSIX_COMMANDS and not IS_POSIX:
             raise click.UsageError(f"robochoc {args[0]} {REQUIREMENT}.", ctx)
         try:
@@ -141,7 +141,7 @@ def run() -> int:
         click.echo("robochoc: interrupted", err=True)
         return INTERRUPTED
     except SystemExit as end:
-        # The reader of our output has closed the pipe: click would exit with the status of invalid input.
+        # The reader of our output has closed the pipe: click would exit with the status for invalid input.
         if end.code == 1:
             return UNREAD
         raise

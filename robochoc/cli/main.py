@@ -1,7 +1,7 @@
 """The entry point of `robochoc`, and its signal handlers.
 
-Ctrl-C and SIGTERM end the program by an exception, so that every `finally` runs: exit status 130 or 143, no child
-process left, no partly written file. The handlers are installed before anything else is imported.
+Ctrl-C and SIGTERM end the program by an exception, so that every `finally` runs: the exit status is 130 or 143, and no
+child process or partly written file is left. The handlers are installed before anything else is imported.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ PATIENCE_S = 1.0
 _RETRY_S = 0.01
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 _HAS_TIMER = hasattr(signal, "setitimer")
-"""Whether a signal can be handled later. On Windows it raises at once, also during an import."""
+"""Whether a signal can be handled later. If not (on Windows), it raises at once, even during an import."""
 
 
 def main() -> NoReturn:
@@ -46,7 +46,7 @@ def main() -> NoReturn:
 
 
 def _open_standard_streams() -> None:
-    """Redirect standard streams that the caller has closed to /dev/null: no pipe of ours must get their descriptors."""
+    """Redirect closed standard streams to /dev/null, so that none of our pipes is given their descriptors."""
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(descriptor)
@@ -58,7 +58,7 @@ def _open_standard_streams() -> None:
 class TerminationSignals:
     """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `Terminated`.
 
-    It never raises during an import, as many modules print or suppress exceptions while they load.
+    The handler never raises during an import, since many modules print or suppress exceptions while they are loaded.
     """
 
     def __init__(self) -> None:
@@ -66,7 +66,7 @@ class TerminationSignals:
         self._since: float | None = None
 
     def install(self) -> None:
-        """Install the handlers. Signals that the caller makes the program ignore (`nohup`, `&`) stay ignored."""
+        """Install the handlers. Signals that the caller set to be ignored (`nohup`, `&`) stay ignored."""
         if _HAS_TIMER:
             signal.signal(signal.SIGALRM, self._retry)
         sys.unraisablehook = self._raise_again
@@ -75,7 +75,7 @@ class TerminationSignals:
                 signal.signal(signum, self._handle)
 
     def ignore(self) -> None:
-        """Ignore further signals: the work is done."""
+        """Ignore further signals, since the work is done."""
         ignored: tuple[signal.Signals, ...] = _STOPPING
         if _HAS_TIMER:
             signal.setitimer(signal.ITIMER_REAL, 0)
@@ -102,7 +102,7 @@ class TerminationSignals:
         self._handle(self._signum, frame)
 
     def _raise_again(self, unraisable: sys.UnraisableHookArgs) -> None:
-        """Raise the exception again, soon, if Python dropped it because it occurred in a finaliser or a callback."""
+        """Raise the exception again soon if Python dropped it because it was raised in a finaliser or a callback."""
         if _HAS_TIMER and self._since is not None and isinstance(unraisable.exc_value, KeyboardInterrupt | SystemExit):
             self._since = None
             signal.setitimer(signal.ITIMER_REAL, _RETRY_S)

@@ -1,4 +1,4 @@
-"""`robochoc app`: the application, in a browser on this machine."""
+"""`robochoc app`: starts the application in a browser on this machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`robochoc authority`: enrolment of robots and observers in runs on several machines."""
+"""`robochoc authority`: enrols robots and observers for runs on several machines."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _LONGEST_TTL_HOURS = 24 * 366
 
 
 def _checked_hours(_context: click.Context, _parameter: click.Parameter, hours: float) -> float:
-    if not 0 < hours <= _LONGEST_TTL_HOURS:  # also rejects NaN, which a range of click accepts
+    if not 0 < hours <= _LONGEST_TTL_HOURS:  # also rejects NaN, which click's ranges accept
         raise click.BadParameter(f"{hours:g} is not greater than 0 and at most {_LONGEST_TTL_HOURS} (a year).")
     return hours
 
@@ -164,7 +164,7 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 
 @contextmanager
 def _errors_as_failures() -> Iterator[None]:
-    """Turn the Authority's errors into `Failure`: one line and an exit status."""
+    """Convert the Authority's errors to a `Failure` with one line and an exit status."""
     try:
         from robochoc.authority.names import InvalidNameError, NotEnrolledError
         from robochoc.authority.registry import AuthorityError
@@ -184,7 +184,7 @@ def _errors_as_failures() -> Iterator[None]:
 
 
 def _print_json(members: Sequence[EnrolledName], now: float) -> None:
-    """Print one JSON object per line: name, role, rights, state at Unix time `now`, and expiry or null."""
+    """Print one JSON object per line: name, role, rights, state at the Unix time `now`, and expiry or null."""
     import msgspec
 
     for member in members:
@@ -199,7 +199,7 @@ def _print_json(members: Sequence[EnrolledName], now: float) -> None:
 
 
 def _print_members(members: Sequence[EnrolledName], now: float) -> None:
-    """Print name, role, rights, state and expiry (UTC) of each of `members`."""
+    """Print the name, role, rights, state and expiry (UTC) of each member."""
     from robochoc.cli.reports.table import print_table
 
     rows = []

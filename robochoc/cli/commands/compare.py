@@ -1,4 +1,4 @@
-"""`robochoc compare`: protocols side by side, without a study file."""
+"""`robochoc compare`: compares protocols side by side, without a study file."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def compare(
 
 
 def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> Study:
-    """Return the study that the command line describes."""
+    """Return the study described by the command line."""
     from robochoc.experiments.study import study_of_tables
     from robochoc.formats.diagnostics import shortened
     from robochoc.system.plain_text import on_one_line
@@ -110,7 +110,7 @@ def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> St
 
 
 def _problems(words: Sequence[str]) -> dict[str, Any]:
-    """Return the table of the problems: a family and its parameters, or paths."""
+    """Return the table `[problems]`: a family and its parameters, or paths."""
     from robochoc.generators.families import FAMILIES, parameters_of
 
     first = words[0]
@@ -130,7 +130,7 @@ def _problems(words: Sequence[str]) -> dict[str, Any]:
 
 
 def _pair(word: str, option: str) -> tuple[str, Any]:
-    """Parse NAME=VALUE of `option`, or of the family with that name, whose parameters may be written with hyphens."""
+    """Parse NAME=VALUE for `option`, or for the family with this name, whose parameters may be written with hyphens."""
     name, equals, value = word.partition("=")
     if not equals or not name:
         raise click.UsageError(f"{option} requires NAME=VALUE, not {word!r}")
@@ -138,7 +138,7 @@ def _pair(word: str, option: str) -> tuple[str, Any]:
 
 
 def _value(text: str) -> Any:  # noqa: ANN401 - a number, a word, or a list
-    """Parse a value; with commas, a list of values."""
+    """Parse a value. A text with commas is a list of values."""
     if "," in text:
         return [_value(part) for part in text.split(",") if part]
     if text in {"true", "false"}:

@@ -1,4 +1,4 @@
-"""`robochoc compile`: the robots' local problems, compiled into domains."""
+"""`robochoc compile`: compiles the robots' local problems into domains."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def _status(folder: Path, bounds: CompileLimits, cache: SolutionCache | None, *,
 
 
 def _compile(folder: Path, bounds: CompileLimits, cache: SolutionCache | None, *, as_json: bool) -> int:
-    """Compile all robots of the team in `folder`, even if some reach a limit, and return the exit status."""
+    """Compile all robots in the team in `folder`, even if some reach a limit, and return the exit status."""
     from robochoc.cli.reports.compile import print_sizes, sizes_json
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.search_result import Progress
@@ -98,7 +98,7 @@ def _compile(folder: Path, bounds: CompileLimits, cache: SolutionCache | None, *
 
 
 def _print_limits(folder: Path, limited: Sequence[TooManySolutionsError | CompileTimeoutError]) -> None:
-    """Print the first limit that was reached, and the names of the other robots, in one line."""
+    """Print the first limit that was reached, and the names of the other robots, on one line."""
     from robochoc.formats import on_one_line
 
     first, *others = limited

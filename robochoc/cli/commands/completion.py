@@ -1,4 +1,4 @@
-"""`robochoc completion`: the script by which a shell completes commands, options and names."""
+"""`robochoc completion`: prints the script with which a shell completes commands, options and names."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import click
 
 SHELLS = ("bash", "zsh", "fish")
 VARIABLE = "_ROBOCHOC_COMPLETE"
-"""The environment variable by which the script asks robochoc for completions (click's convention)."""
+"""The environment variable with which the script asks robochoc for completions (click's convention)."""
 
 
 @click.command()

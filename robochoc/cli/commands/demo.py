@@ -1,4 +1,4 @@
-"""`robochoc demo`: a first team, from its files to the page of its flight, without files of the user."""
+"""`robochoc demo`: a first team, from its files to the page with its flight, without any files from the user."""
 
 from __future__ import annotations
 
@@ -67,13 +67,13 @@ def demo(context: click.Context, page: Path, *, no_open: bool) -> None:
 
 
 def on_a_desktop() -> bool:
-    """Return whether a person watches, with a browser that has windows: others would take over the terminal."""
+    """Return whether a person is watching, with a browser that has windows; others would take over the terminal."""
     windows = sys.platform in {"win32", "darwin"} or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
     return windows and sys.stdout.isatty()
 
 
 def _steps(page: Path) -> Iterator[tuple[str, list[str]]]:
-    """Yield what each step does, and its command."""
+    """Yield the description and the command of each step."""
     yield (
         "16 drones on a 4 x 4 board: each chooses a level such that no two attack each other. Each gets an XML file.",
         ["generate", "queens3d", "--n", "4", "-o", TEAM],

@@ -1,4 +1,4 @@
-"""`robochoc directory`: query a running master's Directory Facilitator."""
+"""`robochoc directory`: queries a running master's Directory Facilitator."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def directory(
 
 
 def _print_answer(answer: str, *, sl: bool, as_json: bool) -> None:
-    """Print one answer line by line; of an agent that has left, only the name."""
+    """Print one answer line by line. For an agent that has left, only the name is printed."""
     import msgspec
 
     from robochoc.run.networked.directory_query import agents_in, subject_of

@@ -1,4 +1,4 @@
-"""`robochoc experiment`: studies, from a question to a figure."""
+"""`robochoc experiment`: runs studies, from a question to a figure."""
 
 from __future__ import annotations
 
@@ -147,7 +147,7 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
 
 
 def _write_journals(results: Path, folder: Path | None) -> None:
-    """Write each journal to a file of the folder, with the run's key as name."""
+    """Write each journal to a file in the folder, named after the run's key."""
     from robochoc.experiments.results import journals
     from robochoc.system.files import write_atomically
 
@@ -211,12 +211,12 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
 
 
 def require_figures() -> None:
-    """Raise `Failure` unless the modules that draw figures are installed."""
+    """Raise `Failure` unless the modules for drawing figures are installed."""
     require_modules("figures", "matplotlib", "scipy")
 
 
 def require_modules(user: str, *modules: str) -> None:
-    """Raise `Failure` unless the modules, which `user` requires, are installed. The extra is `experiments`."""
+    """Raise `Failure` unless the modules that `user` requires are installed. They belong to the extra `experiments`."""
     from importlib.util import find_spec
 
     for name in modules:
@@ -225,7 +225,7 @@ def require_modules(user: str, *modules: str) -> None:
 
 
 def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None], Workers] | None:
-    """Return the factory of a cluster's workers; None for workers on this machine."""
+    """Return a factory for a cluster's workers, or None for workers on this machine."""
     if scheduler is None and dask is None:
         return None
     if scheduler is not None and dask is not None:
@@ -252,7 +252,7 @@ def _show_plan(study: Study, path: Path, again: Sequence[str]) -> None:
 
 @contextmanager
 def _cluster_loss_as_failure(workers: object) -> Iterator[None]:
-    """Turn the loss of a cluster, if one is used, into a `Failure`."""
+    """Convert the loss of a cluster, if one is used, to a `Failure`."""
     if workers is None:
         yield
         return
@@ -260,7 +260,7 @@ def _cluster_loss_as_failure(workers: object) -> Iterator[None]:
 
     from robochoc.experiments.cluster import SchedulerLostError
 
-    logging.disable(logging.CRITICAL)  # Dask logs the loss of a scheduler with a traceback
+    logging.disable(logging.CRITICAL)  # Dask would log the loss of a scheduler with a traceback
     try:
         yield
     except SchedulerLostError as lost:
@@ -269,7 +269,7 @@ def _cluster_loss_as_failure(workers: object) -> Iterator[None]:
 
 @contextmanager
 def open_store(path: Path | None) -> Iterator[Store]:
-    """Open the file of a study's results; None for results in memory."""
+    """Open the file with a study's results. None: results are kept in memory."""
     from robochoc.experiments.store import Store, StudyInUseError
 
     try:
@@ -287,7 +287,7 @@ def carry_out(
     workers: Callable[[int | None], Workers] | None = None,
     again: Sequence[str] = (),
 ) -> Counter[str]:
-    """Run a study, with its progress on a terminal. Each foreseen error becomes a `Failure`."""
+    """Run a study, and show its progress on a terminal. Each foreseen error becomes a `Failure`."""
     from robochoc.cli.reports.experiment import progress_of
     from robochoc.experiments.agreement import DisagreementError
     from robochoc.experiments.plan import TooManyRunsError

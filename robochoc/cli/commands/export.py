@@ -1,4 +1,4 @@
-"""`robochoc export`: a team's problem in the format of other tools."""
+"""`robochoc export`: writes a team's problem in the format of another tool."""
 
 from __future__ import annotations
 
@@ -81,5 +81,5 @@ def _written(team: Team, kind: str, options: ExportOptions) -> ExportResult:
 
 
 def _ending(team: Team, name: str) -> str:
-    """Return the part of a further file's name after the team's name: `_dist.yaml`."""
+    """Return the part of a further file's name that follows the team's name, such as `_dist.yaml`."""
     return name.removeprefix(team.name)

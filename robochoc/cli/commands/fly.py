@@ -1,4 +1,4 @@
-"""`robochoc fly`: a saved result, flown by simulated quadrotors."""
+"""`robochoc fly`: simulated quadrotors fly a saved result."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
 
 
 def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
-    """Fly the mission. Return the log, and a line for each sink."""
+    """Fly the mission, and return the log and a line for each sink."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line

@@ -1,4 +1,4 @@
-"""`robochoc import`: convert problem files of other tools to folders of teams."""  # noqa: N999 - the name of the command
+"""`robochoc import`: converts problem files of other tools to team folders."""  # noqa: N999 - the name of the command
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class _Source(NamedTuple):
-    """The files of one problem, and the folder of its team."""
+    """The files of one problem, and the folder for its team."""
 
     files: Sequence[Path]
     folder: Path
@@ -92,7 +92,7 @@ def import_(
 
 
 def _sources(paths: Sequence[Path], output: Path | None, dialect: str | None) -> list[_Source]:
-    """Return the problems at `paths`. Raises `Failure` if there are none."""
+    """Return the problems found at `paths`. Raises `Failure` if there are none."""
     folders = [path for path in paths if path.is_dir()]
     if folders and len(folders) < len(paths):
         raise click.UsageError("Give either the files of one problem, or folders.")
@@ -112,13 +112,13 @@ def _sources(paths: Sequence[Path], output: Path | None, dialect: str | None) ->
 
 
 def _problems_below(folder: Path, dialect: str | None) -> Iterator[tuple[Path, list[Path]]]:
-    """Yield the relative folder for the team, and the files, of each problem in `folder` and below.
+    """Yield, for each problem in or below `folder`, the relative folder for its team, and its files.
 
     Files of unknown formats, hidden files and symbolic links to folders are skipped.
 
     Args:
         folder: The folder.
-        dialect: The name of the files' dialect; None to recognise it.
+        dialect: The name of the files' dialect. None: it is detected.
     """
     from robochoc.model.priorities import natural_key
 
@@ -139,7 +139,7 @@ def _problems_below(folder: Path, dialect: str | None) -> Iterator[tuple[Path, l
 
 
 def _split(files: list[Path], name: str | None) -> tuple[list[Path], list[Path]]:
-    """Return the files that are complete problems, and the files that are parts of one problem."""
+    """Return the files that are complete problems, and the files that together form one problem."""
     from robochoc.formats.dialects.registry import find_dialect, first_bytes, recognise
 
     problems: list[Path] = []
@@ -160,7 +160,7 @@ def _stem(path: Path) -> str:
 def _import(
     source: _Source, options: ImportOptions, dialect: str | None, order: str | Path, *, force: bool
 ) -> dict[str, Any]:
-    """Write the team of one problem, and return the entry of the report."""
+    """Write the team for one problem, and return its entry in the report."""
     from robochoc.formats import InvalidInputError, encodable, write_team
     from robochoc.formats.dialects.registry import read_foreign
     from robochoc.formats.names_file import NAMES_FILE, names_json

@@ -1,4 +1,4 @@
-"""`robochoc journal`: a summary of a journal, and exports for other programs."""
+"""`robochoc journal`: summarises a journal, and exports it for other programs."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
 MOST_IN_PAGE = 100_000
-"""Messages. With more, the page would be too large for browsers."""
+"""The maximum number of messages in a page. With more, the page would be too large for browsers."""
 
 
 @click.group()
@@ -101,7 +101,7 @@ def export(
 
 
 def _write(output: Path, content: bytes, *, count: int) -> None:
-    """Write an export of `count` messages to a file, and print its size."""
+    """Write an export of `count` messages to a file, and print the file's size."""
     from robochoc.system.files import write_atomically
 
     try:
@@ -115,7 +115,7 @@ def _write(output: Path, content: bytes, *, count: int) -> None:
 def _pieces(
     form: str, read: Journal, trace: Trace, selection: Selection, messages: range | list[int]
 ) -> Iterable[bytes]:
-    """Return the export, piece by piece."""
+    """Return the export piece by piece."""
     from robochoc.journal.journal import lines_of
     from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, mermaid, table
     from robochoc.sniffer.page_data import PageData
@@ -141,7 +141,7 @@ def _pieces(
 
 
 class _TooManyError(RobochocError):
-    """Too many messages for the format; `last` is the number of the last message that fits, or None."""
+    """There are too many messages for the format. `last`: the number of the last message that fits, or None."""
 
     def __init__(self, why: str, fitting: Sequence[int]) -> None:
         super().__init__(why)
@@ -149,13 +149,13 @@ class _TooManyError(RobochocError):
 
 
 def _command(file: Path, form: str, options: Mapping[str, object]) -> str:
-    """Return the same command with other `options`, without those that have no value."""
+    """Return the same command with other `options`. Options without a value are left out."""
     given = [str(part) for name, value in options.items() if value not in (None, "", 0) for part in (name, value)]
     return shlex.join(["robochoc", "journal", "export", str(file), "--format", form, *given])
 
 
 def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
-    """Return a page of the complete run: causes and effects of messages are in other messages."""
+    """Return a page with the complete run, since causes and effects of messages are in other messages."""
     from robochoc.sniffer.selection import Selection
 
     if selection != replace(Selection(), robots=selection.robots):

@@ -191,7 +191,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
 
 @contextmanager
 def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
-    """Yield the publication of the journal for sniffers, in an unnamed file; None unless the run is `sniffable`."""
+    """Yield the publication of the journal for sniffers, in an unnamed file, or None if the run is not `sniffable`."""
     if not sniffable:
         yield None
         return
@@ -236,7 +236,7 @@ def _close_journal(recorder: JournalRecorder | None, publication: Publication | 
     """Write the end of the run to the journal."""
     if recorder:
         recorder.outcome = outcome
-        recorder.close()  # before anything else goes to where it may be written
+        recorder.close()  # before anything else is written to the same destination
     if publication:
         publication.end()
 
@@ -253,7 +253,7 @@ def _print_result(result: MasterResult, *, as_json: bool) -> None:
 
 
 def _header(plan: MasterPlan) -> Header:
-    """Return the journal's header for the run."""
+    """Return the header for the run's journal."""
     from robochoc.journal.journal import Header
     from robochoc.run.defaults import AUTO, DEFAULT_PROTOCOL
 
@@ -262,7 +262,7 @@ def _header(plan: MasterPlan) -> Header:
 
 
 class _EventPrinter:
-    """Prints that the master listens at `place`, and then its events; events before that are printed afterwards."""
+    """Prints that the master listens at `place`, and its events. Events that happen before are printed afterwards."""
 
     def __init__(self, place: Address) -> None:
         self._place = place
@@ -278,7 +278,7 @@ class _EventPrinter:
             self._early = None
 
     def print_event(self, event: AnyEvent) -> None:
-        """Print an event, now or as soon as the master listens. Events come from several threads."""
+        """Print an event now, or as soon as the master listens. Events arrive from several threads."""
         with self._lock:
             if self._early is None:
                 _print_event(event)
@@ -287,7 +287,7 @@ class _EventPrinter:
 
 
 def _print_event(event: AnyEvent) -> None:
-    """Print one line for each event that the master's operator needs to know at once."""
+    """Print one line for an event that the master's operator needs to know at once."""
     from robochoc.formats import on_one_line
     from robochoc.journal.events import DroppedOut, Granted, Lost, Refused, Registered
 

@@ -1,4 +1,4 @@
-"""`robochoc privacy`: how much robots learned about each other in a recorded run."""
+"""`robochoc privacy`: measures how much robots learned about each other in a recorded run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`robochoc protocols`: the installed protocols."""
+"""`robochoc protocols`: lists and explains the installed protocols."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ def replay(
 
 
 def _altered(journal: Journal) -> bool:
-    """Return whether a part of the journal was altered."""
+    """Return whether part of the journal was altered."""
     return journal.damage is not None and not journal.truncated
 
 

@@ -1,4 +1,4 @@
-"""`robochoc robot`: one robot on its own machine (Figure 4)."""
+"""`robochoc robot`: runs one robot on its own machine (Figure 4)."""
 
 from __future__ import annotations
 
@@ -98,20 +98,20 @@ def _run(
     given: dict[str, Any],
     show_stage: Callable[[str], None],
 ) -> tuple[Ending, dict[str, int | str], list[str]]:
-    """Run the robot of `file`, and publish its decision.
+    """Run the robot in `file`, and publish its decision.
 
     Args:
         file: The robot's file.
         place: The address of the master.
-        credentials: The folder of its certificate, and its token.
+        credentials: The folder with the robot's certificate, and its token.
         given: The other options of the command.
         show_stage: Shows the stage of the run.
 
     Returns:
-        The end of the run for the robot, its values with symbols by their names, and a line for each sink.
+        How the run ended for the robot, its values (symbols by their names), and a line for each sink.
 
     Raises:
-        Failure: when the run could not be completed.
+        Failure: if the run could not be completed.
     """
     from robochoc.communication.network.robot_settings import RobotSettings
     from robochoc.formats import read_robot
@@ -119,7 +119,7 @@ def _run(
     from robochoc.solver.cache import SolutionCache
     from robochoc.solver.compile import Compiler
 
-    own = read_robot(file)  # before its token is used
+    own = read_robot(file)  # before the token is used
     with robot_publisher(own, given) as publish:
         show_stage(f"looking for the master at {place}")
         identity = identity_of(file.stem, place, *credentials, given["patience"])
@@ -136,13 +136,13 @@ def _run(
 
 
 def _labelled(own: Robot, assignment: Assignment) -> dict[str, int | str]:
-    """Return the robot's values, with symbols by their names."""
+    """Return the robot's values, in which symbols are replaced by their names."""
     domains = {variable.name: variable.domain for variable in own.variables}
     return {name: domains[name].label(value) for name, value in assignment.items()}
 
 
 class _DecisionReporter:
-    """Prints and publishes the robot's decisions while its team continues the search; equal ones only once."""
+    """Prints and publishes the robot's decisions while its team continues the search. Repetitions are skipped."""
 
     def __init__(self, own: Robot, publish: Callable[[str, Assignment], list[str]]) -> None:
         self._robot = own
@@ -150,7 +150,7 @@ class _DecisionReporter:
         self._last: Assignment | None = None
 
     def report(self, why: str, assignment: Assignment) -> None:
-        """Print a decision on standard error, and publish it. An error of the publication does not end the search."""
+        """Print a decision on standard error, and publish it. An error while publishing does not end the search."""
         if assignment == self._last:
             return
         self._last = dict(assignment)

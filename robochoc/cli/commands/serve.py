@@ -1,4 +1,4 @@
-"""`robochoc serve`: solve teams on request, as a ROS 2 service."""
+"""`robochoc serve`: solves teams on request, as a ROS 2 service."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _MIDDLEWARES: Mapping[str, tuple[str, str]] = MappingProxyType(
         "rosbridge": ("rosbridge_service", "RosbridgeServices"),
     }
 )
-"""Each kind of middleware: its module in `robochoc.ros.live`, and the class there."""
+"""For each kind of middleware: its module in `robochoc.ros.live`, and its class in that module."""
 _SLICE_S = 0.2
 """The interval at which signals are handled, in seconds."""
 
@@ -103,7 +103,7 @@ def serve(
     services = {_SERVICE: DECIDE, **dict.fromkeys((*triggers, _CANCEL), TRIGGER)}
 
     def publish_feedback(text: str) -> None:
-        with suppress(Exception):  # an error of the feedback must not end the decision
+        with suppress(Exception):  # an error in the feedback must not end the decision
             offered.publish(_FEEDBACK, _TEXT, {"data": text})
 
     decision = CancellableDecision(publish_feedback if feedback else None)
@@ -125,7 +125,7 @@ def serve(
 
 
 def _requests(offered: Services, most: int | None) -> Iterator[ServiceRequest]:
-    """Yield requests as they arrive, up to `most` of them."""
+    """Yield up to `most` requests as they arrive."""
     yielded = 0
     while yielded != most:
         request = offered.next(_SLICE_S)
@@ -137,7 +137,7 @@ def _requests(offered: Services, most: int | None) -> Iterator[ServiceRequest]:
 def _opened(
     kind: str, place: str, services: Mapping[str, str], refuse: Refuse, immediate: ImmediateServices
 ) -> Services:
-    """Return the services, offered by the middleware `kind`. Raises `SinkError`."""
+    """Return the services offered through the middleware `kind`. Raises `SinkError`."""
     module, name = _MIDDLEWARES[kind]
     factory: Callable[[str, Mapping[str, str], Refuse, ImmediateServices], Services] = getattr(
         import_module(f"robochoc.ros.live.{module}"), name
@@ -146,7 +146,7 @@ def _opened(
 
 
 def _teams(paths: Sequence[Path]) -> list[Team]:
-    """Return the teams in the folders `paths` and below. Raises `Failure`."""
+    """Return the teams in or below the folders `paths`. Raises `Failure`."""
     from robochoc.formats.problems import read_problem
 
     teams: dict[str, Team] = {}

@@ -1,4 +1,4 @@
-"""`robochoc sniff`: a page that shows and explains the messages of a run, here or of a master elsewhere."""
+"""`robochoc sniff`: a page that shows and explains the messages in a run on this machine or on a remote master."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Command = TypeVar("Command", bound=Callable[..., object])
 NAME = "Sniffer"
 """The default name of a sniffer."""
 _MASTER_ONLY = {"as": "name", "identity": "identity", "journal": "copy", "no-page": "no_page"}
-"""Options that require --master, and their arguments."""
+"""The options that require --master, and their arguments."""
 _OPTIONS = (
     click.option(
         "--master",
@@ -67,7 +67,7 @@ _OPTIONS = (
 
 
 def master_options(command: Command) -> Command:
-    """Add the options by which `robochoc sniff` follows a master."""
+    """Add the options with which `robochoc sniff` follows a master."""
     for option in reversed(_OPTIONS):
         command = option(command)
     return command
@@ -132,7 +132,7 @@ def sniff(
 
 
 def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
-    """Return a session on the journal. Its first piece is read here, so that an invalid file is reported at once."""
+    """Return a session on the journal. The first piece is read now, so that an invalid file is reported at once."""
     from robochoc.formats import on_one_line, read_team
     from robochoc.journal.journal import JournalError
     from robochoc.sniffer.patterns import patterns_in
@@ -154,9 +154,9 @@ def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
 
 
 def _follows_master(journal: Path | None, folder: Path | None, asked: Mapping[str, Any]) -> bool:
-    """Return whether to follow a master instead of reading a `journal`. `asked` has the values of `master_options`.
+    """Return whether to follow a master instead of reading a `journal`. `asked`: the values of `master_options`.
 
-    Raises `UsageError` if both or neither are given, or an option that cannot be combined with them.
+    Raises `UsageError` if both or neither are given, or if an option cannot be combined with them.
     """
     if asked["place"] is None:
         if journal is None:
@@ -175,7 +175,7 @@ def _follows_master(journal: Path | None, folder: Path | None, asked: Mapping[st
 
 @dataclass(frozen=True)
 class _PageOptions:
-    """The page of a run: patterns of the robots shown first, its port, and whether to open a browser."""
+    """The page for a run: patterns of the robots shown first, the port, and whether to open a browser."""
 
     chosen: tuple[str, ...]
     port: int
@@ -191,7 +191,7 @@ def _sniff_master(
     no_page: bool,
     **given: Any,  # noqa: ANN401 - the sniffer's identity
 ) -> int:
-    """Follow the run of the master at `place` until it ends, keep the page until Ctrl-C, and return the exit status."""
+    """Follow the run of the master at `place` to its end, keep the page until Ctrl-C, and return the exit status."""
     from robochoc.formats import on_one_line
 
     with network_errors_as_failures(place), ExitStack() as stack:
@@ -206,7 +206,7 @@ def _sniff_master(
 def _identity(
     place: Address, patience_s: float, *, name: str | None, token: str | None, identity: Path | None
 ) -> Identity:
-    """Return the sniffer's identity. The default of `name` is the identity's name."""
+    """Return the sniffer's identity. By default, `name` is the name in the identity."""
     from robochoc.authority.identity import Identity
     from robochoc.run.networked.join import identity_of
 
@@ -228,7 +228,7 @@ class _JournalWriteError(Exception):
 
 
 class _JournalTarget:
-    """The targets of a received journal: an unnamed file, which the page's process reads, and the user's file."""
+    """The targets for a received journal: an unnamed file that the page's process reads, and the user's file."""
 
     def __init__(self, place: Address, page: _PageOptions | None, copy: Path | None, stack: ExitStack) -> None:
         self._place = place
@@ -240,7 +240,7 @@ class _JournalTarget:
         self._size = 0
 
     def start(self) -> None:
-        """Open the targets, after the master has granted access."""
+        """Open the targets after the master has granted access."""
         from robochoc.formats import on_one_line
         from robochoc.journal.journal import JournalFile
 
@@ -282,12 +282,12 @@ class _JournalTarget:
 
     @property
     def summary(self) -> str:
-        """A text with the size of the received journal."""
+        """A text about the size of the received journal."""
         received = f"{self._size:,} bytes of its journal received"
         return f"{received}, in {self._copy}" if self._copy else received
 
     def wait(self) -> None:
-        """Keep the page until Ctrl-C, or until its process has ended."""
+        """Keep the page open until Ctrl-C, or until its process ends."""
         if self._viewer is None:
             return
         with suppress(KeyboardInterrupt):  # Ctrl-C may come at any time from here

@@ -1,4 +1,4 @@
-"""One team of `robochoc solve`: read it, run it with its observers, and print the outcome."""
+"""Solves one team for `robochoc solve`: reads it, runs it with its observers, and prints the outcome."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 def solve_team(folder: Path, options: Options, outputs: Outputs, request: TeamRequest) -> int:
-    """Solve the team in `folder`, print the outcome, and return the exit status after all pages are closed."""
+    """Solve the team in `folder`, print the outcome, and return the exit status once all pages are closed."""
     with LiveSniffer(outputs.sniffer) as sniffer:
         status = _solve_and_show(folder, options, outputs, request, sniffer)
         sniffer.wait()
@@ -70,7 +70,7 @@ def _solve_and_show(
 
 
 def _with_team_names(kills: Sequence[Kill], problem: ReadProblem) -> tuple[Kill, ...]:
-    """Return `kills` with the robots' names in the team. Unknown names are unchanged: the run rejects them."""
+    """Return `kills` with the robots' names in the team. Unknown names are kept, so that the run rejects them."""
     from robochoc.model.original_names import robots_called
 
     known = robots_called(problem.team, problem.names)
@@ -78,7 +78,7 @@ def _with_team_names(kills: Sequence[Kill], problem: ReadProblem) -> tuple[Kill,
 
 
 class _FinishedRun(NamedTuple):
-    """A finished run, whose journal is written."""
+    """A finished run whose journal has been written."""
 
     team: Team
     outcome: Outcome
@@ -130,7 +130,7 @@ def _solve(
 def _observed(
     run: PreparedRun, recorder: JournalRecorder | None, loop: ClosedLoop | None, audience: Audience | None
 ) -> Outcome:
-    """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
+    """Run the team with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
     from robochoc.cli.reports.choice import OrderNote
     from robochoc.cli.reports.progress import progress_line, waiting_for_reports
     from robochoc.run.defaults import CENTRAL
@@ -147,16 +147,16 @@ def _observed(
     note.print_if_slow(outcome.metrics.wall_s)
     if recorder:
         recorder.outcome = outcome
-        recorder.close()  # before anything else goes to where it may be written
+        recorder.close()  # before anything else is written to the same destination
     return outcome
 
 
 def _print_outcome(
     problem: ReadProblem, outcome: Outcome, request: TeamRequest, choice: ProtocolChoice, ground: GroundMap | None
 ) -> None:
-    """Print the outcome, in the original names if the problem was imported.
+    """Print the outcome, with the original names if the problem was imported.
 
-    The JSON result of a team's folder has the team's names, and the original names in addition.
+    The JSON result for a team's folder contains the team's names, and the original names in addition.
     """
     from robochoc.model.original_names import renamed_outcome, renamed_team
 

@@ -1,4 +1,4 @@
-"""`robochoc validate`: check teams, and print all errors of all files."""
+"""`robochoc validate`: checks teams, and prints all errors in all files."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Options and arguments that several commands share, and how they are parsed."""
+"""Options and arguments shared by several commands, and their parsing."""

@@ -1,4 +1,4 @@
-"""Options that families of `robochoc generate` share, and the writing of the generated team."""
+"""Options shared by families of `robochoc generate`, and the command that writes the generated team."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
 MAX = 1000
 MAX_NODES = 1_000_000
-"""The limit of `generators/draws.py`, repeated since that module is not imported at the start."""
+"""The limit in `generators/draws.py`, repeated here because that module is not imported at the start."""
 MAX_PROCESSES = 1000
-"""Robots. For larger teams, `next_step` suggests the simulator (docs/guides/large-teams.md)."""
+"""The most robots that run as processes; for larger teams, the simulator is suggested (docs/guides/large-teams.md)."""
 Options = dict[str, Any]
 Command = Callable[..., None]
 TeamOnMap: TypeAlias = "tuple[Team, GroundMap]"
@@ -32,7 +32,7 @@ TeamOnMap: TypeAlias = "tuple[Team, GroundMap]"
 def number_option(
     name: str, text: str, *, least: int = 1, most: int = MAX, default: int | None = None
 ) -> Callable[..., Any]:
-    """Return an option with an integer value; required unless it has a default."""
+    """Return an option with an integer value, which is required unless it has a default."""
     return click.option(
         name,
         required=default is None,
@@ -57,10 +57,10 @@ seed_option = click.option(
 
 
 def writes_team(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Command]:
-    """Return a decorator for a function that makes a team: the command writes it to the folder of -o.
+    """Return a decorator for a function that makes a team: the resulting command writes the team to the folder of -o.
 
-    The default folder has the team's name; `folder` describes it in the help text. A `ValueError` of the function, for
-    numbers that are inconsistent, is wrong usage.
+    The default folder has the team's name; `folder` describes the default in the help text. If the function raises
+    `ValueError` for inconsistent numbers, this is a usage error.
     """
 
     def decorate(make: Callable[..., Team | TeamOnMap]) -> Command:
@@ -79,9 +79,9 @@ def writes_team(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Comm
 
 
 def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace: bool) -> None:
-    """Write the team of `make`, and its map of the ground if there is one, as `robochoc fly --map` reads it.
+    """Write the team made by `make`, and its map of the ground, if there is one, in the form that `robochoc fly` reads.
 
-    A `ValueError` of `make`, for numbers that are inconsistent, is wrong usage.
+    If `make` raises `ValueError` for inconsistent numbers, this is a usage error.
     """
     from robochoc.formats import InvalidInputError, write_team
     from robochoc.formats.team_writer import GROUND_FILE
@@ -110,24 +110,24 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
 
 
 def next_step(folder: Path | str, robots: int) -> str:
-    """Return a hint with the command that solves the team in `folder`: in the simulator if it has many robots."""
+    """Return a hint with the command that solves the team in `folder`, in the simulator if there are many robots."""
     return f"next: robochoc solve {folder}{' --runtime simulator' if robots > MAX_PROCESSES else ''}"
 
 
 OUTPUT = ("--seed", "-o", "--force", "--help")
-"""The last section of a family's help."""
+"""The options in the last section of a family's help."""
 GRAPH = ("--connected", "--links", "--neighbours", "--rewiring", "--rows", "--torus")
-"""The section on graphs."""
+"""The options in the section on graphs."""
 
 KINDS = ("random", "scale-free", "small-world", "grid", "tree")
 
 
 _GRAPH_PARAMETERS = ("links", "neighbours", "rewiring", "rows", "torus", "connected")
-"""Parameters that apply to some kinds of graphs only."""
+"""Parameters that only apply to some kinds of graphs."""
 
 
 def graph_options(command: Command) -> Command:
-    """Add the options of constraint graphs, which `pop_graph` evaluates."""
+    """Add the options for constraint graphs, which `pop_graph` evaluates."""
     for option in reversed(
         (
             click.option("--agents", type=WholeNumber(1, MAX_NODES), metavar="N", help="Number of robots."),
@@ -159,12 +159,12 @@ def graph_options(command: Command) -> Command:
 
 
 def pop_graph(options: Options, density: str) -> Graph | None:
-    """Remove the options of graphs from `options`, and return the graph; None for a random graph of a given `density`.
+    """Remove the options for graphs from `options`, and return the graph; None: a random graph of a given `density`.
 
-    For the random graph, `options` retains the number of robots, the density and whether it must be connected.
+    For the random graph, `options` keeps the number of robots, the density, and whether the graph must be connected.
 
     Raises:
-        ValueError: if an option is missing or does not apply to this graph, or numbers are inconsistent.
+        ValueError: if an option is missing or does not apply to this graph, or if numbers are inconsistent.
     """
     from robochoc.generators.graph_choice import GraphChoice
 

@@ -1,4 +1,4 @@
-"""Options of all commands that compile robots' local problems."""
+"""Options for all commands that compile robots' local problems."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def local_options(command: Command) -> Command:
 
 
 def limits(local_solutions: int, local_timeout: float, *, always_ace: bool) -> CompileLimits:
-    """Return the limits that the options set."""
+    """Return the limits set by the options."""
     from robochoc.solver.compile import CompileLimits
 
     if not local_timeout > 0:

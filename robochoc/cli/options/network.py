@@ -1,4 +1,4 @@
-"""Addresses, tokens, other options and errors that `robochoc master`, `robot`, `sniff` and `directory` share."""
+"""Addresses, tokens, other options, and errors shared by `robochoc master`, `robot`, `sniff` and `directory`."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ Command = TypeVar("Command", bound=Callable[..., object])
 _EXTRA = {"cryptography", "zenoh"}
 STDIN = "-"
 LONGEST = 4096
-"""Bytes. A token has about a hundred."""
+"""The maximum number of bytes read for a token, which has about a hundred."""
 _FILE = "robochoc.token_file"
 
 
 class AddressType(click.ParamType["Address"]):
-    """`HOST:PORT` of a master."""
+    """The address `HOST:PORT` of a master."""
 
     name = "address"
 
@@ -63,7 +63,7 @@ identity_option = click.option(
 
 
 def patience_option(text: str, default_s: float, name: str = "patience_s") -> Callable[[Command], Command]:
-    """Return the option `--patience SECONDS`, as the argument `name`, with the help `text`."""
+    """Return the option `--patience SECONDS`, stored in the argument `name`, with the help text `text`."""
     return click.option(
         "--patience",
         name,
@@ -76,10 +76,9 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
 
 
 def token_options() -> Callable[[Command], Command]:
-    """Return the options `--token` and `--token-file`, both as the argument `token`.
+    """Return the options `--token` and `--token-file`, which are both stored in the argument `token`.
 
-    While the command runs, a token on the command line can be read by every user of the machine, in the list of
-    processes.
+    While the command runs, every user of the machine can read a token on the command line in the list of processes.
     """
     options = (
         click.option(
@@ -127,7 +126,7 @@ def _from_standard_input() -> str:
 
 
 def _from_file(path: str) -> str:
-    """Return the token in the file. Reject a file that others may read, as ssh does with keys."""
+    """Return the token in a file. Files that other users may read are rejected, as ssh does with keys."""
     try:
         with open(path, "rb") as file:  # noqa: PTH123 - the file that is checked is the file that is read
             status = os.fstat(file.fileno())
@@ -140,7 +139,7 @@ def _from_file(path: str) -> str:
 
 
 def _only_word(content: bytes, place: str) -> str:
-    """Return the token of a line, with or without a name before it, as `robochoc authority enrol` prints it."""
+    """Return the token on a line, after an optional name, as printed by `robochoc authority enrol`."""
     words = content.decode(errors="replace").split()
     if len(content) > LONGEST or len(words) not in {1, 2}:
         found = "no token" if not words else "more than one token"
@@ -150,7 +149,7 @@ def _only_word(content: bytes, place: str) -> str:
 
 @contextmanager
 def network_errors_as_failures(place: object) -> Iterator[None]:
-    """Turn each foreseen error of a run on several machines into a `Failure`: one line and an exit status."""
+    """Convert each foreseen error in a run on several machines to a `Failure` with one line and an exit status."""
     statuses = _statuses()
     from robochoc.formats import on_one_line
 
@@ -163,7 +162,7 @@ def network_errors_as_failures(place: object) -> Iterator[None]:
 
 
 def _statuses() -> dict[int, tuple[type[Exception], ...]]:
-    """Return the exceptions of each exit status. Raise `Failure` if a package of the extra is missing."""
+    """Return the exceptions for each exit status. Raises `Failure` if a package of the extra is missing."""
     try:
         from robochoc.authority.certificates import HostNameError
         from robochoc.authority.enrolment import EnrolmentError

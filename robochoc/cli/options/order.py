@@ -1,4 +1,4 @@
-"""`--order`: a priority order by name, or a file that lists the robots."""
+"""The option `--order`: the name of a priority order, or a file that lists the robots."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ def order_for(team: Team, order: str | Path | None, names: Mapping[str, str] = {
     Args:
         team: The team.
         order: The name of the order, or the path of a file.
-        names: The original names of the robots, which a file may use.
+        names: The original names of the robots, which may be used in a file.
 
     Raises:
-        InvalidInputError: a file does not list the team's robots.
+        InvalidInputError: if a file does not list exactly the team's robots.
     """
     from robochoc.formats.order_file import read_order
     from robochoc.model.orders import Order

@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 PathLike = str | os.PathLike[str]
 
 _MOST_RECOGNISED = 20
-"""The maximum number of files of a folder without a team whose format is recognised."""
+"""The maximum number of files whose format is detected in a folder without a team."""
 
 
 class InputPath(click.Path):
-    """A path to read. An empty path is an error: an unset shell variable would otherwise mean the current folder."""
+    """A path to read. An empty path is an error; otherwise an unset shell variable would mean the current folder."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path)
@@ -36,17 +36,17 @@ class InputPath(click.Path):
 
 
 class TeamFolder(InputPath):
-    """The path of a team's folder: the shell completes folders."""
+    """The path of a team's folder, for which the shell completes folders."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002 - click's
-        """Return the shell's own completion of folders."""
+        """Return the shell's own completion for folders."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="dir")]
 
 
 class OutputFile(click.Path):
-    """A file to write, in an existing, writable folder."""
+    """A file to write in an existing, writable folder."""
 
     def __init__(self) -> None:
         super().__init__(dir_okay=False, path_type=Path)
@@ -58,7 +58,7 @@ class OutputFile(click.Path):
         path = Path(os.fsdecode(super().convert(value, param, ctx)))
         if path.is_dir():
             self.fail(f"{path} is a folder; name a file", param, ctx)
-        if path.exists() and not path.is_file():  # a device or a pipe
+        if path.exists() and not path.is_file():  # the path is a device or a pipe
             return path
         try:
             folder = resolved(path).parent
@@ -72,7 +72,7 @@ class OutputFile(click.Path):
 
 
 NamedPlace = tuple[Path | str, str]
-"""A file or topic in one canonical spelling, and its name on the command line."""
+"""A file or topic in canonical spelling, and its name on the command line."""
 
 
 def refuse_same_places(
@@ -83,14 +83,14 @@ def refuse_same_places(
     more_outputs: Iterable[NamedPlace] = (),
     more_inputs: Iterable[NamedPlace] = (),
 ) -> None:
-    """Raise `click.UsageError` if a command would overwrite one of its inputs, or write two outputs to one place.
+    """Raise `click.UsageError` if a command would overwrite one of its inputs, or write two outputs to the same place.
 
     Args:
-        outputs: Files to write, by their names on the command line.
-        inputs: Files to read, by their names on the command line.
-        teams: Folders whose files are read.
-        more_outputs: Outputs that need not be files.
-        more_inputs: Inputs that need not be files.
+        outputs: The files to write, by their names on the command line.
+        inputs: The files to read, by their names on the command line.
+        teams: The folders whose files are read.
+        more_outputs: Further outputs, which need not be files.
+        more_inputs: Further inputs, which need not be files.
 
     Devices and pipes may be shared.
     """
@@ -111,17 +111,17 @@ def refuse_same_places(
 
 
 def _named(files: Mapping[str, Path | None]) -> Iterator[NamedPlace]:
-    """Yield the path and the name of each given file, which need not exist yet. Devices are left out."""
+    """Yield the path and name of each given file, which need not exist yet. Devices are left out."""
     from robochoc.system.files import resolved
 
     for name, path in files.items():
-        with suppress(OSError):  # its reader or writer reports the error
+        with suppress(OSError):  # the code that reads or writes the file reports the error
             if path and (path.is_file() or not path.exists()):
                 yield resolved(path), f"{name} {path}"
 
 
 def import_hints(path: Path) -> list[str]:
-    """Return a line with the command that imports the problem at `path`; none if no file there has a known format."""
+    """Return a line with the command that imports the problem at `path`; empty if no file has a known format."""
     from robochoc.formats.dialects.registry import recognise
 
     try:
@@ -139,11 +139,11 @@ def import_hints(path: Path) -> list[str]:
 
 
 def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | None = None) -> list[Path]:
-    """Return the folders of all teams at `paths` or below, without duplicates.
+    """Return the folders of all teams at or below `paths`, without duplicates.
 
-    With `foreign`, files of other tools are teams, too; with `dialect`, all files have this format.
+    With `foreign`, files of other tools are also teams; with `dialect`, all files have this format.
 
-    Raises `Failure`, which names every path without a team.
+    Raises `Failure`, which lists every path without a team.
     """
     from robochoc.formats import InvalidInputError, find_teams
     from robochoc.formats.dialects.registry import recognise_or_raise

@@ -25,7 +25,7 @@ class ProblemPath(TeamFolder):
     """The path of a team's folder or of another tool's file."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:  # noqa: ARG002 - click's
-        """Return the shell's own completion of files."""
+        """Return the shell's own completion for files."""
         from click.shell_completion import CompletionItem
 
         return [CompletionItem(incomplete, type="file")]
@@ -37,7 +37,7 @@ class Pattern(click.ParamType[str]):
     name = "regex"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the expression unchanged, after a check."""
+        """Return the expression unchanged if it is valid."""
         import re
 
         try:
@@ -54,7 +54,7 @@ def format_option(command: _Command) -> _Command:
 
 
 def reading_options(command: _Command) -> _Command:
-    """Add `--infinity` and `--owner`, which control how a file of another tool is read."""
+    """Add `--infinity` and `--owner`, which control how files of other tools are read."""
     owner = click.option(
         "--owner",
         type=Pattern(),

@@ -1,4 +1,4 @@
-"""`--journal`: the journal that a command writes."""
+"""The option `--journal`, with which a command writes a journal."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def recording(
     objective: Callable[[], Objective] | None = None,
     sinks: Sequence[BlockSink] = (),
 ) -> Iterator[JournalRecorder | None]:
-    """Give a recorder that writes to `path` and to other `sinks` during the run; None if there is neither.
+    """Provide a recorder that writes to `path` and to other `sinks` during the run, or None if neither is given.
 
-    If the file cannot be written, the run continues; the error is reported at the end as the failure of the command,
-    unless the run itself failed. Other sinks report their own failures.
+    If the file cannot be written, the run continues. At the end, the error is reported as the failure of the command,
+    unless the run itself failed. Other sinks report their own errors.
     """
     if path is None and not sinks:
         yield None
@@ -54,12 +54,12 @@ def recording(
     try:
         yield recorder
     except BaseException:
-        if not recorder.is_empty:  # a rejected run does not overwrite the journal of an earlier one
+        if not recorder.is_empty:  # a rejected run must not overwrite the journal of an earlier run
             recorder.close()
         for failure in _failures(recorder):
             failure.show()
         if file:
-            with suppress(OSError):  # the error that ended the run matters more
+            with suppress(OSError):  # the error that ended the run is more important
                 file.close()
         raise
     else:
@@ -74,7 +74,7 @@ def recording(
 def flushing_progress(
     recorder: JournalRecorder | None, show: Callable[[Progress], None] | None
 ) -> Callable[[Progress], None] | None:
-    """Return a function that receives a run's progress: it flushes the recorder when due, and calls `show`."""
+    """Return a function that receives a run's progress, flushes the recorder when due, and calls `show`."""
     if recorder is None:
         return show
 

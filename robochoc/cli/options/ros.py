@@ -1,4 +1,4 @@
-"""Options of the commands that publish decisions, simulate flights, and receive reports of robots."""
+"""Options for the commands that publish decisions, simulate flights, or receive reports from robots."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.cli.options.value_types import Number
 Command = TypeVar("Command", bound=Callable[..., object])
 
 FLIGHT = "flight"
-"""The value of `--situation` for the simulation."""
+"""The value of `--situation` that selects a simulated flight."""
 FRAME = "map"
 AXES = 3
 
@@ -25,19 +25,19 @@ class FrameType(click.ParamType[str]):
     name = "frame"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the name, which must not contain blanks."""
+        """Return the name, which must not contain spaces."""
         if not value or not value.isprintable() or " " in value:
             self.fail(f"{value!r} is not the name of a frame, such as map", param, ctx)
         return value
 
 
 class PointType(click.ParamType["tuple[float, ...]"]):
-    """Three numbers, separated by commas."""
+    """Three numbers separated by commas."""
 
     name = "point"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
-        """Return the numbers of `1,2,0.5`."""
+        """Return the numbers in a value such as `1,2,0.5`."""
         if isinstance(value, tuple):
             return value
         try:
@@ -50,12 +50,12 @@ class PointType(click.ParamType["tuple[float, ...]"]):
 
 
 class WindType(PointType):
-    """The velocity of wind; a single number is its speed along x."""
+    """The velocity of the wind; a single number is the speed along x."""
 
     name = "wind"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
-        """Return the numbers of `1,2,0.5`, and for `3` those of `3,0,0`."""
+        """Return the numbers in a value such as `1,2,0.5`; `3` means `3,0,0`."""
         if not isinstance(value, str) or "," in value:
             return super().convert(value, param, ctx)
         try:
@@ -65,12 +65,12 @@ class WindType(PointType):
 
 
 class FailureType(click.ParamType["tuple[str, float]"]):
-    """A robot or a drone, and the time of its failure."""
+    """A robot or drone, and the time of its failure."""
 
     name = "failure"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[str, float]:  # noqa: ANN401 - click's signature
-        """Return the name and the seconds of `Robot3.1@5`."""
+        """Return the name and the seconds in a value such as `Robot3.1@5`."""
         from robochoc.robots.simulated_feedback import FAILS_S
 
         if isinstance(value, tuple):
@@ -88,7 +88,7 @@ class FailureType(click.ParamType["tuple[str, float]"]):
 
 
 class Finite(Number):
-    """A finite number in a range."""
+    """A finite number within limits."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
         """Return the number."""
@@ -127,7 +127,7 @@ ros_options = _all_of(
     click.option("--tf", is_flag=True, help="Publish goals on /tf_static and flights on /tf."),
     click.option("--diagnostics", is_flag=True, help="Publish verdict, epoch and cost on /diagnostics."),
 )
-"""`--ros`, `--frame`, `--scale`, `--ros-type`, `--tf`, `--diagnostics`."""
+"""The options `--ros`, `--frame`, `--scale`, `--ros-type`, `--tf` and `--diagnostics`."""
 
 flight_options = _all_of(
     click.option(
@@ -153,7 +153,7 @@ flight_options = _all_of(
     click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
     click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),
 )
-"""`--fail`, `--distance`, `--downwash`, `--wind`, `--gusts`."""
+"""The options `--fail`, `--distance`, `--downwash`, `--wind` and `--gusts`."""
 
 arm_option = click.option(
     "--arm",
@@ -202,7 +202,7 @@ situation_options = _all_of(
         help="An obstacle, in the problem's units. Repeatable.",
     ),
 )
-"""`--situation`, `--patience`, `--report-timeout`, `--battery`, `--improve`, `--use-sim-time`, `--obstacle`."""
+"""`--situation`, `--patience`, `--report-timeout`, `--battery`, `--improve`, `--use-sim-time` and `--obstacle`."""
 
 CONDITIONS = {
     "failures": "--fail",
@@ -220,9 +220,9 @@ NOT_PUBLISHED = "requires --ros SINK"
 
 @dataclass(frozen=True)
 class RosOptions:
-    """The options of this module: sinks of decisions, and the source of the robots' situation.
+    """The options in this module: sinks for decisions, and the source of the robots' situation.
 
-    `flight` has the given options of `FlightSettings`, and `published` those in `PUBLISHED`.
+    `flight` contains the given options of `FlightSettings`, and `published` the given options in `PUBLISHED`.
     """
 
     sinks: tuple[str, ...]
@@ -241,12 +241,12 @@ class RosOptions:
 
     @property
     def simulates_flight(self) -> bool:
-        """Whether the robots' situation comes from a simulated flight."""
+        """Whether the robots' situation is taken from a simulated flight."""
         return self.situation == FLIGHT
 
 
 def pop_ros_options(settings: dict[str, Any]) -> RosOptions:
-    """Remove the options of this module from `settings`. Raises `click.UsageError` for an option without effect."""
+    """Remove this module's options from `settings`. Raises `click.UsageError` for an option that has no effect."""
     sinks, situation, arm = settings.pop("sinks"), settings.pop("situation"), settings.pop("arm")
     given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME, *PUBLISHED)}
     asked = given_names(given)
@@ -282,7 +282,7 @@ def given_names(options: Mapping[str, Any]) -> set[str]:
 
 
 def refuse_given(options: Mapping[str, str], asked: set[str], why: str) -> None:
-    """Raise `click.UsageError`, with the reason `why`, for the first of `options` that was given."""
+    """Raise `click.UsageError` with the reason `why` for the first of `options` that was given."""
     for name, option in options.items():
         if name in asked:
             raise click.UsageError(f"{option} {why}")

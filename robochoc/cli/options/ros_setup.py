@@ -1,4 +1,4 @@
-"""The setup for the options of ROS and flights: sinks, feedback, the closed loop. Errors become `Failure`."""
+"""Sets up sinks, feedback and the closed loop from the options for ROS and flights. Errors become `Failure`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def ros_errors_as_failures() -> Iterator[None]:
-    """Turn errors of sinks, sources and names into `Failure`, with one line."""
+    """Convert errors in sinks, sources and names to a `Failure` with one line."""
     from robochoc.robots.connections import UnknownSinkError, UnknownSourceError
     from robochoc.robots.sink import SinkError
     from robochoc.robots.source import SourceError
@@ -54,7 +54,7 @@ def ros_errors_as_failures() -> Iterator[None]:
 
 @contextmanager
 def flight_errors_as_failures() -> Iterator[None]:
-    """Turn a decision that cannot be flown into `Failure`, with one line."""
+    """Convert the error for a decision that cannot be flown to a `Failure` with one line."""
     from robochoc.robots.simulated_feedback import CannotFlyError
 
     try:
@@ -64,21 +64,21 @@ def flight_errors_as_failures() -> Iterator[None]:
 
 
 def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
-    """Return the sinks, which `stack` closes. Raises `SinkError`."""
+    """Return the opened sinks, which `stack` will close. Raises `SinkError`."""
     from robochoc.robots.connections import open_sink
 
     return [stack.enter_context(open_sink(text)) for text in texts]
 
 
 def publish_options(given: Mapping[str, Any]) -> PublishOptions:
-    """Return the options that `--ros-type`, `--tf` and `--diagnostics` set."""
+    """Return the options set by `--ros-type`, `--tf` and `--diagnostics`."""
     from robochoc.ros.team_topics import PublishOptions
 
     return PublishOptions(kind=given["ros_type"] or "", frames=given["tf"], diagnostics=given["diagnostics"])
 
 
 def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
-    """Allow arming in all `sinks` that support it. Raises `click.UsageError` if none does, and `SinkError`."""
+    """Allow arming in all `sinks` that support it. Raises `click.UsageError` if no sink does, and `SinkError`."""
     able = [sink for sink in sinks if sink.arms]
     if not able:
         raise click.UsageError(
@@ -89,7 +89,7 @@ def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
 
 
 def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
-    """Return the settings of a simulated flight from the `given` options."""
+    """Return the settings for a simulated flight from the `given` options."""
     from robochoc.robots.simulated_feedback import FlightSettings
 
     return FlightSettings(seed=seed, **given)
@@ -97,7 +97,7 @@ def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
 
 @contextmanager
 def _flight_usage() -> Iterator[None]:
-    """Turn an unknown drone or invalid weather into `click.UsageError`."""
+    """Convert the errors for an unknown drone or invalid weather to `click.UsageError`."""
     from robochoc.robots.simulated_feedback import UnknownDroneError
 
     try:
@@ -117,7 +117,7 @@ def conditions_of(given: Mapping[str, Any], mission: Mission) -> FlightCondition
 
 @contextmanager
 def scale_usage() -> Iterator[None]:
-    """Turn a scale other than that of the map into `click.UsageError`."""
+    """Convert the error for a scale that differs from the map's scale to `click.UsageError`."""
     try:
         yield
     except ValueError as wrong:
@@ -126,13 +126,13 @@ def scale_usage() -> Iterator[None]:
 
 @contextmanager
 def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = None) -> Iterator[ClosedLoop | None]:
-    """Give the closed loop of `team`, or None if no option requires one. On exit, everything published is complete.
+    """Provide the closed loop for `team`, or None if no option requires it. Publications are complete on exit.
 
-    A map in the `folder` of the team has the positions of robots, the length of a unit, and the obstacles.
+    A map in the team's `folder` provides the positions of robots, the length of a unit, and the obstacles.
 
     Raises:
-        Failure: A sink or a source fails, or a decision cannot be flown.
-        click.UsageError: An option does not apply to the team or to the source.
+        Failure: if a sink or a source fails, or a decision cannot be flown.
+        click.UsageError: if an option does not apply to the team or to the source.
     """
     if not ros:
         yield None
@@ -163,7 +163,7 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
 
 
 def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
-    """Return the feedback of the source in `--situation`."""
+    """Return the feedback from the source given by `--situation`."""
     if ros.situation == FLIGHT:
         from robochoc.robots.simulated_feedback import SimulatedFeedback
 
@@ -185,11 +185,11 @@ def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitSt
 
 @contextmanager
 def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
-    """Give a function that publishes the decision of `robot` alone, and returns a line for each sink.
+    """Provide a function that publishes the decision of `robot` alone, and returns a line for each sink.
 
-    The arguments of the function are the master's description of the run's end, or of its state, and the robot's
-    decision. A decision equal to the last published one is not published again. All options of `ros_options` are
-    removed from `given`. Raises `Failure`.
+    The function's arguments are the master's description of the end or the state of the run, and the robot's decision.
+    A decision that equals the last published decision is not published again. All options in `ros_options` are removed
+    from `given`. Raises `Failure`.
     """
     texts = given.pop("sinks")
     asked = {name: given.pop(name) for name in (*IN_FRAME, *PUBLISHED)}
@@ -221,12 +221,12 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
 
 
 def sink_places(sinks: Sequence[str]) -> list[NamedPlace]:
-    """Return the targets of `--ros`. Raises `click.UsageError`."""
+    """Return the targets given by `--ros`. Raises `click.UsageError`."""
     return [_place_of("--ros", text) for text in sinks]
 
 
 def source_places(situation: str | None) -> list[NamedPlace]:
-    """Return the file that `--situation` reads; a live source may also be a sink. Raises `click.UsageError`."""
+    """Return the file that `--situation` reads. (A live source may also be a sink.) Raises `click.UsageError`."""
     places = [_place_of("--situation", situation)] if situation else []
     return [(place, named) for place, named in places if isinstance(place, Path)]
 

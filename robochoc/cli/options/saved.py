@@ -1,4 +1,4 @@
-"""Input files that robochoc has written: journals and results, and their teams."""
+"""Reads input files that robochoc has written, journals and results, and finds their teams."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robochoc.model.problem import Robot, Team
 
 LARGEST_FILE = 1 << 30
-"""1 GiB: a journal of hundreds of millions of messages, or one of millions as text."""
+"""The maximum size of a file: 1 GiB, a journal with hundreds of millions of messages, or millions as text."""
 JOURNAL_STEP = "give a file of 'robochoc solve --journal'"
 _OUTCOME_STEP = "give a result of 'robochoc solve --json' or a journal of '--journal'"
 
@@ -38,7 +38,7 @@ journal_team_option = click.option(
 
 
 def saved_content(file: Path, next_step: str) -> bytes:
-    """Return the content of `file`. Raises `Failure`, whose message ends in `next_step`."""
+    """Return the content of `file`. Raises `Failure`, whose message ends with `next_step`."""
     try:
         with file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
@@ -61,7 +61,7 @@ def saved_journal(file: Path) -> Journal:
 
 
 def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
-    """Return the outcome in a JSON result or a journal, and the team if the journal contains it.
+    """Return the outcome in a JSON result or journal, and the team if a journal contains it.
 
     Raises `Failure`.
     """
@@ -82,7 +82,7 @@ def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
 
 
 def _given_team(journal: Journal) -> Team | None:
-    """Return the team of a journal, with all robots in their initial state; None if the journal does not contain it."""
+    """Return the team in a journal, with all robots in their initial state, or None if the journal has no team."""
     from robochoc.journal.events import Given
     from robochoc.journal.team_events import GivenProblemError, TeamReader
     from robochoc.model.problem import Team
@@ -101,19 +101,19 @@ def _given_team(journal: Journal) -> Team | None:
 def saved_team(
     outcome: Outcome, given: Team | None, saved: Path, folder: Path | None
 ) -> tuple[Team | None, Path | None]:
-    """Return the team of a saved outcome, and its folder; None if not found.
+    """Return the team of a saved outcome and its folder, or None for either if it is not found.
 
-    The team is read from `folder`; without a folder, it is the journal's team (`given`), or read from the default
+    The team is read from `folder`. Without a folder, it is the journal's team (`given`), or read from the default
     folder.
 
-    Raises `InvalidInputError`, and `Failure` if the team is not that of `outcome`, which is from the file `saved`.
+    Raises `InvalidInputError`, or `Failure` if the team does not belong to `outcome`, which was read from `saved`.
     """
     from robochoc.formats import read_team, robot_names
 
     if folder is None and given is not None and _is_team_of(outcome, given):
         default = _default_folder(outcome)
         is_same = default is not None and set(robot_names(default)) <= {robot.name for robot in given.robots}
-        return given, default if is_same else None  # for its map
+        return given, default if is_same else None  # the folder may contain a map
     folder = folder or _default_folder(outcome)
     if folder is None:
         missing = Path("instances") / Path(outcome.team).name
@@ -128,7 +128,7 @@ def saved_team(
 
 
 def _is_team_of(outcome: Outcome, team: Team) -> bool:
-    """Return whether `team`, or its scenario, has all robots and all decided values of `outcome`."""
+    """Return whether `team` or its scenario contains all robots and all decided values in `outcome`."""
     from robochoc.flight.mission import all_robots
 
     robots = all_robots(team)
@@ -141,7 +141,7 @@ def _is_team_of(outcome: Outcome, team: Team) -> bool:
 
 
 def _default_folder(outcome: Outcome) -> Path | None:
-    """Return the folder to which `generate` writes teams of that name; None if it does not exist."""
+    """Return the folder to which `generate` writes teams with this name, or None if it does not exist."""
     name = Path(outcome.team).name
     folder = Path("instances") / name
     return folder if name not in {"", ".."} and folder.is_dir() else None

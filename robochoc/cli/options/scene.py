@@ -1,4 +1,4 @@
-"""`--html` and `--serve`, which show the 3D scene, and `--map`, the map of the ground below it."""
+"""The options `--html` and `--serve`, which show the 3D scene, and `--map`, the map of the ground below it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Command = TypeVar("Command", bound=Callable[..., object])
 
 
 def html_option(*short: str) -> Callable[[Command], Command]:
-    """Return the option `--html FILE`, with further spellings."""
+    """Return the option `--html FILE` with further spellings."""
     return click.option(
         "--html",
         *short,
@@ -40,7 +40,7 @@ map_option = click.option(
 
 
 def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
-    """Return the map in `file`, or else in the `folder` of the team; None if there is none. Raises `Failure`."""
+    """Return the map in `file`, or in the team's `folder` if no file is given, or None. Raises `Failure`."""
     from robochoc.formats import on_one_line
     from robochoc.formats.team_writer import GROUND_FILE
     from robochoc.maps.ground_map import MAX_BYTES, read_ground_map
@@ -60,9 +60,9 @@ def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
 
 
 def readable_map(folder: Path) -> GroundMap | None:
-    """Return the map in the `folder` of a team; None if it is missing or invalid.
+    """Return the map in a team's `folder`, or None if it is missing or invalid.
 
-    The map only adds places to printed values: an invalid one must not fail a run that does not need it.
+    The map only adds positions to printed values, so an invalid map must not end a run that does not need it.
     """
     try:
         return ground_map(None, folder)

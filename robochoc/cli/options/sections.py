@@ -1,4 +1,4 @@
-"""Commands whose help has named sections, with the most used options first."""
+"""Commands whose help has titled sections, with the most used options first."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ COMMON = "Common options"
 """The title of the first section."""
 REST = "Other options"
 _COLUMN = 26
-"""Characters. The text of a longer option starts on the next line."""
+"""The column, in characters, at which texts start. The text of a longer option starts on the next line."""
 _OBVIOUS = re.compile(r"; x>=?[01](?=\])|\s*\[(x>=?[01]|[\d.e-]+<=x<=[\d.e-]+)\]")
-"""Obvious number ranges in click's texts, which are left out."""
+"""Obvious ranges of numbers in click's texts, which are left out."""
 
 
 class SectionedCommand(click.Command):
     """A command whose help shows its options in sections.
 
     Args:
-        sections: Each option by one of its spellings. Options without a section are listed last.
+        sections: The options in each section, each by one of its spellings. Options without a section are listed last.
     """
 
     def __init__(self, *args: Any, sections: Sections, **kwargs: Any) -> None:  # noqa: ANN401 - click's own
@@ -32,7 +32,7 @@ class SectionedCommand(click.Command):
         self.sections = sections
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """Write the options, section by section."""
+        """Write the options section by section."""
         options = [option for option in self.get_params(ctx) if isinstance(option, click.Option)]
         parameters = {spelling: option for option in options for spelling in option.opts}
         placed = {spelling for spellings in self.sections.values() for spelling in spellings}

@@ -1,4 +1,4 @@
-"""Options that `robochoc solve` and `robochoc master` share, and the parsing of the options of `solve`."""
+"""Options shared by `robochoc solve` and `robochoc master`, and the parsing of the options of `solve`."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., object])
 WITHDRAWALS = ("minimum", "maximal")
 _FORMER = {"fewest": "minimum"}
-"""Spellings of earlier versions."""
+"""The spellings used in earlier versions."""
 CHANNEL_NAMES = ("wlan", "wpan", "wman", "wwan")
 CHANNEL_TYPE = NameOrFile("channel", CHANNEL_NAMES)
 
@@ -41,12 +41,12 @@ class WithdrawalName(click.Choice[str]):
         super().__init__(WITHDRAWALS)
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the name in today's spelling."""
+        """Return the name in its current spelling."""
         return super().convert(_FORMER.get(value, value), param, ctx)
 
 
 def protocol_option(*, central: bool) -> Callable[[Command], Command]:
-    """Return the option `--protocol NAME`; with `central`, its help also explains the central solver."""
+    """Return the option `--protocol NAME`. With `central`, its help also explains the central solver."""
     alone = "; central: one model, no robots" if central else ""
     words = f"Protocol ('robochoc protocols' lists them); auto: chosen by the problem{alone}."
     return click.option("--protocol", type=ProtocolName(), default=AUTO, show_default=True, metavar="NAME", help=words)
@@ -89,12 +89,12 @@ messages_option = click.option(
 
 
 class KillType(click.ParamType[Kill]):
-    """`ROBOT@SECONDS`."""
+    """A value `ROBOT@SECONDS`."""
 
     name = "kill"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> Kill:
-        """Return the robot and the time."""
+        """Return the robot and the time in the value."""
         robot, _, seconds = value.rpartition("@")
         with suppress(ValueError):
             after_s = float(seconds)
@@ -124,17 +124,17 @@ _SAME_NAMES = (
     "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
     "central_with",
 )  # fmt: skip
-"""Arguments of `robochoc solve` with the same name in `robochoc.run.Options`."""
+"""The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 
 
 class SolveCommand(SectionedCommand):
-    """A command whose `--withdraw`, `--spare` and `--sniff` have an optional value.
+    """A command in which the value of `--withdraw`, `--spare` and `--sniff` is optional.
 
-    The word after one of them is its value if it is valid as such.
+    The word after one of these options is its value if it is a valid value.
     """
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Add the default value to each such option that has none."""
+        """Add the default value after each of these options that has no value."""
         plain = args.index("--") if "--" in args else len(args)
         for place, word in enumerate(args[:plain]):
             following = args[place + 1] if place + 1 < len(args) else ""
@@ -153,9 +153,9 @@ class SolveCommand(SectionedCommand):
 
 
 def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str]) -> None:
-    """Raise `click.UsageError` unless `word`, after an option without its value, is an option or an existing path.
+    """Raise `click.UsageError` unless `word`, after an option without a value, is an option or an existing path.
 
-    Any other word is one of the option's `values`, misspelt: it would be read as a path. Nothing is checked while the
+    Any other word is probably a misspelt value (`values`), but would be read as a path. Nothing is checked while the
     shell completes an unfinished word.
     """
     if ctx.resilient_parsing or not word or word.startswith("-") or os.path.lexists(word):
@@ -165,13 +165,13 @@ def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str])
 
 
 def _names_robots(word: str) -> bool:
-    """Return whether `word` can be patterns of robots' names, rather than the next option or a team's path."""
+    """Return whether `word` can be patterns of robots' names, instead of the next option or a team's path."""
     return bool(word) and not word.startswith("-") and "/" not in word and not Path(word).exists()
 
 
 @dataclass(frozen=True)
 class Outputs:
-    """The outputs of a run besides the printed result."""
+    """The outputs of a run in addition to the printed result."""
 
     html: Path | None
     journal: Path | None
@@ -184,7 +184,7 @@ class Outputs:
 
 @dataclass(frozen=True)
 class TeamRequest:
-    """The options that apply to each team: order (None: not given), reading of its files, and printed output."""
+    """The options that apply to each team: its order (None: not given), how its files are read, and what is printed."""
 
     order: str | Path | None
     dialect: str | None
@@ -196,10 +196,10 @@ class TeamRequest:
 
 
 def channel_for(channel: str | Path | None) -> ChannelModel | None:
-    """Return the channel model of a name or a file.
+    """Return the channel model with a name or in a file.
 
     Raises:
-        InvalidInputError: the file is not a valid channel model.
+        InvalidInputError: if the file is not a valid channel model.
     """
     if channel is None:
         return None
@@ -209,7 +209,7 @@ def channel_for(channel: str | Path | None) -> ChannelModel | None:
 
 
 def protocol_settings(given: Iterable[str]) -> dict[str, str]:
-    """Parse words `NAME=VALUE`; of several values for a name, the last counts."""
+    """Parse words `NAME=VALUE`. If a name is repeated, the last value counts."""
     found = {}
     for word in given:
         name, equals, value = word.partition("=")
@@ -225,12 +225,12 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
     """Make the options of a run from the arguments of `robochoc solve`.
 
     Args:
-        arguments: the command's arguments; those that are used are removed, except protocol and order.
-        environment: whether the robots' situation changes the problem.
+        arguments: The command's arguments. Those that are used are removed, except the protocol and the order.
+        environment: Whether the robots' situation changes the problem.
 
     Raises:
-        click.UsageError: for options that cannot be combined (`robochoc.run.compatibility.option_rules`).
-        Failure: for a channel that cannot be read.
+        click.UsageError: if options cannot be combined (`robochoc.run.compatibility.option_rules`).
+        Failure: if a channel model cannot be read.
     """
     from robochoc.run.compatibility.option_rules import refuse_options
     from robochoc.solver.errors import UnsupportedError
@@ -253,7 +253,7 @@ def _pop_options(arguments: dict[str, Any]) -> Options:
         channel = channel_for(arguments.pop("channel"))
     return Options(
         protocol=arguments["protocol"],
-        order=() if arguments["order"] not in {None, GIVEN} else None,  # made for each team later
+        order=() if arguments["order"] not in {None, GIVEN} else None,  # determined for each team later
         local=limits(
             arguments.pop("local_solutions"), arguments.pop("local_timeout"), always_ace=arguments.pop("always_ace")
         ),
@@ -265,7 +265,7 @@ def _pop_options(arguments: dict[str, Any]) -> Options:
 
 
 def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, teams: int) -> None:
-    """Raise `click.UsageError` for outputs that would be empty, or that are possible for one team only."""
+    """Raise `click.UsageError` for outputs that would be empty, or that are only possible for a single team."""
     if request.explain and request.as_json:
         raise click.UsageError(
             "--explain cannot be used with --json: the JSON result always includes the choice and the tree"

@@ -50,7 +50,7 @@ class Number(click.FloatRange):
 
 
 class ProtocolName(click.ParamType[str]):
-    """The name of an installed protocol, in any case. The run rejects other words, with a hint."""
+    """The name of an installed protocol, in upper or lower case. The run rejects other words with a hint."""
 
     name = "protocol"
 
@@ -69,10 +69,10 @@ class ProtocolName(click.ParamType[str]):
 
 
 class NameOrFile(click.Path):
-    """One of `names`, or the path of an existing file.
+    """One of several `names`, or the path of an existing file.
 
     Args:
-        kind: The word for such a name in messages: `order`.
+        kind: The word for these names in messages, such as `order`.
         names: The names.
         other_spellings: Further spellings of some names.
     """
@@ -84,7 +84,7 @@ class NameOrFile(click.Path):
         self._other_spellings = other_spellings or {}
 
     def convert(self, value: PathLike, param: click.Parameter | None, ctx: click.Context | None) -> str | Path:
-        """Return the name or the path. Any other word is wrong usage."""
+        """Return the name or the path. Any other word is a usage error."""
         word = os.fsdecode(value)
         name = self._other_spellings.get(word, word)
         if name in self._names:
@@ -98,7 +98,7 @@ class NameOrFile(click.Path):
         return Path(word)
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Return the names that begin with `incomplete`; files if there are none."""
+        """Return the names that begin with `incomplete`, or files if there are none."""
         return _beginning_with(incomplete, self._names) or super().shell_complete(ctx, param, incomplete)
 
 

@@ -1,4 +1,4 @@
-"""The output of commands: tables for people, JSON for programs.
+"""The output of commands: tables for people, and JSON for programs.
 
-The report of a command is a module of its own if it imports much, so that the command's help does not.
+The report of a command is in a separate module if it imports much, so that the command's help stays fast.
 """

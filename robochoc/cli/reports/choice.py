@@ -1,4 +1,4 @@
-"""The reasons for a choice of protocol and order (`robochoc solve --explain`), and a note on order in slow runs."""
+"""The reasons for choosing a protocol and order (`robochoc solve --explain`), and a note on orders in slow runs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
     from robochoc.run.options import Options
 
 LONG_S = 5.0
-"""Seconds of a search after which the note on a faster order is printed."""
+"""The seconds of search after which the note on a faster order is printed."""
 
 
 def choice_lines(choice: ProtocolChoice) -> Iterator[str]:
-    """Yield the facts about the team and the reasons against other protocols; nothing if the user named a protocol."""
+    """Yield the facts about the team and the reasons against other protocols; empty if the user chose the protocol."""
     if choice.facts:
         yield f"  the team: {'; '.join(choice.facts)}"
     for name, why in choice.rejected:
@@ -40,7 +40,7 @@ def _rule_lines(rule: Rule) -> Iterator[str]:
 
 
 class OrderNote:
-    """A note on standard error, printed once in a slow run: another order is usually faster than that of the files."""
+    """A note on standard error, printed once in a slow run: another order is usually faster than the files' order."""
 
     def __init__(self, team: Team, options: Options) -> None:
         self._team, self._options = team, options
@@ -59,7 +59,7 @@ class OrderNote:
         return observe
 
     def print_if_slow(self, elapsed_s: float) -> None:
-        """Print the note if the search has been slow and the note is not printed yet."""
+        """Print the note if the search is slow and the note has not been printed yet."""
         if self._printed or elapsed_s < LONG_S:
             return
         self._printed = True

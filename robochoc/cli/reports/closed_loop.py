@@ -1,4 +1,4 @@
-"""The report of a closed loop: published decisions, unusable reports of robots, and the simulated flight."""
+"""The report of a closed loop: published decisions, unusable reports from robots, and the simulated flight."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def publication_lines(loop: ClosedLoop) -> list[str]:
-    """Return a line for each sink, and the notes on reports that could not be used."""
+    """Return a line for each sink, and notes on reports that could not be used."""
     return [*(f"{publisher.place}: {publisher.summary}" for publisher in loop.publishers), *loop.notes]
 
 
@@ -29,11 +29,11 @@ class FlownMission(NamedTuple):
 
 
 def report_flight(loop: ClosedLoop, failures: Sequence[tuple[str, float]], *, quiet: bool) -> FlownMission:
-    """Print and return the simulated flight.
+    """Print and return the result of the simulated flight.
 
     Args:
-        loop: The closed loop of a simulated flight.
-        failures: The drones of --fail, with the seconds at which they fail.
+        loop: The closed loop with a simulated flight.
+        failures: The drones given by --fail, with the times in seconds at which they fail.
         quiet: Whether to print nothing.
     """
     from robochoc.cli.reports.flight import as_planned, flight_summary, late_failures
@@ -46,12 +46,12 @@ def report_flight(loop: ClosedLoop, failures: Sequence[tuple[str, float]], *, qu
         click.echo(flight_summary(flown))
         for line in late_failures(failures, flown):
             click.echo(line, err=True)
-    # A drone that fell has left the team: that alone is not a failure.
+    # A drone that fell has left the team, which alone is not a failure.
     return FlownMission(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
 
 
 def _simulated_flight(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
-    """Return the mission and the log of the simulated flight; None if nothing was flown."""
+    """Return the mission and the log of the simulated flight, or None if nothing was flown."""
     from robochoc.robots.simulated_feedback import SimulatedFeedback
 
     flown = loop.feedback.log() if isinstance(loop.feedback, SimulatedFeedback) else None

@@ -20,7 +20,7 @@ CompileResult = Compilation | TooManySolutionsError | CompileTimeoutError
 
 
 def sizes_json(team: Team, results: Sequence[CompileResult], seconds: float) -> bytes:
-    """Return one JSON object. A robot that reached a limit has a `reason`, and null for unknown values."""
+    """Return one JSON object. The entry of a robot that reached a limit has a `reason`, and null for unknown values."""
     rows = [_row(team, result) for result in results]
     return msgspec.json.encode({"team": encodable(team.name), "seconds": round(seconds, 6), "robots": rows})
 
@@ -40,7 +40,7 @@ def print_sizes(team: Team, results: Sequence[CompileResult], seconds: float, fo
 
 
 def _row(team: Team, result: CompileResult) -> dict[str, Any]:
-    """Return a robot's entry. `seconds` includes the start of ACE for the first robot that needs it."""
+    """Return the entry for a robot. `seconds` includes the start of ACE for the first robot that needs ACE."""
     robot = team[result.robot]
     row: dict[str, Any] = {
         "robot": encodable(robot.name),

@@ -1,4 +1,4 @@
-"""Studies on the terminal: their plan, progress and results."""
+"""Prints studies on the terminal: their plan, progress and results."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _MINUTE_S, _HOUR_S = 60, 3600
 
 @contextmanager
 def progress_of(name: str) -> Iterator[Callable[[StudyProgress], None] | None]:
-    """Give a function that shows the progress of a study on the last line of a terminal; None elsewhere."""
+    """Provide a function that shows the progress of a study on the last line of a terminal, or None elsewhere."""
     from robochoc.communication.search_result import Progress
 
     with progress_line(name) as show:
@@ -43,7 +43,7 @@ def progress_of(name: str) -> Iterator[Callable[[StudyProgress], None] | None]:
 
 
 def duration(seconds: float) -> str:
-    """Return a time in seconds, minutes or hours, depending on its length."""
+    """Return a duration as text in seconds, minutes or hours."""
     if seconds < _MINUTE_S:
         return f"{seconds:.0f} s"
     if seconds < _HOUR_S:
@@ -52,12 +52,12 @@ def duration(seconds: float) -> str:
 
 
 def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[str]:
-    """Yield the number of planned runs, of existing results, and the estimated time of the missing runs.
+    """Yield lines with the numbers of planned and existing runs, and the estimated time for the missing runs.
 
     Args:
         study: The study.
-        path: The file of its results, which need not exist.
-        again: The statuses of ended runs that are to be repeated, besides those that always are.
+        path: The file with the results, which need not exist.
+        again: The statuses of runs to repeat, in addition to those that are always repeated.
     """
     from robochoc.experiments.plan import TooManyRunsError, plan_of
     from robochoc.experiments.results import finished_keys, read
@@ -79,7 +79,7 @@ def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[
 
 
 def _estimate(missing: Sequence[Any], rows: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the time of the missing runs, estimated from the times of existing ones; empty if there are none."""
+    """Return the time for the missing runs, estimated from the existing ones; empty if there are none."""
     took: dict[str, list[float]] = {}
     for row in rows.values():
         took.setdefault(row["label"], []).append(row["total_s"])
@@ -92,13 +92,13 @@ def _estimate(missing: Sequence[Any], rows: Mapping[str, Mapping[str, Any]]) -> 
 
 
 def ended_line(name: str, ended: Counter[str]) -> str:
-    """Return the number of runs of a study with each status."""
+    """Return the number of runs with each status in a study."""
     counts = ", ".join(f"{count:,} {status}" for status, count in ended.most_common())
     return f"{on_one_line(name)}: {sum(ended.values()):,} runs: {counts}"
 
 
 def print_summary(results: Results, over: str | None, metrics: Sequence[str]) -> None:
-    """Print the progress of a study, medians of its metrics, and the statuses of its runs."""
+    """Print the progress of a study, the medians of its metrics, and the statuses of its runs."""
     rows, count = results.rows, results.planned
     there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
     click.echo(f"{on_one_line(results.title)}: {there}")
@@ -110,7 +110,7 @@ def print_summary(results: Results, over: str | None, metrics: Sequence[str]) ->
 
 
 def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> None:
-    """Print medians, the statuses of runs, and the ranking. The defaults are those in the study's `[report]`."""
+    """Print medians, the statuses of runs, and the ranking. The defaults are given by the study's `[report]`."""
     from robochoc.experiments import summary
     from robochoc.experiments.study import report_settings
 
@@ -138,7 +138,7 @@ def _print_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
 
 
 def _print_answers(rows: Rows, metrics: Sequence[str]) -> None:
-    """Print the best way to run for each metric, and the ways to run with equal results."""
+    """Print the best way to run by each metric, and the ways to run with equal results."""
     from robochoc.experiments import ranking
 
     for line in ["", *ranking.answers(rows, metrics)]:
@@ -146,7 +146,7 @@ def _print_answers(rows: Rows, metrics: Sequence[str]) -> None:
 
 
 def _print_endings(rows: Rows) -> None:
-    """Print the statuses and verdicts of runs, for each way to run."""
+    """Print the statuses and verdicts of runs for each way to run."""
     from robochoc.experiments.summary import endings
 
     click.echo("\nhow runs ended")

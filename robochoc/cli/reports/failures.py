@@ -20,21 +20,21 @@ R = TypeVar("R")
 
 
 class Failure(RobochocError, click.ClickException):  # noqa: N818 - it ends a command, as click's do
-    """An error that ends the command with `status`; its message is printed on standard error without a prefix."""
+    """An error that ends the command with `status`. Its message is printed on standard error without a prefix."""
 
     def __init__(self, status: int, message: str) -> None:
         super().__init__(message)
         self.exit_code = status  # type: ignore[misc]  # click reads it off instances
 
     def show(self, file: IO[Any] | None = None) -> None:  # noqa: ARG002 - click's signature
-        """Print the message, line by line. Unprintable characters are escaped: it may quote untrusted input."""
+        """Print the message line by line. Unprintable characters are escaped, since it may quote untrusted input."""
         from robochoc.system.plain_text import on_one_line
 
         click.echo("\n".join(map(on_one_line, self.message.split("\n"))), err=True)
 
 
 def invalid_input_fails(command: Callable[P, R]) -> Callable[P, R]:
-    """Make `command` end with the diagnostics and status 1 if its input is invalid."""
+    """Make `command` end with diagnostics and status 1 if its input is invalid."""
 
     @wraps(command)
     def guarded(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -56,7 +56,7 @@ def worst(statuses: Iterable[int]) -> int:
 
 @contextmanager
 def errors_as_failures(place: object) -> Iterator[None]:
-    """Turn each foreseen error of the work on `place` into a `Failure` with a message of one line."""
+    """Convert each foreseen error while working on `place` to a `Failure` with a message of one line."""
     try:
         yield
     except Exception as error:
@@ -69,7 +69,7 @@ def errors_as_failures(place: object) -> Iterator[None]:
 
 
 def _status(error: Exception) -> int | None:
-    """Return the exit status of `error`; None for an unforeseen error."""
+    """Return the exit status for `error`, or None for an unforeseen error."""
     from robochoc.communication.search_result import RobotsLostError
     from robochoc.formats import InvalidInputError
     from robochoc.run.registry import UnknownProtocolError

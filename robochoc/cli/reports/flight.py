@@ -1,4 +1,4 @@
-"""The report of `robochoc fly` on a flight, as a table and as JSON."""
+"""The report of `robochoc fly` about a flight, as a table and as JSON."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 
 ARRIVED_M = 0.1
-"""A drone this near to its goal has arrived: in calm air it ends within a millimetre, in gusts within centimetres."""
+"""A drone closer to its goal has arrived. In calm air it ends within a millimetre, in gusts within centimetres."""
 _MOST_NAMES = 6
 
 
 def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
-    """Return whether all drones have arrived, kept the set distance, and none has fallen (unless `may_fall`)."""
+    """Return whether all drones arrived and kept the required distance, and none fell (unless `may_fall`)."""
     apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
     walls = flown.nearest_wall
     apart = apart and (walls is None or walls.distance_m >= walls.set_m)
@@ -34,14 +34,14 @@ def flight_report(mission: Mission, flown: FlightLog) -> str:
 
 
 def flight_summary(flown: FlightLog) -> str:
-    """Return a text on the flight: events, arrivals, the smallest distance, and the speed of the simulation."""
+    """Return a text about the flight: events, arrivals, the smallest distance, and the speed of the simulation."""
     lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.events]
     lines += [_arrival(flown), _separation(flown), *_wall_distance(flown), _speed(flown)]
     return "\n".join(f"  {line}" for line in lines)
 
 
 def late_failures(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
-    """Return a line for each of the requested `failures` that would be after the end of the flight."""
+    """Return a line for each of the requested `failures` whose time is after the end of the flight."""
     return [
         f"--fail {on_one_line(name)}@{at_s:g}: the flight ended earlier, after {flown.simulated_s:.1f} s"
         for name, at_s in failures
@@ -121,7 +121,7 @@ def _speed(flown: FlightLog) -> str:
 
 
 def _rate(seconds: float, wall_s: float) -> str:
-    """Return the speed of the simulation relative to real time; empty if either took no time."""
+    """Return the speed of the simulation relative to real time; empty if one of them took no time."""
     if seconds <= 0 or wall_s <= 0:
         return ""
     if seconds >= wall_s:
@@ -148,7 +148,7 @@ def _names(flown: FlightLog, numbers: Sequence[int]) -> str:
 
 
 def flight_json(mission: Mission, flown: FlightLog) -> bytes:
-    """Return the report as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
+    """Return the report as one line of JSON: lengths in metres, times in seconds, and null for a drone that fell."""
     ends = flown.positions[-1] if len(flown.positions) else ()
     legs = zip(mission.legs, flown.legs, strict=True)
     report = {

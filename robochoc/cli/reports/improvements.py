@@ -1,4 +1,4 @@
-"""`--improve`: publish each better answer, and print it on standard error, while the search continues."""
+"""The option `--improve`: publishes each better answer, and prints it on standard error, while the search continues."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 
 
 class ImprovementReporter:
-    """The audience of a run (`robochoc.run.improvement.Audience`), which prints a line for each answer unless `quiet`.
+    """The audience of a run (`robochoc.run.improvement.Audience`). Prints a line for each answer unless `quiet`.
 
-    Better answers are published by the closed `loop`, if there is one.
+    If there is a closed `loop`, it publishes better answers.
     """
 
     def __init__(self, loop: ClosedLoop | None, *, quiet: bool) -> None:
@@ -27,7 +27,7 @@ class ImprovementReporter:
         self._epochs: list[EpochOutcome] = []
 
     def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        """Publish an answer, and print its time and its cost."""
+        """Publish an answer, and print its time and cost."""
         if len(epoch.improvements) > 1:
             epoch = replace(epoch, opened_by="a better decision")
         self._epochs.append(epoch)
@@ -37,11 +37,11 @@ class ImprovementReporter:
             print_above(self._line(team, epoch))
 
     def has_news(self, team: Team) -> bool:
-        """Return whether robots have reported a change of the problem."""
+        """Return whether robots have reported a change in the problem."""
         return self._loop is not None and self._loop.has_news(team)
 
     def mission(self, outcome: Outcome, team: Team) -> Mission | None:
-        """Return the mission through all answers, one after the other; None for a single answer or several epochs."""
+        """Return the mission through all answers in order, or None if there is a single answer or several epochs."""
         if len(self._epochs) <= 1 or outcome.epochs:
             return None
         from robochoc.flight.mission import mission_of

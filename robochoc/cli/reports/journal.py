@@ -1,4 +1,4 @@
-"""The report of `robochoc journal show` on a journal."""
+"""The report of `robochoc journal show` about a journal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _WIDTH = 10
 
 
 def journal_report(trace: Trace) -> Iterator[str]:
-    """Yield lines of text. Unprintable characters are escaped: names in a journal are untrusted input."""
+    """Yield lines of text. Unprintable characters are escaped, since names in a journal are untrusted input."""
     for heading, text in _facts(trace):
         yield on_one_line(f"{heading:<{_WIDTH}} {text}")
 

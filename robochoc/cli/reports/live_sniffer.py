@@ -1,4 +1,4 @@
-"""`robochoc solve --sniff`: a page that shows a run live, in its own process, from the run's journal."""
+"""The option `robochoc solve --sniff`: a page in a separate process shows a run live, from the run's journal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from robochoc.sniffer.viewer import Viewer
 
 _BROWSER_S = 8.0
-"""The longest time that a run waits for the browser of --open, in seconds."""
+"""The maximum time in seconds that a run waits for the browser opened by --open."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def sniffer_request(chosen: str | None, *, open_browser: bool) -> SnifferRequest
 
 
 def check_patterns(request: SnifferRequest | None, team: Team) -> None:
-    """Raise `click.UsageError` if a pattern of --sniff matches no robot of `team` or of its scenario."""
+    """Raise `click.UsageError` if a pattern of --sniff matches no robot in `team` or in its scenario."""
     if request is None or not request.chosen:
         return
     from robochoc.flight.mission import all_robots
@@ -57,7 +57,7 @@ def check_patterns(request: SnifferRequest | None, team: Team) -> None:
 
 
 class LiveSniffer:
-    """A context manager with the viewer of one run, if one is requested. On exit, the viewer ends."""
+    """A context manager with the viewer for one run, if requested. On exit, the viewer is ended."""
 
     def __init__(self, request: SnifferRequest | None) -> None:
         self._request = request
@@ -73,10 +73,10 @@ class LiveSniffer:
         self._stack.close()
 
     def start(self) -> list[Callable[[bytes], object]]:
-        """Start the viewer, and return the functions that write the journal's blocks for it; none without a viewer.
+        """Start the viewer, and return the functions that write the journal's blocks for it; empty without a viewer.
 
-        The blocks are written to an unnamed file, which disappears with the program. The viewer's URL is printed, and a
-        browser is opened if requested.
+        The blocks are written to an unnamed file, which disappears when the program ends. The viewer's URL is printed,
+        and a browser is opened if requested.
         """
         if self._request is None:
             return []
@@ -94,7 +94,7 @@ class LiveSniffer:
         return [self._write]
 
     def wait(self) -> None:
-        """Keep the page until Ctrl-C, or until its process ends."""
+        """Keep the page open until Ctrl-C, or until the viewer ends."""
         viewer = self._viewer
         if viewer is None:
             return
@@ -110,7 +110,7 @@ class LiveSniffer:
             click.echo("the page is gone: its process has ended", err=True)
 
     def _write(self, block: bytes) -> None:
-        """Write a block. After an error the page lacks the rest, but the run continues."""
+        """Write a block. After an error, the page lacks the following blocks, but the run continues."""
         if self._file is None or self._write_error:
             return
         try:

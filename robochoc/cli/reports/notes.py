@@ -1,4 +1,4 @@
-"""Notes on problems of other tools: changes made by the import, and a cost bound."""
+"""Notes on problems of other tools: the changes made by the import, and a cost bound."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from robochoc.formats.problems import ReadProblem
 
 _SHOWN = 3
-"""The maximum number of notes of one kind that are shown."""
+"""The maximum number of notes shown of each kind."""
 
 
 def note_lines(notes: Iterable[ConversionNote], more: str) -> Iterator[str]:
-    """Yield a line for each note, up to three of one kind.
+    """Yield a line for each note, up to three of each kind.
 
     Args:
         notes: The notes.
-        more: The hint where all notes can be found.
+        more: A hint on where to find all notes.
     """
     from robochoc.formats import on_one_line
 
@@ -35,14 +35,14 @@ def note_lines(notes: Iterable[ConversionNote], more: str) -> Iterator[str]:
 
 
 def difference_lines(notes: Iterable[ConversionNote]) -> Iterator[str]:
-    """Yield a line for each note on a difference between the team and the file."""
+    """Yield a line for each note about a difference between the team and the file."""
     from robochoc.formats.dialects.dialect import OTHER_PROBLEM
 
     return note_lines((note for note in notes if note.kind in OTHER_PROBLEM), "'robochoc import --report' lists them")
 
 
 def bound_warning(problem: ReadProblem, cost: Cost | None) -> str:
-    """Return a warning if a cost reaches the bound in the problem's file, where it is not a solution; else nothing."""
+    """Return a warning if a cost reaches the bound in the problem's file, and so is not a solution; else empty."""
     if problem.bound is None or cost is None:
         return ""
     maximize = problem.team.robots[0].costs.maximize

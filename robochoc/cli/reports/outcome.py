@@ -1,4 +1,4 @@
-"""The outcome of a run, for people."""
+"""The outcome of a run as text."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from robochoc.system.plain_text import counted
 
 WIDTH = 100
 _LARGE = 1 << 16
-"""Bytes: messages from this size on are mentioned."""
+"""The size in bytes from which a message is mentioned."""
 _MOST_DROPPED = 3
-"""The maximum number of dropped constraints in a report."""
+"""The maximum number of dropped constraints listed in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 _ONLY, _NONE = "task", "none"
-"""A robot with at most one task has one variable, whose first value is none (`formats/dialects/tasks`)."""
+"""A robot with at most one task has one variable, whose first value means no task (`formats/dialects/tasks`)."""
 
 
 def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None) -> str:
-    """Return the verdict and its reason, the values, the withdrawn and lost robots, and the metrics, as a few lines.
+    """Return the verdict with its reason, the values, the withdrawn and lost robots, and the metrics, on a few lines.
 
-    Values that are places on the map `ground` of the team are followed by their position in metres.
+    Values that are places on the team's map `ground` are followed by their position in metres.
     """
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = team_after_events(team, outcome.events)
@@ -55,7 +55,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
 
 
 def _dropped(outcome: Outcome) -> list[str]:
-    """Return a line that names the first constraints that were dropped because robots in them are absent."""
+    """Return a line that lists the first constraints dropped because robots in them are absent."""
     dropped = outcome.dropped_constraints
     if not dropped:
         return []
@@ -68,14 +68,14 @@ def _dropped(outcome: Outcome) -> list[str]:
 
 
 def _chosen(outcome: Outcome) -> list[str]:
-    """Return a line with the chosen protocol and order, and the reasons; empty if the user gave both."""
+    """Return a line with the chosen protocol and order, and the reasons; empty if the user chose both."""
     names = {"protocol": outcome.protocol, "order": f"order {outcome.order}"}
     words = [f"{names[part]}, as {why}" for part, why in outcome.chosen.items()]
     return [f"  chosen: {'; '.join(words)}"] if words else []
 
 
 def _preprocessing(outcome: Outcome) -> list[str]:
-    """Return a line on the preprocessing, if there was any."""
+    """Return a line about the preprocessing, if there was any."""
     done = outcome.preprocessing
     if done is None:
         return []
@@ -83,7 +83,7 @@ def _preprocessing(outcome: Outcome) -> list[str]:
 
 
 def _epochs(outcome: Outcome) -> list[str]:
-    """Return a table of the epochs, with the event that opened each, and its verdict."""
+    """Return a table of the epochs, with the event that started each epoch, and the verdict."""
     if not outcome.epochs:
         return []
     counts = ("seconds",) if outcome.runtime == "central" else ("messages", "NCCCs")
@@ -145,12 +145,12 @@ def _verdict(team: Team, outcome: Outcome) -> str:
 
 
 def _is_unfinished(outcome: Outcome) -> bool:
-    """Return whether the run stopped at a solution, which was checked, because a message was lost."""
+    """Return whether the run stopped at a checked solution because a message was lost."""
     return outcome.verified and outcome.reason is not None and outcome.metrics.lost_messages > 0
 
 
 def _counted(count: int, outcome: Outcome) -> str:
-    """Return the number of solutions, or optima, which may have any number of digits."""
+    """Return the number of solutions or optima, which may have any number of digits."""
     if outcome.verdict == Verdict.SOLUTION:
         return f"{Decimal(count):,} solution{'s' * (count != 1)}"
     return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"
@@ -165,7 +165,7 @@ def _confirmed(outcome: Outcome) -> str:
 
 
 def _checked(outcome: Outcome) -> str:
-    """Return how the constraints were checked. On several machines, some may be checked by their owner only."""
+    """Return how the constraints were checked. On several machines, some may only be checked by their owner."""
     if not outcome.verified:
         return f"not checked: {outcome.reason}"
     if outcome.checked is None or not outcome.checked.by_owner:
@@ -175,7 +175,7 @@ def _checked(outcome: Outcome) -> str:
 
 
 def _trusted(team: Team, outcome: Outcome) -> str:
-    """Return the claim that could not be checked, and rests on the reports of all robots."""
+    """Return the claim that could not be checked, and depends on the reports of all robots."""
     if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
     what = "the minimum withdrawal" if outcome.withdrawn_alive else f"the {_best(team)} cost"
@@ -192,7 +192,7 @@ def _not_proven(team: Team, outcome: Outcome) -> str:
 
 
 def _by_the_deadline(outcome: Outcome) -> str:
-    """Return the time of the answer, if the deadline ended the search."""
+    """Return the time of the answer, if the search was ended by the deadline."""
     if outcome.deadline is None:
         return ""
     by = f" by the deadline of {outcome.deadline:g} s"
@@ -201,7 +201,7 @@ def _by_the_deadline(outcome: Outcome) -> str:
 
 
 def _maximizes(team: Team) -> bool:
-    """Return whether the team's costs are utilities; of a normalised team, whether they were."""
+    """Return whether the team's costs are utilities, or were utilities before the team was normalised."""
     return any(robot.costs.maximize or robot.user_units.maximize for robot in team.robots)
 
 
@@ -210,12 +210,12 @@ def _best(team: Team) -> str:
 
 
 def _side(team: Team) -> str:
-    """Return whether bounds of the cost are upper or lower bounds."""
+    """Return whether bounds on the cost are upper or lower bounds."""
     return "upper" if _maximizes(team) else "lower"
 
 
 def _weight(team: Team, outcome: Outcome) -> str:
-    """Return the weight of the withdrawn robots, if robots differ in weight."""
+    """Return the weight of the withdrawn robots, if the robots have different weights."""
     if all(robot.weight == 1 for robot in team.robots):
         return ""
     return f" (weight {sum(team[name].weight for name in outcome.withdrawn_alive)})"
@@ -226,7 +226,7 @@ def _number(cost: Cost | None) -> str:
 
 
 def _so_far(team: Team, outcome: Outcome) -> str:
-    """Return the incumbent and the lower bound when a limit is reached."""
+    """Return the incumbent and the lower bound at the time when a limit was reached."""
     bound = outcome.bound
     if outcome.withdrawn_alive:
         lower = f" (lower bound {_number(bound)})" if bound else ""
@@ -275,7 +275,7 @@ def _largest(spent: Metrics) -> str:
 
 
 def _local(spent: Metrics) -> str:
-    """Return the time and memory of local problems, if there were any."""
+    """Return the time and memory needed for local problems, if there were any."""
     if not spent.compile_s:
         return ""
     memory = f", {spent.memory / 2**20:.1f} MiB in the largest process" if spent.memory else ""
@@ -291,19 +291,19 @@ def _simulated(outcome: Outcome) -> str:
 
 
 def _values(team: Team, assignment: Mapping[str, int | str], places: Mapping[str, Place]) -> list[str]:
-    """Return a table of tasks, a board, or a list of the values, with their places if these are known."""
+    """Return a table of tasks, a board, or a list of values, with their positions if these are known."""
     if places:
         return _list(team, {name: f"{value}{_at(places.get(name))}" for name, value in assignment.items()})
     return task_table(team, assignment) or _board(team, assignment) or _list(team, assignment)
 
 
 def _at(place: Place | None) -> str:
-    """Return the suffix of a value that is a place: its position in metres, in the form of the maps' options."""
+    """Return the suffix for a value that is a place: its position in metres, in the form of the options for maps."""
     return f" ({','.join(f'{part:.10g}' for part in place)} m)" if place else ""
 
 
 def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
-    """Return a board, if variables are named after cells (`V3.1`) and it is not too wide."""
+    """Return a board, if variables are named after its cells (`V3.1`) and it is not too wide."""
     cells = {}
     for name in team.variables:
         match = _CELL.fullmatch(name)
@@ -347,7 +347,7 @@ def task_table(team: Team, values: Mapping[str, int | str]) -> list[str]:
 
 
 def _tasks_of(robot: Robot) -> dict[str, tuple[str, int | str]]:
-    """Return the variable and the value by which `robot` does each task; empty if the robot has other variables."""
+    """Return the variable and the value by which `robot` does each task; empty if the robot has any other variable."""
     first = f"{robot.name}."
     if [one.name for one in robot.variables] == [first + _ONLY]:
         only = robot.variables[0]
@@ -378,7 +378,7 @@ def _listed(team: Team, outcome: Outcome, places: MapPlaces) -> list[str]:
 
 
 def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:
-    """Return words in columns, as many as fit."""
+    """Return words arranged in as many columns as fit."""
     width = 2 + max(len(word) for word in words)
     per_line = max(1, WIDTH // width)
     return [

@@ -22,7 +22,7 @@ _MEASURE_TEXTS = {
 
 
 def print_privacy(report: PrivacyReport, measure: Measure) -> None:
-    """Print the mean losses of each robot, and those of the system by all measures."""
+    """Print the mean losses of each robot, and the system's losses by all measures."""
     of = f", run {report.run} of {report.runs}" if report.runs > 1 else ""
     click.echo(on_one_line(f"{report.team}: {report.protocol}{of}, {counted(len(report.robots), 'robot')}"))
     kinds = report.kinds()
@@ -52,7 +52,7 @@ def _notes(report: PrivacyReport) -> Iterator[str]:
 
 
 def privacy_json(report: PrivacyReport) -> str:
-    """Return the report as one JSON object; an unknown loss is null."""
+    """Return the report as one JSON object, in which an unknown loss is null."""
     fields: dict[str, object] = {
         "team": report.team,
         "protocol": report.protocol,

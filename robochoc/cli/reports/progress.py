@@ -1,4 +1,4 @@
-"""Progress of a run: one line on a terminal, nothing elsewhere."""
+"""Shows the progress of a run: one line on a terminal, nothing elsewhere."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ if TYPE_CHECKING:
 REFRESH_S = 0.1
 TICK_S = 0.5
 _ERASE = "\r\x1b[K"
-"""Go to the start of the line, and erase it (ECMA-48)."""
+"""Moves to the start of the line and erases it (ECMA-48)."""
 
 
 def waiting_for_reports(show: Callable[[Progress], None]) -> Callable[[], None]:
-    """Return a function that shows the elapsed time while no robot reports."""
+    """Return a function that shows the elapsed time until robots report."""
     from robochoc.communication.search_result import Progress
 
     began = time.monotonic()
@@ -32,9 +32,9 @@ def waiting_for_reports(show: Callable[[Progress], None]) -> Callable[[], None]:
 
 @contextmanager
 def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
-    """Give a function that shows the progress of a run on the last line of a terminal; None without a terminal.
+    """Provide a function that shows the progress of a run on the last line of a terminal, or None without a terminal.
 
-    Only calls refresh the line, not a background thread: a run forks processes, which must not happen beside threads.
+    The line is only refreshed by calls, not by a thread: a run forks processes, which must not happen beside threads.
     """
     if not _is_terminal():
         yield None
@@ -60,7 +60,7 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
 
 @contextmanager
 def elapsed_time(what: str, stage: str) -> Iterator[None]:
-    """Show the elapsed time of the block on a terminal, for work that reports no progress and forks no process."""
+    """Show the elapsed time of the block on a terminal, for work that reports no progress and forks no processes."""
     from robochoc.communication.search_result import Progress
 
     with progress_line(what) as show:
@@ -83,7 +83,7 @@ def elapsed_time(what: str, stage: str) -> Iterator[None]:
 
 
 def print_above(line: str) -> None:
-    """Print `line` on standard error, above a progress line if there is one."""
+    """Print `line` on standard error, above the progress line if there is one."""
     click.echo(f"{_ERASE}{line}" if _is_terminal() else line, err=True)
 
 
@@ -93,7 +93,7 @@ def _is_terminal() -> bool:
 
 @contextmanager
 def stages(team: str) -> Iterator[Callable[[str], None] | None]:
-    """Give a function like that of `progress_line`, for work with named stages instead of messages."""
+    """Provide a function like `progress_line`, for work with named stages instead of messages."""
     from robochoc.communication.search_result import Progress
 
     began = time.monotonic()

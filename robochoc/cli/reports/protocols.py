@@ -1,4 +1,4 @@
-"""The report of `robochoc protocols`: the installed protocols, as a table, as text and as JSON."""
+"""The report of `robochoc protocols`: the installed protocols as a table, as text, or as JSON."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from robochoc.solver import central
 from robochoc.system.compiled_core import docstring
 
 _KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
-"""Traits with another key in `--json`: their name in the first version."""
+"""Traits whose key in `--json` is their name in the first version."""
 
 
 @dataclass(frozen=True)
@@ -43,12 +43,12 @@ class ProtocolRow:
 
     @property
     def purposes(self) -> tuple[str, ...]:
-        """Return the purposes that the protocol's traits imply; none for a broken one."""
+        """Return the purposes implied by the protocol's traits; empty if the protocol is broken."""
         return purposes_of(self.traits) if self.traits else ()
 
 
 def rows() -> list[ProtocolRow]:
-    """Return all protocols that `robochoc solve --protocol` accepts, and the broken ones with their error."""
+    """Return all protocols that `robochoc solve --protocol` accepts, and the broken protocols with their errors."""
     return [*map(_row, installed_protocols()), _central_solver()]
 
 
@@ -59,7 +59,7 @@ def protocols_json(found: Sequence[ProtocolRow], *, explain: bool = False) -> by
 
 
 def print_protocols(found: Sequence[ProtocolRow], *, long: bool = False) -> None:
-    """Print name, purpose, completeness and use of each protocol, or with `long` all traits; then broken protocols."""
+    """Print each protocol's name, purpose, completeness and use (`long`: all traits), then the broken protocols."""
     headings = ["name", "for", "complete", "use when"]
     if long:
         headings = [
@@ -92,7 +92,7 @@ def print_purposes(found: Sequence[ProtocolRow]) -> None:
 
 
 def protocol_text(row: ProtocolRow) -> str:
-    """Return the protocol's traits, its module, its parameters and its docstring without the examples."""
+    """Return the protocol's traits, module, parameters, and docstring without examples."""
     head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
     place = f"{row.place}, from the package {row.package}"
     about = _docstring(row).partition("\n>>> ")[0].rstrip()
@@ -143,7 +143,7 @@ def _row(offer: InstalledProtocol) -> ProtocolRow:
 
 
 def _central_solver() -> ProtocolRow:
-    """Return the row of the central solver, with the traits of an equivalent protocol."""
+    """Return the row for the central solver, with the traits of an equivalent protocol."""
     traits = Traits(
         paper="not a protocol: ACE solves all files merged",
         costs=True,

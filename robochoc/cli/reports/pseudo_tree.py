@@ -1,4 +1,4 @@
-"""The pseudo-tree that the robots have built, for people (`robochoc solve --explain`)."""
+"""The pseudo-tree built by the robots, as text (`robochoc solve --explain`)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from robochoc.run.registry import protocol_named
 
 
 def tree_text(outcome: Outcome) -> str:
-    """Return the tree, one robot per line, with its depth and induced width; or a note that there is none.
+    """Return the tree, one robot per line, with its depth and induced width, or a note that there is no tree.
 
-    A run may end while robots still build the tree. Then some robots have a parent but there is no root: roots are the
-    last to complete.
+    If a run ends while robots are still building the tree, some robots have a parent but there is no root, since roots
+    are the last to complete.
     """
     nodes = outcome.tree
     if not nodes and (outcome.verdict != Verdict.UNKNOWN or not _builds_tree(outcome.protocol)):
@@ -55,7 +55,7 @@ def _from_the_roots(below: Mapping[str | None, list[str]]) -> list[str]:
 
 
 def _depth(nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> int:
-    """Return the number of edges from a root to the deepest leaf."""
+    """Return the number of edges between a root and the deepest leaf."""
     depths: dict[str | None, int] = {None: -1}
     for name in _from_the_roots(below):
         depths[name] = depths[nodes[name].parent] + 1
@@ -63,7 +63,7 @@ def _depth(nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[
 
 
 def _width(nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> int:
-    """Return the size of the largest separator (Dechter 2003, 4.1): the robots above that share constraints with it."""
+    """Return the size of the largest separator (Dechter 2003, 4.1): ancestors that share constraints with a subtree."""
     separators: dict[str, set[str]] = {}
     for name in reversed(_from_the_roots(below)):
         above = {name for name in (nodes[name].parent, *nodes[name].pseudo_parents) if name is not None}
@@ -72,7 +72,7 @@ def _width(nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[
 
 
 def _drawn(root: str, nodes: Mapping[str, PseudoTreeNode], below: Mapping[str | None, list[str]]) -> Iterator[str]:
-    """Yield a line per robot, parents first. Trees may be as deep as teams are large, so nothing is recursive."""
+    """Yield a line per robot, parents first. There is no recursion, since trees may be as deep as teams are large."""
     waiting = [(root, "", "")]
     while waiting:
         name, branch, indent = waiting.pop()

@@ -1,4 +1,4 @@
-"""The report of `robochoc replay`: the counts and the first difference, as text and as JSON."""
+"""The report of `robochoc replay`, as text and as JSON: the counts and the first difference."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from robochoc.journal.journal import Journal
 from robochoc.replay import Contradiction, ReplayResult, StepDifference
 
 LONGEST = 400
-"""Characters that are shown of a message's content."""
+"""The maximum number of characters shown from a message's content."""
 MOST = 20
-"""The maximum number of messages of a packet, and of robots that could not be replayed, that are shown."""
+"""The maximum number of messages shown from a packet, and of robots that could not be replayed."""
 
 
 def replay_report(journal: Journal, replayed: ReplayResult) -> str:
@@ -115,7 +115,7 @@ def _difference_lines(difference: StepDifference) -> Iterator[str]:
 
 
 def _contradiction_lines(found: Sequence[Contradiction]) -> Iterator[str]:
-    """Yield lines for each claim of the journal that its steps contradict: what, recorded, replayed."""
+    """Yield lines for each claim in the journal that its steps contradict: claim, recorded and replayed value."""
     for one in found:
         yield f"    {one.what}"
         yield f"      recorded  {_cut(msgspec.json.encode(one.recorded).decode())}"
@@ -123,7 +123,7 @@ def _contradiction_lines(found: Sequence[Contradiction]) -> Iterator[str]:
 
 
 def _differing(recorded: AnyEvent | None, replayed: AnyEvent | None) -> list[str]:
-    """Return the names of the fields, and of a message's content, in which two events of one type differ."""
+    """Return the names of the fields, including those of a message's content, in which two events of a type differ."""
     if recorded is None or type(recorded) is not type(replayed):
         return []
     left, right = _fields(recorded), _fields(replayed)
@@ -137,7 +137,7 @@ def _fields(event: object) -> dict[str, object]:
 
 
 def _event_text(event: AnyEvent | None) -> str:
-    """Return a text on the event of a robot."""
+    """Return a text that describes a robot's event."""
     match event:
         case Sent():
             text = f"sent {event.type} to {event.receiver}: {_content(event.content)}, {event.bytes:,} bytes"

@@ -1,4 +1,4 @@
-"""The 3D scene of `robochoc solve`, `fly` and `animate`, as a file or live."""
+"""The 3D scene for `robochoc solve`, `fly` and `animate`, as a file or live."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def scene_for(
     flown: FlightLog | None = None,
     ground: GroundMap | None = None,
 ) -> Scene:
-    """Return the scene of `outcome`. Without the log of a flight, a flight in calm air is simulated here.
+    """Return the scene of `outcome`. Without the log of a flight, a flight in calm air is simulated.
 
     Args:
         outcome: The outcome.
-        team: The team of the files, before its scenario. Without it, the scene shows names only.
+        team: The team in the files, before its scenario. None: the scene shows only names.
         mission: The mission of `outcome`, if it is already known.
-        flown: The log of the flight of `mission`.
-        ground: A map of the ground, used if `mission` is None.
+        flown: The log of a flight of `mission`.
+        ground: A map of the ground, which is used if `mission` is None.
     """
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.mission import mission_of
@@ -52,7 +52,7 @@ def scene_for(
 
 
 def show_scene(scene: Scene, path: Path | None, *, serve: bool, port: int = 0, quiet: bool = False) -> None:
-    """Write `scene` as a page to `path`, if there is one; then show it live if `serve` is set."""
+    """Write `scene` as a page to `path`, if given, and then show it live if `serve` is set."""
     if path:
         _write_page(scene, path, quiet=quiet)
     if serve:
@@ -70,7 +70,7 @@ def _write_page(scene: Scene, path: Path, *, quiet: bool) -> None:
 
 
 def _serve(scene: Scene, port: int) -> None:
-    """Show `scene` in a browser of this machine until Ctrl-C."""
+    """Show `scene` in a browser on this machine until Ctrl-C."""
     from robochoc.view.live import serve_scene
 
     serve_scene(

@@ -1,4 +1,4 @@
-"""A table with aligned columns, without lines, so that other programs can read it from a pipe, too."""
+"""A table with aligned columns and no lines, so that other programs can also read it from a pipe."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from robochoc.system.plain_text import on_one_line
 
 GAP = "  "
 NARROWEST = 18
-"""Characters: the minimum width of a wrapped column."""
+"""The minimum width of a wrapped column, in characters."""
 
 
 def print_table(
     headings: Sequence[str], rows: Iterable[Sequence[str]], *, right: Collection[str] = (), prose: str = ""
 ) -> None:
-    """Print a table on standard output. On a terminal the headings are bold, and prose is wrapped to its width.
+    """Print a table on standard output. On a terminal, headings are bold, and prose is wrapped to the terminal's width.
 
     Args:
-        headings: One for each column.
-        rows: The cells. Unprintable characters in them are escaped.
-        right: Headings of the columns that are aligned to the right: numbers.
+        headings: The heading of each column.
+        rows: The cells of each row. Unprintable characters are escaped.
+        right: The headings of right-aligned columns, which contain numbers.
         prose: The heading of the column that may be wrapped.
     """
     terminal = sys.stdout.isatty()
@@ -42,7 +42,7 @@ def table_lines(
     prose: str = "",
     width: int | None = None,
 ) -> list[str]:
-    """Return the lines of a table, headings first; `width` is that of a terminal. See `print_table`."""
+    """Return the lines of a table, headings first. `width`: the width of the terminal. See `print_table`."""
     cells = [list(headings), *([on_one_line(cell) for cell in row] for row in rows)]
     widths = [max(map(_width, column)) for column in zip(*cells, strict=True)]
     if prose and width is not None:
@@ -54,7 +54,7 @@ def table_lines(
 
 
 def _lines(row: Sequence[str], widths: Sequence[int], right: Sequence[bool]) -> Iterator[str]:
-    """Yield the lines of one row: several if a cell is wider than its column."""
+    """Yield the lines of one row; there are several if a cell is wider than its column."""
     parts = [[cell] if _width(cell) <= width else wrap(cell, width) for cell, width in zip(row, widths, strict=True)]
     for number in range(max(map(len, parts))):
         line = (part[number] if number < len(part) else "" for part in parts)

@@ -25,21 +25,21 @@ if TYPE_CHECKING:
     from robochoc.generators.maps.map_team import MapChoice
 
 MAX_ROBOTS, MAX_CELLS = 100, 1000
-"""The limits of `generators/maps/map_team.py`, repeated since that module is not imported at the start."""
+"""The limits in `generators/maps/map_team.py`, repeated here because that module is not imported at the start."""
 ON_MAP = ("--radius", "--speed", "--within", "--cell", "--cells")
 """The options in the section on robots and cells."""
 _MAP_PARAMETERS = ("map", "agents", "at", "radius", "speed", "within", "cell", "cells")
 
 
 def measure_option(name: str, text: str, default: float | None = None, unit: str = "M") -> Callable[..., Any]:
-    """Return an option whose value is a length or another measure that is not negative."""
+    """Return an option whose value is a length or another non-negative measure."""
     return click.option(
         name, default=default, show_default=default is not None, type=Number(0), metavar=unit, help=text
     )
 
 
 def map_options(command: Command) -> Command:
-    """Add the options of maps, which `pop_map_choice` evaluates."""
+    """Add the options for maps, which `pop_map_choice` evaluates."""
     for option in reversed(
         (
             click.option(
@@ -79,7 +79,7 @@ def map_options(command: Command) -> Command:
 
 
 def pop_map_choice(options: Options) -> MapChoice:
-    """Remove the options of maps from `options`, and return the choice of map, robots and cells."""
+    """Remove the options for maps from `options`, and return the choice of map, robots and cells."""
     from robochoc.generators.maps.map_team import MapChoice
 
     given = {key: options.pop(key) for key in _MAP_PARAMETERS}

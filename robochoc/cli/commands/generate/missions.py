@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def model_option(name: str, choices: list[str], text: str) -> Callable[..., Any]:
-    """Return an option whose value is one of `choices`, by default the first."""
+    """Return an option whose value is one of `choices`. The first is the default."""
     return click.option(name, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
 
 

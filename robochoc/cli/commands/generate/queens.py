@@ -1,4 +1,4 @@
-"""`robochoc generate queens3d`."""
+"""`robochoc generate queens3d`: the 3D N^2 queens problem."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
 
 MAX_N = 49
-"""The limit of `generators/queens3d.py`, repeated since that module is not imported at the start."""
+"""The limit in `generators/queens3d.py`, repeated here because that module is not imported at the start."""
 
 
 @click.command(short_help="3D N^2 queens: one robot per cell or row of the board.")

@@ -1,4 +1,4 @@
-"""`robochoc generate scenario`."""
+"""`robochoc generate scenario`: adds a random scenario to a team."""
 
 from __future__ import annotations
 
