@@ -17,7 +17,7 @@ T = TypeVar("T")
 
 
 class ErrorText(str):
-    """A sentence with the reason why a query has no result."""
+    """A sentence that explains why a query has no result."""
 
     __slots__ = ()
 

@@ -1,4 +1,4 @@
-"""The first page: examples, a file, an empty map, and the user's own teams."""
+"""The first page: examples, opening a file, an empty map, and the user's own teams."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def _shown_by(key: str, sketch: Sketch) -> str:
 
 
 def show_team(name: str) -> None:
-    """Show the page on which a team is modelled."""
+    """Show the page for modelling a team."""
     ui.navigate.to(f"/team/{name}/model")
 
 
@@ -92,7 +92,7 @@ def _own_card(projects: Projects, name: str) -> None:
 def _confirm_removal(projects: Projects, name: str, title: str) -> None:
     def remove() -> None:
         dialog.close()
-        with suppress(KeyError):  # already removed
+        with suppress(KeyError):  # the team was already removed
             projects.remove(name)
         _own.refresh()
 
@@ -138,7 +138,7 @@ def _thumbnail(sketch: Sketch) -> None:
 
 _LONGEST_NAME = 100
 _MOST_ERRORS = 3
-"""The maximum number of errors of a file that are shown."""
+"""The maximum number of errors shown for a file."""
 
 
 def build_upload_card(projects: Projects, show: Callable[[str], None]) -> None:
@@ -175,18 +175,18 @@ def build_upload_card(projects: Projects, show: Callable[[str], None]) -> None:
             max_file_size=MAX_BYTES,
         ).classes("hidden")
     _accept_only_files(str(upload.props["url"]))
-    # In the browser, since it opens the file dialog only in response to a click.
+    # In the browser, which opens the file dialog only in response to a click.
     card.on("click", js_handler=f"() => getElement({upload.id}).$el.querySelector('input[type=file]').click()")
 
 
 def _accept_only_files(url: str) -> None:
-    """Reject forms without a file at the address of an upload, which NiceGUI does not handle."""
+    """Reject forms without a file at the upload address, which NiceGUI would not handle."""
     route = next(route for route in app.routes if isinstance(route, Route) and route.path == url)
     app.remove_route(url)
 
     @app.post(url)
     async def upload(request: Request) -> dict[str, str]:
-        async with request.form() as form:  # the form is cached: NiceGUI gets the same one
+        async with request.form() as form:  # the form is cached, so NiceGUI receives the same one
             if not form or not all(isinstance(value, UploadFile) for value in form.values()):
                 raise HTTPException(400, say("gallery.no-file"))
             answer: dict[str, str] = await route.endpoint(request)
@@ -194,7 +194,7 @@ def _accept_only_files(url: str) -> None:
 
 
 def _first_errors(mistakes: str) -> str:
-    """Return the first errors, one per line, and the number of the others."""
+    """Return the first errors, one per line, and the number of further errors."""
     lines = mistakes.splitlines() or [say("app.fault")]
     more = len(lines) - _MOST_ERRORS
     first = [on_one_line(line) for line in lines[:_MOST_ERRORS]]

@@ -31,7 +31,7 @@ _BUILD: dict[str, Callable[[Project], None]] = {
     "compare": build_compare,
 }
 _BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_imported_model, "whatif": build_imported_whatif}
-"""Pages of imported teams that differ from the others."""
+"""The pages that are different for imported teams."""
 
 
 def install(projects: Projects) -> None:
@@ -52,7 +52,7 @@ def install(projects: Projects) -> None:
     def team(name: str, area: str) -> None:
         try:
             project = projects.open(name)
-            build = {**_BUILD, **_BUILD_FOREIGN} if project.files else _BUILD  # facts are read
+            build = {**_BUILD, **_BUILD_FOREIGN} if project.files else _BUILD  # this reads the facts
         except (KeyError, ValueError) as missing:
             _missing(damaged=isinstance(missing, ValueError))
             return
@@ -77,7 +77,7 @@ def install(projects: Projects) -> None:
         _missing(damaged=False)
 
 
-def _end_jobs() -> None:  # without a parameter, for which NiceGUI would pass the application
+def _end_jobs() -> None:  # NiceGUI would pass the application to a parameter
     end_all()
 
 

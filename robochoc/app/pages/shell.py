@@ -1,4 +1,4 @@
-"""The frame of all pages: the bar with links, the team's name, undo and redo, and the theme button."""
+"""The frame around all pages: the bar with links, the team's name, undo and redo, and the theme button."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from robochoc.app.sketch.edits import EditError, renamed
 from robochoc.app.texts import say
 
 AREAS = ("model", "decide", "whatif", "fly", "compare")
-"""The pages of a team, in the order in which they are used."""
+"""The pages of a team, in the usual order of use."""
 
 
 class ThemeButton(Element, component="theme.js"):
-    """The button that switches between light and dark. The choice is stored in the browser, for all pages."""
+    """The button that switches between light and dark. The browser stores the choice for all pages."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -29,7 +29,7 @@ class ThemeButton(Element, component="theme.js"):
 
 
 def edit_error_text(error: EditError) -> str:
-    """Return the text of an invalid edit."""
+    """Return the error text for an invalid edit."""
     return say(error.key, **error.named)
 
 
@@ -58,7 +58,7 @@ def shell(title: str, project: Project | None = None, area: str = "") -> Iterato
 
 
 def on_leave(end: Callable[[], None]) -> None:
-    """Call `end` when the browser leaves this page."""
+    """Call `end` when the browser leaves the current page."""
     ui.context.client.on_delete(end)
 
 
@@ -87,7 +87,7 @@ def _name(project: Project) -> None:
 
 
 def _project_error(project: Project) -> None:
-    """Show whether the team was removed in another window or cannot be saved."""
+    """Show whether the team was removed in another window, or cannot be saved."""
     label = ui.label().classes("error").props("role=alert")
 
     def follow() -> None:

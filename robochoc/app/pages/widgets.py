@@ -1,4 +1,4 @@
-"""Small elements that several pages share, and the check of numbers in fields."""
+"""Small elements that several pages share, and validation of numbers in fields."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from robochoc.app.texts import say
 
 
 def bounded_integer(value: object, least: int, most: int, otherwise: int) -> int:
-    """Return the integer in a field, within bounds.
+    """Return the integer in a field, clamped to [least, most].
 
     Args:
         value: The value of the field.
         least: The minimum.
         most: The maximum.
-        otherwise: The result for a value that is not a number.
+        otherwise: The result if the value is not a number.
     """
     if not isinstance(value, (int, float)) or not isfinite(value):
         return otherwise
@@ -30,16 +30,16 @@ def bounded_integer(value: object, least: int, most: int, otherwise: int) -> int
 
 
 class Card(Protocol):
-    """An entry of a list that shows a part of the sketch."""
+    """An entry in a list that shows part of the sketch."""
 
     element: Element
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the card to the current sketch."""
 
 
 class Cards:
-    """A list of cards, one for each key. Cards are reused after changes of the sketch, so no typed text is lost."""
+    """A list of cards, one for each key. Cards are reused when the sketch changes, so typed text is not lost."""
 
     def __init__(self, container: Element, make: Callable[..., Card]) -> None:
         self._container, self._make = container, make
@@ -60,7 +60,7 @@ class Cards:
 
 
 class TroubleLines:
-    """Lines with errors and hints of the element above them, and their remedies."""
+    """Lines with the errors and hints for the element above them, and the remedies."""
 
     def __init__(self) -> None:
         self._box = ui.element("div").classes("troubles").props("role=status")
@@ -82,7 +82,7 @@ class TroubleLines:
 
 
 def line(text: str, classes: str = "") -> ui.label:
-    """Add a text to a line."""
+    """Add a line with a text."""
     return ui.label(text).classes(f"run {classes}")
 
 
@@ -96,14 +96,14 @@ def panel(key: str) -> Iterator[Element]:
 
 
 def icon_button(icon: str, says: str, does: Callable[[], object]) -> ui.button:
-    """Add a button with an icon only. `says` is its name for screen readers, and its tooltip."""
+    """Add a button with only an icon. `says` is its name for screen readers, and its tooltip."""
     button = ui.button(icon=icon, on_click=does).props("flat round dense size=sm").classes("quiet")
     name_it(button, says)
     return button
 
 
 def name_it(element: Element, says: str) -> None:
-    """Set an element's name for screen readers, which may contain any characters, and its tooltip."""
+    """Set an element's tooltip and its name for screen readers, which may contain any characters."""
     if element.props.get("aria-label") != says:
         element.props["aria-label"] = says
         element.props["title"] = says
@@ -111,10 +111,10 @@ def name_it(element: Element, says: str) -> None:
 
 
 def number_field(key: str, least: int, most: int, changed: Callable[[int], str | None]) -> ui.number:
-    """Add a field for an integer. `changed` makes the edit, and returns the text of an error."""
+    """Add a field for an integer. `changed` performs the edit, and returns the text of an error."""
 
     def check(value: float | None) -> str | None:
-        if value is None or not least <= value <= most or value != int(value):  # NaN is in no bounds
+        if value is None or not least <= value <= most or value != int(value):  # NaN is within no limits
             return say("model.number", least=least, most=most)
         return changed(int(value))
 
@@ -123,7 +123,7 @@ def number_field(key: str, least: int, most: int, changed: Callable[[int], str |
 
 
 def everybody_button(does: Callable[[], object]) -> ui.button:
-    """Add the button that applies an element to all robots again."""
+    """Add the button that makes an element apply to all robots again."""
     return (
         ui.button(say("model.everybody"), icon="groups", on_click=does)
         .props("flat dense no-caps align=left")
@@ -132,12 +132,12 @@ def everybody_button(does: Callable[[], object]) -> ui.button:
 
 
 def refuse_last(choice: ui.select, robots: Sequence[str], why: str) -> None:
-    """Restore the last robot of a choice, with the reason: an empty choice would mean all robots."""
+    """Restore the last robot in a selection and show the reason: an empty selection would mean all robots."""
     choice.set_value([*robots])
     choice.error = why
 
 
 def put(field: ValidationElement[Any], value: object) -> None:
-    """Show a value in a field, unless the user is typing a text that is not valid yet."""
+    """Show a value in a field, unless the user is typing text that is not valid yet."""
     if field.value != value and not field.error:
         field.set_value(value)

@@ -1,1 +1,1 @@
-"""The page `compare` of a team."""
+"""The page "Compare" of a team."""

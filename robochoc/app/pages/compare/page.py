@@ -1,4 +1,4 @@
-"""The page "Compare": a study of two or more protocols on this team or on a similar family, with its report."""
+"""The page "Compare": a study of two or more protocols on this team or a similar family, with its report."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class ComparePage:
         self._follow()
 
     async def _show_form(self) -> None:
-        """Show the form after finding the suitable protocols, which is slow for large teams."""
+        """Find the suitable protocols, which is slow for large teams, and then show the form."""
         self._timer.deactivate()
         sketch = self._project.sketch
         if sketch == self._sketch:
@@ -185,7 +185,7 @@ class ComparePage:
             return
         self._shown = state
         if facts is not None and facts is self._progress_of and facts.stage not in ENDED:
-            self._advance(facts)  # in place: a rebuilt button could lose a click
+            self._advance(facts)  # updated in place, since a rebuilt button could lose a click
             return
         self._progress_of = None
         self._results.clear()
@@ -265,14 +265,14 @@ def _style() -> str:
 
 
 REPORT = "study/report.html"
-"""The address of the report, relative to the pages of its team."""
+"""The address of the report, relative to the team's pages."""
 
 
 def install_reports(projects: Projects) -> None:
-    """Install the address of reports."""
+    """Install the address for reports."""
 
     @app.get("/team/{name}/" + REPORT)
-    async def report(name: str) -> Response:  # in the event loop, as in all code that opens teams
+    async def report(name: str) -> Response:  # runs in the event loop, as all code that opens teams
         try:
             file = study_on(projects.open(name)).report
         except (KeyError, ValueError):

@@ -1,1 +1,1 @@
-"""The page `decide` of a team."""
+"""The page "Decide" of a team."""

@@ -1,4 +1,4 @@
-"""An answer as a headline in words, as a table of robots, and as the costs of its rules."""
+"""An answer as a headline in words, a table of robots, and the costs of rules."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _WHOLE = frozenset({"solution", "optimal"})
 def headline(run: Run, imported: ImportedFacts | None = None) -> str:
     """Return the outcome of a run in one or two sentences. `imported`: the facts about an imported team.
 
-    For a run from an opened file, the text says that it is a claim of the file, and whether it was checked.
+    For a run from an opened file, the text says that the file claims this outcome, and whether it was checked.
     """
     return claim_words(run, _headline(run, imported))
 
@@ -64,7 +64,7 @@ def _so_far(result: RunResult, state: RunState) -> str:
 
 
 def _cost(result: RunResult, *, worth: bool) -> str:
-    """Return the cost of an answer, or its `worth`."""
+    """Return the cost of an answer, or its utility if `worth`."""
     if result.cost is None:
         return ""
     if result.verdict == "optimal" and not result.withdrawn:
@@ -75,7 +75,7 @@ def _cost(result: RunResult, *, worth: bool) -> str:
 
 
 def _bound(run: Run, result: RunResult, imported: ImportedFacts | None, *, worth: bool) -> str:
-    """Return the lower bound of the cost, or of the number of robots that must withdraw."""
+    """Return the lower bound on the cost, or on the number of robots that must withdraw."""
     if result.verdict in _WHOLE or result.bound is None:
         return ""
     if not run.record.options.withdraw:
@@ -88,7 +88,7 @@ def _bound(run: Run, result: RunResult, imported: ImportedFacts | None, *, worth
 
 
 def effort(run: Run) -> str:
-    """Return the protocol, runtime, messages and time of a run, in words."""
+    """Return the protocol, runtime, number of messages and time of a run, in words."""
     result = run.result
     if result is None:
         return say("decide.took-time", seconds=f"{run.seconds:.1f}")
@@ -122,11 +122,11 @@ def table_html(sketch: Sketch, result: RunResult) -> str:
 
 
 MOST_BARS = 40
-"""The maximum number of rules with a bar; the cost of the others is summed up in one line."""
+"""The maximum number of rules with a bar. The costs of the other rules are added up on one line."""
 
 
 async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> None:
-    """Fill `where` with the costs of rules, if there are any. They are computed in a thread."""
+    """Fill `where` with the costs of rules, if there are any. The costs are computed in a thread."""
     costs = await run.io_bound(rule_costs, sketch, result.values)
     if not costs or where.is_deleted:
         return

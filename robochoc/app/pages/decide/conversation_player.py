@@ -1,4 +1,4 @@
-"""The robots' conversation in words: the last messages during a run, and a playback afterwards."""
+"""The robots' conversation in words: the last messages during a run, and a playback after the run."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from robochoc.journal.entries import JournalError
 from robochoc.modelling.errors import ModelError
 
 TICK_S = 0.1
-"""The interval at which a playback is drawn."""
+"""The interval in seconds at which a playback is drawn."""
 _LISTED = 6
 _ANSWERS_S = 20.0
-"""The time limit for a browser's answer; without an answer, nothing is played."""
+"""The time limit in seconds for the browser's answer. Without an answer, nothing is played."""
 _CALM = "matchMedia('(prefers-reduced-motion: reduce)').matches"
 
 
 class ConversationPlayer:
     """The list of messages, with controls for a playback after the run.
 
-    `draw` is called when the picture must be drawn again; `shown` has the moment to show.
+    `draw` is called when the picture must be drawn again. `shown` is the moment to show.
     """
 
     def __init__(self, draw: Callable[[], None]) -> None:
@@ -63,7 +63,7 @@ class ConversationPlayer:
 
     @property
     def shown(self) -> tuple[Tape, int] | None:
-        """The conversation that is played back, and its present moment. None: show the end of the run."""
+        """The conversation being played back, and the current moment. None: show the end of the run."""
         if self._tape is None or not self._opened or self._player.ended:
             return None
         return self._tape, self._player.moment
@@ -80,7 +80,7 @@ class ConversationPlayer:
         self._list.set_content(messages_html(messages[:_LISTED]))
 
     def set_run(self, run: Run | None) -> None:
-        """Set the ended run for the playback; None: there is no run."""
+        """Set the ended run to play back, or None if there is no run."""
         if run is self._run:
             return
         self._reset()
@@ -90,7 +90,7 @@ class ConversationPlayer:
         self._refresh()
 
     def start(self) -> None:
-        """Start the playback, unless the user prefers reduced motion."""
+        """Start the playback, unless the user prefers reduced motion in the browser."""
         with self._box:
             ui.timer(0, self._start, once=True)
 
@@ -105,7 +105,7 @@ class ConversationPlayer:
             await self._toggle()
 
     async def _open(self) -> bool:
-        """Read the conversation, if that is not done yet; return whether it is available."""
+        """Read the conversation if necessary, and return whether it is available."""
         run = self._run
         if self._tape is None and run is not None and not self._loading:
             self._loading = True
@@ -141,7 +141,7 @@ class ConversationPlayer:
             self._redraw()
 
     async def _sought(self, event: ValueChangeEventArguments[float | None]) -> None:
-        """Seek to the slider's position; it is drawn at the next tick, since a slider moves more often."""
+        """Move to the slider's position. It is drawn at the next tick, since a slider moves more often."""
         if event.value != self._player.moment and await self._open():
             self._player.seek(event.value)
             self._timer.active = True
@@ -182,7 +182,7 @@ class ConversationPlayer:
 
 
 def conversation_of(run: Run, wanted: Callable[[], bool] = lambda: True) -> Tape | None:
-    """Return the conversation of a run; None if it is not available, or not `wanted` any more.
+    """Return the conversation in a run, or None if it is not available, or no longer `wanted`.
 
     The function is slow: call it in a thread.
     """

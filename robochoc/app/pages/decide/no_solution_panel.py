@@ -25,12 +25,12 @@ _MOST_HINTS = 3
 
 
 def hints_about_rules(sketch: Sketch) -> list[Trouble]:
-    """Return the hints on rules that are obviously impossible, each with a remedy."""
+    """Return the hints about rules that are obviously impossible, each with a remedy."""
     return [trouble for trouble in troubles(sketch) if trouble.about == About.RULE and not trouble.is_error]
 
 
 class NoSolutionPanel:
-    """The two ways out for a team without a solution: withdraw robots, or change conflicting rules.
+    """The two options for a team without a solution: withdraw robots, or change conflicting rules.
 
     `decide` starts a new run; with `withdraw`, robots may withdraw.
     """
@@ -50,7 +50,7 @@ class NoSolutionPanel:
         ui.timer(0, self._show_hints, once=True)
 
     async def _show_hints(self) -> None:
-        """Show the hints that need no search, as on the page "Model"."""
+        """Show the hints that can be found without a search, as on the page "Model"."""
         hints = await run.io_bound(hints_about_rules, self._sketch)
         if hints is not None and not self._found.is_deleted:
             self._known.show(hints[:_MOST_HINTS])
@@ -62,12 +62,12 @@ class NoSolutionPanel:
             ui.label(say(f"{key}-help")).classes("soft")
 
     def end(self) -> None:
-        """End the search."""
+        """End the search for conflicts."""
         if self._search:
             self._search.end()
 
     async def _search_conflict(self) -> None:
-        if self._search:  # a search is running
+        if self._search:  # a search is already running
             return
         self._search = search = ConflictSearch(self._sketch, folder=self._project.folder)
         self._set_text(say("decide.searching", seconds=int(PATIENCE_S)))
@@ -128,7 +128,7 @@ class NoSolutionPanel:
 
     def _soften(self, rule: SketchRule, cost: float | None) -> None:
         def softer(sketch: Sketch) -> Sketch:
-            now = sketch.rule(rule.id)  # the present rule: it may have been changed or removed
+            now = sketch.rule(rule.id)  # the current rule, since it may have been changed or removed
             return sketch if now is None else with_rule(sketch, msgspec.structs.replace(now, cost=int(cost or 0)))
 
         self._change(softer)

@@ -1,4 +1,4 @@
-"""The page `decide` of a team: a button that starts a run, the robots' conversation, and the answer in words."""
+"""The page "Decide" of a team: a button that starts a run, the robots' conversation, and the answer in words."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from robochoc.model.cost_units import cost_shown
 
 PURPOSE = "decide"
 MOST_LIVE = 300
-"""The picture of a larger team is drawn only at the end of the run, and from time to time during playback."""
+"""The most robots whose picture is drawn live. Of larger teams, only the end and some playback moments are drawn."""
 _SINGLE_CLICKS = (0, 1)
-"""Numbers of successive clicks (`UIEvent.detail`) that count as one; keys have 0."""
+"""The numbers of successive clicks (`UIEvent.detail`) that count as a single click; for keys the number is 0."""
 SHORT_S = 3.0
 """Searches shorter than this are replayed, since they ended before anyone could watch."""
 FEW_MESSAGES = 100
@@ -88,7 +88,7 @@ class _Page:
     # Events
 
     def _press(self, event: GenericEventArguments) -> None:
-        """Start or stop a run; the second click of a double click does not stop the run that the first one started."""
+        """Start or stop a run. The second click of a double click must not stop the run started by the first click."""
         if event.args not in _SINGLE_CLICKS:
             return
         if self._run is not None and self._run.state == RunState.RUNNING:
@@ -103,7 +103,7 @@ class _Page:
         self._pressed = self._runs.start(options, files=self._project.files, purpose=PURPOSE)
 
     def _follow_latest(self) -> None:
-        """Show the last started run, which may have been started in another tab."""
+        """Show the run that was started last, possibly in another tab."""
         self._end()
         self._run = self._runs.latest_for(PURPOSE)
         self._end_following = self._run.on_change(self._show) if self._run else None
@@ -114,8 +114,8 @@ class _Page:
             self._end_following()
 
     def _follow_team(self) -> None:
-        """Show errors of the team, or that it differs from the team of the shown run."""
-        errors = [] if self._imported else errors_of(self._project.sketch)  # files were checked when they were opened
+        """Show errors in the team, or that it differs from the team in the shown run."""
+        errors = [] if self._imported else errors_of(self._project.sketch)  # files are checked when they are opened
         self._not_ready.clear()
         if errors:
             with self._not_ready:
@@ -135,7 +135,7 @@ class _Page:
         shown, sketch = self._run, self._sketch()
         running = shown is not None and shown.state == RunState.RUNNING
         self._show_button(running=running)
-        self._show_conversation(shown)  # first, since the playback may be of the previous run
+        self._show_conversation(shown)  # first, since the playback may still show the previous run
         self._show_live(shown, sketch)
         changed = shown is not None and sketch != self._project.sketch
         now = (shown, shown and shown.state, shown and shown.result, changed)
@@ -153,7 +153,7 @@ class _Page:
     def _sketch(self) -> Sketch:
         try:
             return self._run.sketch if self._run else self._project.sketch
-        except (OSError, ValueError):  # its files are damaged
+        except (OSError, ValueError):  # the run's files are damaged
             return self._project.sketch
 
     def _show_button(self, *, running: bool) -> None:
@@ -166,7 +166,7 @@ class _Page:
         self._status.set_text(say("decide.running") if running else "")
 
     def _show_conversation(self, shown: Run | None) -> None:
-        """Show the messages. A short conversation is played back in the tab where the run was started."""
+        """Show the messages. In the tab where the run was started, a short conversation is played back."""
         if shown is not None and shown.state == RunState.RUNNING:
             self._player.show_live(shown.live.last_messages)
             return
@@ -177,7 +177,7 @@ class _Page:
                 self._player.start()
 
     def _draw(self) -> None:
-        """Draw the picture again, after a change of the playback's moment."""
+        """Draw the picture again after the moment of the playback has changed."""
         sketch = self._sketch()
         large = len(sketch.robots) > MOST_LIVE
         if self._frames.is_due(time.monotonic(), large=large, playing=self._player.playing):
@@ -305,5 +305,5 @@ def _style() -> str:
 
 
 def _is_short(result: RunResult) -> bool:
-    """Return whether the conversation was too short to be watched."""
+    """Return whether the conversation was too short to watch."""
     return result.metrics.wall_s < SHORT_S or result.messages <= FEW_MESSAGES

@@ -1,4 +1,4 @@
-"""A team during a run, as an SVG: the robots' values or target cells, and the messages of the last second."""
+"""A team during a run as an SVG: the robots' values or target cells, and the messages in the last second."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from robochoc.app.texts import say
 from robochoc.model.cost_units import Cost, cost_shown
 
 UNIT = 56
-"""The size of a cell."""
+"""The size of a cell in the picture."""
 Point = tuple[float, float]
 _HOME = 9
-"""The radius of the ring in a robot's own cell."""
+"""The radius of the ring in a robot's current cell."""
 _PILL_HALF = 13
-"""Half the height of a robot's label in its target cell."""
+"""Half the height of a robot's label in the target cell."""
 _TIP = 9
 _LONGEST = 9
-"""The number of letters of a name that fit into a cell."""
+"""The number of letters in a name that fit into a cell."""
 _BESIDE = (7, 11)
-"""The horizontal and vertical distance between robots in one cell."""
+"""The horizontal and vertical distances between robots in the same cell."""
 
 
 class TargetCell(msgspec.Struct, frozen=True):
-    """The target cell of a robot, and its other decisions in short (empty if there are none)."""
+    """A robot's target cell, and its other decisions in short form (empty if there are none)."""
 
     cell: Cell
     beside: str = ""
 
 
 def decides_places(sketch: Sketch) -> bool:
-    """Return whether a robot decides a place, so that the picture of the team is a map."""
+    """Return whether any robot decides a place, so that the picture is a map."""
     return any(decision.kind == DecisionKind.PLACE for decision in sketch.decisions)
 
 
 def targets_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, TargetCell]:
-    """Return the targets of robots by their names; if a robot decides several places, the first one."""
+    """Return the target of each robot by name. If a robot decides several places, the first one is its target."""
     cells: dict[str, Cell] = {}
     beside: dict[str, list[str]] = {}
     for decision in sketch.decisions:
@@ -55,12 +55,12 @@ def targets_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, Tar
 
 
 def homes(sketch: Sketch) -> dict[str, Point]:
-    """Return each robot's position in the picture; robots in one cell are drawn beside each other."""
+    """Return each robot's position in the picture. Robots in the same cell are drawn side by side."""
     return _spread({robot.name: robot.at for robot in sketch.robots})
 
 
 def shown_part(sketch: Sketch) -> tuple[Cell, Cell]:
-    """Return the south-western and north-eastern cell of the drawn part: all relevant cells and a margin."""
+    """Return the south-western and north-eastern cells of the part to draw: all relevant cells with a margin."""
     cells = [robot.at for robot in sketch.robots]
     for decision in sketch.decisions:
         if decision.kind == DecisionKind.PLACE:
@@ -72,7 +72,7 @@ def shown_part(sketch: Sketch) -> tuple[Cell, Cell]:
 
 
 def map_svg(sketch: Sketch) -> Iterator[str]:
-    """Yield the cells of the map, the blocked cells, and the numbers of columns and rows."""
+    """Yield the cells of the map, the blocked cells, and the column and row numbers."""
     first, last = shown_part(sketch)
     left, top = first.x * UNIT, -(last.y + 1) * UNIT
     width, height = (last.x - first.x + 1) * UNIT, (last.y - first.y + 1) * UNIT
@@ -94,7 +94,7 @@ def map_svg(sketch: Sketch) -> Iterator[str]:
 
 
 def view_box(sketch: Sketch) -> str:
-    """Return the `viewBox` of the picture's SVG."""
+    """Return the `viewBox` for the picture's SVG."""
     first, last = shown_part(sketch)
     width, height = (last.x - first.x + 1) * UNIT, (last.y - first.y + 1) * UNIT
     return f"{first.x * UNIT - 26} {-(last.y + 1) * UNIT - 6} {width + 32} {height + 30}"
@@ -109,9 +109,9 @@ def robots_with_targets_svg(
     *,
     named: bool,
 ) -> Iterator[str]:
-    """Yield the robots: a ring at the robot's position, an arrow to its target, and the name there.
+    """Yield the robots: a ring at the robot's position, and an arrow to its target with the robot's name.
 
-    A robot without a target has its name at its position. `named`: whether there is room for names.
+    The name of a robot without a target is at its position. `named`: whether there is room for names.
     """
     at_home = homes(sketch)
     chosen = _spread({name: target.cell for name, target in targets.items() if name in at_home})
@@ -129,7 +129,7 @@ def robots_with_targets_svg(
 
 
 def brief(text: str, most: int) -> str:
-    """Return a text, shortened to a maximum number of letters."""
+    """Return a text shortened to a maximum number of letters."""
     return text if len(text) <= most else f"{text[: most - 1]}…"
 
 
@@ -157,7 +157,7 @@ def _pill(at: Point, text: str) -> str:
 
 
 def _arrow(home: Point, there: Point) -> str:
-    """Return an arrow from the ring to the label."""
+    """Return an arrow from the ring to the label at the target."""
     across, along = there[0] - home[0], there[1] - home[1]
     far = hypot(across, along)
     if far < 2 * (_HOME + _PILL_HALF):
@@ -175,9 +175,9 @@ def _arrow(home: Point, there: Point) -> str:
 
 
 MOST_MESSAGES = 200
-"""The maximum number of lines for messages, for readability."""
+"""The maximum number of lines drawn for messages, for readability."""
 MOST_NAMED = 60
-"""The maximum number of robots with names; in larger teams only the values are written."""
+"""The maximum number of robots drawn with names. In larger teams only the values are shown."""
 _BRIEF = 12
 _FEW_LETTERS = 3
 _HALF = 19
@@ -186,7 +186,7 @@ Says = Mapping[str, str]
 
 
 def values_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, str]:
-    """Return each robot's decisions in short, by its name; places as column and row."""
+    """Return each robot's decisions in short form, by robot name; places as column and row."""
     said: dict[str, list[str]] = {}
     for decision in sketch.decisions:
         for robot in sketch.deciders(decision):
@@ -205,15 +205,15 @@ def team_svg(
     spoken: Mapping[tuple[str, str], int] = {},
     targets: Mapping[str, TargetCell] = {},
 ) -> str:
-    """Return the picture; a map if places are decided. Names given by users are escaped.
+    """Return the picture, which is a map if places are decided. Names given by users are escaped.
 
     Args:
         sketch: The team.
         says: The text at each robot.
-        unsettled: Robots whose values may still change, which are grey.
-        aside: Withdrawn robots.
+        unsettled: The robots whose values may still change; they are drawn in grey.
+        aside: The withdrawn robots.
         spoken: The number of messages in the last second, by sender and receiver.
-        targets: The cells that robots have chosen.
+        targets: The cells chosen by robots.
     """
     if decides_places(sketch):
         named = len(sketch.robots) <= MOST_NAMED
@@ -239,7 +239,7 @@ def _svg(view: str, parts: list[str], robots: int) -> str:
 def _places(sketch: Sketch) -> dict[str, tuple[float, float]]:
     """Return each robot's position in the picture, without empty columns and rows.
 
-    Robots in one cell are drawn beside each other.
+    Robots in the same cell are drawn side by side.
     """
     columns = {x: place for place, x in enumerate(sorted({robot.at.x for robot in sketch.robots}))}
     rows = {y: place for place, y in enumerate(sorted({robot.at.y for robot in sketch.robots}))}
@@ -282,12 +282,12 @@ def _robots(
 
 
 def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, until: float = 0.0) -> str:
-    """Return a small chart of the decreasing cost with its caption, and a band down to the lower bound.
+    """Return a small chart of the decreasing cost with a caption, and a band down to the lower bound.
 
     Args:
-        costs: The costs of the best answers so far: seconds since the start, and the cost.
-        bound: The lower bound of the cost. None: not known.
-        until: The end of the line, in seconds since the start.
+        costs: The costs of the best answers so far: pairs of seconds since the start and cost.
+        bound: The lower bound on the cost. None: unknown.
+        until: The end of the chart, in seconds since the start.
 
     Returns:
         The picture; empty if the cost has not changed and no bound is known.
@@ -311,7 +311,7 @@ def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, 
         words.append(say("decide.falling", first=cost_shown(costs[0][1]), last=cost_shown(best), seconds=fell))
     if known and low < best:
         words.append(say("decide.band", bound=cost_shown(low), best=cost_shown(best)))
-    if not words:  # the first answer was proven to be the best
+    if not words:  # the first answer was proven optimal
         return ""
     said = escape(" ".join(words))
     band = f'<path class="band" d="{path}H{width}V{height}H0Z"/>' if known else ""

@@ -1,4 +1,4 @@
-"""The options of a run: protocol, runtime, seed and time limit, in a panel that is folded at first."""
+"""The options for a run: protocol, runtime, seed and time limit, in a panel that is collapsed at first."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _MOST_REASONS = 12
 
 
 class RunOptionsPanel:
-    """The panel. `options` returns the chosen options."""
+    """The panel. `options` returns the options that the user set."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
@@ -36,7 +36,7 @@ class RunOptionsPanel:
             self._why = ui.element("div").classes("why")
 
     def options(self, *, withdraw: bool = False) -> RunOptions:
-        """Return the chosen options, with the default for each invalid value."""
+        """Return the options that the user set, with the default instead of each invalid value."""
         limit = self._limit.value
         return RunOptions(
             protocol=str(self._protocol.value or AUTO)[:MAX_LABEL],
@@ -47,7 +47,7 @@ class RunOptionsPanel:
         )
 
     async def _show_protocols(self) -> None:
-        """Show the protocols that suit the team, when the panel is unfolded after a change of the team."""
+        """Show the protocols that suit the team, when the panel is opened after a change in the team."""
         sketch = self._project.sketch
         if not self._fold.value or self._shown_sketch is sketch:
             return
@@ -55,7 +55,7 @@ class RunOptionsPanel:
         self._set_text(say("decide.looking"))
         found = await run_query(fitting, sketch, self._project.files)
         if isinstance(found, ErrorText):
-            self._shown_sketch = None  # try again when the panel is unfolded
+            self._shown_sketch = None  # try again when the panel is opened
             self._set_text(say("decide.fits-none", why=found))
         elif found is not None:
             self._show(found)

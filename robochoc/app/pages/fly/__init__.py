@@ -1,1 +1,1 @@
-"""The page `fly` of a team."""
+"""The page "Fly" of a team."""

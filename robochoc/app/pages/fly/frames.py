@@ -1,4 +1,4 @@
-"""The frames of the flight and the conversation, with a common time line, drawn in the browser (`frames.js`)."""
+"""The frames with the flight and the conversation on a common time line, drawn in the browser (`frames.js`)."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ class RunFrames(Element, component="frames.js"):
         }
 
     def show(self, flight: str | None, talk: str | None, *, flies: bool, talks: bool) -> None:
-        """Show pages by their relative addresses; None for a page that does not exist (yet).
+        """Show pages, given by their relative addresses. None: the page does not exist (yet).
 
-        `flies` and `talks` differ from their first values after the building of a page has failed.
+        `flies` and `talks` differ from their initial values if a page could not be built.
         """
         self._props["flight"] = flight
         self._props["talk"] = talk
@@ -47,5 +47,5 @@ class RunFrames(Element, component="frames.js"):
 
 
 def _template(key: str) -> str:
-    """Return a text in which the browser replaces names in braces."""
+    """Return a text in which the browser replaces the names in braces."""
     return say(key)

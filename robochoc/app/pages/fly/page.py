@@ -1,4 +1,4 @@
-"""The page `fly` of a team: its flight, its conversation, and files to share."""
+"""The page "Fly" of a team: its flight, its conversation, and files to share."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def build_fly(project: Project) -> None:
 
 
 class _Page:
-    """The page of a run, which is updated; without `?run=`, of the last run."""
+    """The page for a run, which is kept up to date. Without `?run=`, it shows the last run."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
@@ -59,7 +59,7 @@ class _Page:
         return asked or self._runs.latest_for("decide") or self._runs.latest_for("whatif")
 
     def _follow(self) -> None:
-        """Show the run, if it or its state has changed."""
+        """Show the run again if it or its state has changed."""
         run = self._run()
         shown = (run.id, run.state) if run else None
         if shown == self._shown and shown is not None:
@@ -120,7 +120,7 @@ class _Page:
         self._leave = shown.leave
 
     def _choice(self, run: Run) -> None:
-        """Add the choice of earlier runs, if there are any."""
+        """Add a selection of earlier runs, if there are any."""
         runs = [one for one in self._runs.all() if one.state in {RunState.ENDED, RunState.STOPPED}]
         if len(runs) < 2:  # noqa: PLR2004 - nothing to choose
             return
@@ -134,7 +134,7 @@ class _Page:
 
 
 class _BuiltFrames:
-    """The frames of a run, which appear when they are built, with the progress until then."""
+    """The frames of a run, which appear once they are built. Until then, the progress is shown."""
 
     def __init__(self, builder: FlightBuilder) -> None:
         self._builder = builder
@@ -151,7 +151,7 @@ class _BuiltFrames:
         self._request_files()
 
     def leave(self) -> None:
-        """End the request for the files, after the page was closed."""
+        """End the request for the files, since the page was closed."""
         self._release()
 
     def _request_files(self) -> None:
@@ -209,7 +209,7 @@ class _BuiltFrames:
 
 
 def _framed(builder: FlightBuilder, page: Path | None) -> str | None:
-    """Return the address of a page for a frame, with the time of the page against caching."""
+    """Return the address of a page for a frame. It contains the page's modification time to prevent caching."""
     with suppress(OSError):
         return f"{relative_address(builder.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None
     return None
@@ -225,7 +225,7 @@ def _title() -> None:
 
 
 def _empty_page(what: str, remedy: str, link: str, address: str) -> None:
-    """Show why the page is empty, with a remedy and a link."""
+    """Show the reason for an empty page, with a remedy and a link."""
     _title()
     ui.label(say(what) if what.startswith("fly.") else what)
     _remedy(remedy, link, address)
@@ -253,11 +253,11 @@ _VERDICTS = frozenset({"solution", "optimal", "no-solution"})
 
 
 def run_words(run: Run, now: datetime | None = None) -> str:
-    """Return a run in a line.
+    """Return the description of a run on one line.
 
     Args:
         run: The run.
-        now: The local time; by default the present. The lines of runs on other days include the date.
+        now: The local time, by default the current time. Runs on other days are shown with their date.
     """
     began = datetime.fromtimestamp(run.record.started).astimezone()
     when = (

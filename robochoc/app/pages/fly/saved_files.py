@@ -1,4 +1,4 @@
-"""Serve the files of a run: its pages, for frames in this application, and downloads.
+"""Serves the files of a run: its pages, for frames in the application, and downloads.
 
 /team/ID/kept/RUN/flight.html, conversation.html      complete documents with their own policies
 /team/ID/kept/RUN/report.html, flight.mcap, team.zip, state.zip
@@ -26,10 +26,10 @@ REPORT = "report.html"
 TEAM = "team.zip"
 STATE = "state.zip"
 MOST_IN_REPORT = 24 << 20
-"""The maximum number of bytes of a page in a report, so that the report can be sent by mail."""
+"""The maximum size in bytes of a page included in a report, so that the report can be sent by mail."""
 _HEADERS = {"Content-Security-Policy": "frame-ancestors 'self'"}
 _APART = {"Content-Security-Policy": "sandbox allow-scripts allow-popups allow-downloads; frame-ancestors 'self'"}
-"""The headers of the report, which gets another origin than the application: no page needs to access it."""
+"""The headers for the report, which is given a separate origin because no page needs to access it."""
 
 
 def address(team: str, run: Run, file: str) -> str:
@@ -38,12 +38,12 @@ def address(team: str, run: Run, file: str) -> str:
 
 
 def relative_address(run: Run, file: str) -> str:
-    """Return the address of a file of a run, relative to the pages of the team, for frames and links set by scripts."""
+    """Return the address of a run's file relative to the pages of the team, for frames and links set by scripts."""
     return f"kept/{run.id}/{file}"
 
 
 def install_saved_files(projects: Projects) -> None:
-    """Install the addresses of files."""
+    """Install the addresses of the files."""
 
     @app.get("/team/{name}/kept/{number}/{file}")
     async def kept(name: str, number: str, file: str) -> Response:
@@ -68,7 +68,7 @@ def _page(file: Path | None) -> Response:
 
 
 def _built(run: Run, file: str) -> Response:
-    """Return a file that is built on request, or a recording. This is slow."""
+    """Return a file that is built on request, or a recording. This function is slow."""
     sketch = run.sketch
     match file:
         case "report.html":

@@ -84,7 +84,7 @@ class _card:  # noqa: N801 - a context manager, as NiceGUI's are
 
 
 def _link(text: str, what: str, address: str, saved_as: str | None = None) -> None:
-    """Add a link that looks like a button. With `saved_as`, it saves the file, else it opens the file in a tab."""
+    """Add a link that looks like a button. With `saved_as`, it saves the file; otherwise it opens the file in a tab."""
     link = ui.element("a").classes("button")
     link._props["href"] = address  # noqa: SLF001 - `props` would parse it
     link._props["aria-label"] = f"{say(what)}: {text}"  # noqa: SLF001

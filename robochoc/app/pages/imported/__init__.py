@@ -1,1 +1,1 @@
-"""The pages of imported teams that differ from those of teams that were drawn here."""
+"""The pages that are different for imported teams and for teams drawn in the application."""

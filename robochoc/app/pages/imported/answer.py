@@ -1,4 +1,4 @@
-"""The answer of an imported team: tables and epochs, and the panel for a team without a solution."""
+"""The answer of an imported team: tables and epochs, or the panel for a team without a solution."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ _MOST_CONSTRAINTS = 60
 def show_imported_below(
     project: Project, facts: ImportedFacts, result: RunResult, decide: Callable[..., None]
 ) -> ImportedNoSolutionPanel | None:
-    """Fill the current container; return the panel for a team without a solution, if there is none.
+    """Fill the current container. If there is no solution, return the panel for that case.
 
     Args:
         project: The team.
         facts: The facts about the team.
-        result: The result of its run.
+        result: The result of the team's run.
         decide: Starts a new run; with `withdraw`, robots may withdraw.
     """
     ui.add_css(style())
@@ -43,7 +43,7 @@ def show_imported_below(
 
 
 class ImportedNoSolutionPanel:
-    """The ways out for a team without a solution, with the reason if one is not available. `decide`: as above."""
+    """The options if a team has no solution, with reasons for unavailable ones. `decide`: starts a new run."""
 
     def __init__(self, project: Project, facts: ImportedFacts, result: RunResult, decide: Callable[..., None]) -> None:
         self._project = project
@@ -65,13 +65,13 @@ class ImportedNoSolutionPanel:
         on_leave(self.end)
 
     def end(self) -> None:
-        """End the search."""
+        """End the search for conflicts."""
         if self._search:
             self._search.end()
 
     async def _search_conflict(self) -> None:
         folder = self._project.import_folder
-        if self._search or folder is None:  # a search is running
+        if self._search or folder is None:  # a search is already running
             return
         self._search = search = ConflictSearch(TeamOfFiles(folder, self._events), folder=self._project.folder)
         self._set_text(say("decide.searching", seconds=int(PATIENCE_S)))
@@ -116,15 +116,15 @@ def _choice_card(title: str, hint: str, does: Callable[[], object]) -> None:
 
 
 MOST_ROWS = 300
-"""The maximum number of rows of a table."""
+"""The maximum number of rows in a table."""
 MOST_EPOCHS = 40
 _MOST_AT_ONE = 3
-"""The maximum number of values at a robot in the picture."""
+"""The maximum number of values shown at a robot in the picture."""
 _LONGEST = 160
 
 
 def values_in_short(facts: ImportedFacts, values: Mapping[str, Value]) -> dict[str, str]:
-    """Return each robot's decisions in short, by its name."""
+    """Return each robot's decisions in short form, by robot name."""
     said: dict[str, str] = {}
     for robot in facts.robots:
         own = [str(values[one.variable]) for one in robot.decides if one.variable in values]
@@ -144,7 +144,7 @@ def table_html(facts: ImportedFacts, result: RunResult) -> str:
 
 
 def epochs_html(facts: ImportedFacts, result: RunResult) -> str:
-    """Return the list of epochs with their events and verdicts. Names are escaped."""
+    """Return a list of epochs with their events and verdicts. Names are escaped."""
     parts = []
     for number, epoch in enumerate(result.epochs[:MOST_EPOCHS]):
         known = say(f"imported.verdict.{epoch.verdict}")
@@ -175,7 +175,7 @@ def _table(facts: ImportedFacts, values: Mapping[str, Value], aside: frozenset[s
 
 
 def rows_html(caption: str, heads: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
-    """Return a table whose rows begin with a heading. All texts are escaped."""
+    """Return a table in which each row begins with a heading. All texts are escaped."""
     head = "".join(f'<th scope="col">{escape(one)}</th>' for one in heads)
     body = "".join(_row(*row) for row in rows)
     return f"<table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"

@@ -45,14 +45,14 @@ def build_imported_model(project: Project) -> None:
         with ui.element("section").classes("panel imported-part"):
             _heading("imported.team")
             ui.label(counts(facts))
-            links = facts.links if facts.linked <= MAX_LINES else ()  # many links are not readable
+            links = facts.links if facts.linked <= MAX_LINES else ()  # too many links are not readable
             ui.html(thumbnail(project.sketch, links), sanitize=False).classes("imported-picture")
         with ui.element("section").classes("panel imported-part"):
             _RobotViewer(project, facts, folder)
 
 
 def counts(facts: ImportedFacts) -> str:
-    """Return the size and the objective of a team, in a few sentences."""
+    """Return the size and objective of a team in a few sentences."""
     told = [
         say(
             "imported.counts",
@@ -110,7 +110,7 @@ def _events(facts: ImportedFacts) -> None:
 
 
 class _RobotViewer:
-    """One robot at a time: its decisions, its constraints in words, and its file."""
+    """Shows one robot at a time: its decisions, its constraints in words, and its file."""
 
     def __init__(self, project: Project, facts: ImportedFacts, folder: Path) -> None:
         self._project, self._folder = project, folder
@@ -123,7 +123,7 @@ class _RobotViewer:
         select.props("dense outlined").classes("imported-choice")
         select.on_value_change(lambda event: self._choose(event.value))
         self._box = ui.element("div").classes("imported-part").props("aria-live=polite")
-        last = (facts.there or facts.robots)[-1].name  # its file has the constraints with earlier robots
+        last = (facts.there or facts.robots)[-1].name  # its file contains the constraints with earlier robots
         ui.timer(0, lambda: select.set_value(last), once=True)
 
     async def _choose(self, name: object) -> None:
@@ -138,7 +138,7 @@ class _RobotViewer:
             found = str(damaged)
         if (
             found is None or self._chosen != robot.name or self._box.is_deleted
-        ):  # the server is shutting down, or another robot was chosen
+        ):  # the server is shutting down, or the user selected another robot
             return
         self._box.clear()
         with self._box:
@@ -184,7 +184,7 @@ class _RobotViewer:
 
 
 def _elsewhere(folder: Path) -> None:
-    """Show the command and the Python code for the team's files."""
+    """Show the command and the Python code for using the team's files."""
     _heading("imported.elsewhere")
     ui.label(say("imported.command")).classes("soft")
     with ui.element("pre").classes("imported-file command-text").props("tabindex=0"):
@@ -201,5 +201,5 @@ def _heading(key: str) -> None:
 
 @cache
 def style() -> str:
-    """Return the style of the pages of imported teams."""
+    """Return the style for the pages of imported teams."""
     return (files(__package__) / "imported.css").read_text(encoding="utf-8")

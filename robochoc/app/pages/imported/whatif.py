@@ -1,4 +1,4 @@
-"""The page "What if" of an imported team: robots fail, and the others decide again."""
+"""The page "What if" for an imported team: robots fail, and the others decide again."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ class _Page:
 
 
 def moved(facts: ImportedFacts, was: Mapping[str, Value], now: Mapping[str, Value]) -> list[str]:
-    """Return the robots whose decisions differ before and after an event."""
+    """Return the robots whose decisions before and after an event differ."""
     return [
         robot.name
         for robot in facts.robots

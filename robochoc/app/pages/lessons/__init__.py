@@ -1,1 +1,1 @@
-"""The pages of the lessons: the list, and one lesson."""
+"""The pages for lessons: the list, and a single lesson."""

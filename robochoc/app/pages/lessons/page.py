@@ -1,4 +1,4 @@
-"""The list of lessons, and one lesson: a picture on the left and the question on the right, step by step."""
+"""The list of lessons, and a lesson: a picture on the left and a question on the right, step by step."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def _state(number: int, progress: LessonProgress) -> str:
 
 
 def bits(count: int, done: int, now: int | None = None) -> None:
-    """Draw a bar for each step, in addition to the text."""
+    """Draw a bar with an element for each step, in addition to the text."""
     with ui.element("div").classes("bits").props("aria-hidden=true"):
         for place in range(count):
             ui.element("i").classes(f"{'done' if place < done else ''} {'now' if place == now else ''}")
@@ -77,7 +77,7 @@ class _Page:
     def __init__(self, number: int, progress: LessonProgress) -> None:
         self._number = number
         self._lesson = lesson(number)
-        self._client = ui.context.client  # a clicked element is deleted while its click is handled
+        self._client = ui.context.client  # a clicked element is deleted while its click is being handled
         self._progress = progress
         self._place = 0 if progress.is_over(number) else progress.done(number)
         self._chosen: list[AnswerChoice] = []
@@ -135,7 +135,7 @@ class _Page:
                 self._choose(choice)
 
     def _focus(self, element: ui.element) -> None:
-        """Move the keyboard's focus when the browser has drawn the element."""
+        """Move the keyboard focus to `element` once the browser has drawn it."""
         found = f"document.getElementById('{element.html_id}')"
         again = "left && setTimeout(() => look(left - 1), 20)"
         self._client.run_javascript(f"(function look(left) {{ const it = {found}; it ? it.focus() : {again}; }})(100)")

@@ -1,1 +1,1 @@
-"""The page `model` of a team."""
+"""The page "Model" of a team."""

@@ -15,20 +15,20 @@ from robochoc.app.sketch.sketch import Area, Cell, Sketch
 from robochoc.app.texts import say
 
 SELECT = "select"
-"""The tool for selecting and dragging. With other tools, the cell under the pointer is highlighted."""
+"""The tool for selecting and dragging. Other tools highlight the cell under the pointer."""
 
 MOST_MOVES = 2**53
 
 
 class RobotClicked(msgspec.Struct):
-    """A clicked robot; `more`: whether the selection is extended."""
+    """A click on a robot. `more`: whether the selection is extended."""
 
     name: str
     more: bool = False
 
 
 class BoardAction(msgspec.Struct):
-    """An action that was chosen at a robot (`name`), or at a cell."""
+    """An action selected at a robot (`name`) or at a cell."""
 
     act: str
     name: str = ""
@@ -37,7 +37,7 @@ class BoardAction(msgspec.Struct):
 
 
 class RobotDragged(msgspec.Struct):
-    """A robot that was dragged to a cell. `sent`: the number of moves sent by this tab."""
+    """A robot dragged to a cell. `sent`: the number of moves sent by this tab."""
 
     name: str
     x: int
@@ -51,7 +51,7 @@ def _nothing(*_: object) -> None:
 
 @dataclass
 class BoardEvents:
-    """The handlers of a board's events, which the page defines."""
+    """The handlers for a board's events, which the page defines."""
 
     robot: Callable[[RobotClicked], object] = _nothing
     cell: Callable[[Cell], object] = _nothing
@@ -76,8 +76,8 @@ class Board(Element, component="board.js"):
     """The map of a team.
 
     Args:
-        events: The handlers of clicks, drags and keys.
-        movable: Whether robots can be dragged, and moved by the arrow keys.
+        events: The handlers for clicks, drags and keys.
+        movable: Whether robots can be moved, by dragging or with the arrow keys.
     """
 
     def __init__(self, events: BoardEvents, *, movable: bool = True) -> None:
@@ -93,7 +93,7 @@ class Board(Element, component="board.js"):
     def show(
         self, sketch: Sketch, *, robots: list[DrawnRobot] | None = None, links: list[DrawnLink] | None = None
     ) -> None:
-        """Draw a sketch. Without `links`, they remain unchanged."""
+        """Draw a sketch. Without `links`, the links are not changed."""
         self._set_area(sketch.area)
         self._set("robots", robots_of(sketch) if robots is None else robots)
         if links is not None:
@@ -101,7 +101,7 @@ class Board(Element, component="board.js"):
         self.update()
 
     def set_menus(self, robot: dict[str, str], cell: dict[str, str]) -> None:
-        """Set the actions in the menus of robots and cells: names of actions, and their texts."""
+        """Set the actions in the menus of robots and cells: action names and their texts."""
         self._change("acts", {"robot": [*robot.items()], "cell": [*cell.items()]})
 
     def choose(self, names: list[str]) -> None:
@@ -109,7 +109,7 @@ class Board(Element, component="board.js"):
         self._change("selected", names)
 
     def light(self, rule: str | None) -> None:
-        """Highlight one rule with its text; others are dimmed."""
+        """Highlight one rule with its text, and dim all others."""
         self._change("lit", rule or "")
 
     def use(self, tool: str) -> None:
@@ -133,8 +133,8 @@ class Board(Element, component="board.js"):
         try:
             given: object = msgspec.convert(event.args, self._events.types[name])
         except msgspec.ValidationError:
-            return  # not from our board
-        if isinstance(given, RobotDragged):  # the board retains moves that are not confirmed by this
+            return  # not sent by our board
+        if isinstance(given, RobotDragged):  # the board keeps moves that this does not confirm
             self._change("heard", given.sent)
         getattr(self._events, name)(given)
 

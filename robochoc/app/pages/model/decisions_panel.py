@@ -1,4 +1,4 @@
-"""The panel "What does each decide?": a card for each decision, and buttons that add one."""
+"""The panel "What does each decide?": a card for each decision, and buttons for adding decisions."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class DecisionsPanel:
                     name_it(button, say("model.add-kind", kind=say(f"kind.{kind}")))
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the panel to the current sketch."""
         decisions = self._desk.sketch.decisions
         self._hint.set_visibility(not decisions)
         self._cards.follow([(place, decision.kind) for place, decision in enumerate(decisions)])
@@ -92,10 +92,10 @@ class _DecisionCard:
             self._lines = TroubleLines()
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the card to the current sketch."""
         decision = self._decision
         if decision is not None:
-            self._following = True  # changes of fields are not the user's now
+            self._following = True  # from here, changes in fields are not made by the user
             self._show(self._desk.sketch, decision)
             self._following = False
 
@@ -170,7 +170,7 @@ class _DecisionCard:
             return None
         clicked = self._desk.cells_of
         if clicked == decision.name:
-            self._desk.cells_of = made.name  # continue with its cells under the new name
+            self._desk.cells_of = made.name  # the user continues selecting cells, under the new name
         wrong = self._desk.edit(lambda sketch: with_decision(sketch, made, instead_of=decision.name))
         if wrong is not None:
             self._desk.cells_of = clicked

@@ -1,4 +1,4 @@
-"""The shared state of the panels of the page "Model": the team, the selection, the open rule, and edits."""
+"""The state shared by the panels of the page "Model": the team, the selection, the open rule, and edits."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ def _still() -> None:
 
 @dataclass
 class Desk:
-    """The state of one tab with the page.
+    """The state of the page in one browser tab.
 
     Attributes:
         project: The team.
         selected: The selected robots, in the order of their selection.
-        just_added: The robot that is selected because it was just added, for naming. New rules do not apply to it.
-        opened: The rule that is edited. Clicked robots are added to it or removed from it.
-        cells_of: The name of the decision whose cells are chosen by clicks on the map.
+        just_added: The robot that is selected only because it was just added, for naming. New rules ignore it.
+        opened: The rule being edited. A click on a robot adds it to the rule or removes it.
+        cells_of: The name of the decision whose cells the user selects on the map.
         pointed: The rule under the pointer in the list.
-        troubles: The known errors and hints.
+        troubles: The errors and hints found so far.
         show_error: Shows an error that belongs to no field.
-        point: Called when another rule in the list is under the pointer.
+        point: Called when the rule under the pointer in the list changes.
     """
 
     project: Project
@@ -52,19 +52,19 @@ class Desk:
 
     @property
     def sketch(self) -> Sketch:
-        """The present state of the team."""
+        """The current state of the team."""
         return self.project.sketch
 
     def on_view_change(self, callback: Callable[[], None]) -> None:
-        """Call `callback` after a change of the selection or the open rule, without a change of the team."""
+        """Call `callback` after a change in the selection or the open rule that does not change the team."""
         self._listeners.add(callback)
 
     def notify_view_change(self) -> None:
-        """Update all panels after a change of the selection, the open rule, or the pointer."""
+        """Update all panels after a change in the selection, the open rule, or the pointer."""
         self._listeners()
 
     def edit(self, change: Edit) -> str | None:
-        """Change the team. Return the text of an invalid edit, for the field of the edit; None if it is valid."""
+        """Change the team. Return the error text for the field if the edit is invalid, otherwise None."""
         try:
             self.project.edit(change)
         except EditError as error:
@@ -78,7 +78,7 @@ class Desk:
         return wrong is None
 
     def select(self, names: list[str]) -> None:
-        """Select these robots, without those that do not exist (any more)."""
+        """Select those of these robots that (still) exist."""
         known = {robot.name for robot in self.sketch.robots}
         self.selected = [name for name in dict.fromkeys(names) if name in known]
         self.just_added = None
@@ -91,16 +91,16 @@ class Desk:
 
     @property
     def rule_robots(self) -> list[str]:
-        """The robots of a new rule. Empty: all robots."""
+        """The robots in a new rule. Empty: all robots."""
         return [] if self.just_added else self.selected
 
     def open(self, rule: str | None) -> None:
-        """Open a rule for editing; None to close it."""
+        """Open a rule for editing, or close it if `rule` is None."""
         self.opened, self.cells_of = rule, None
         self.notify_view_change()
 
     def drop_removed(self) -> None:
-        """Drop removed elements from the selection and the open rule."""
+        """Remove elements that no longer exist from the selection and the open rule."""
         known = {robot.name for robot in self.sketch.robots}
         self.selected = [name for name in self.selected if name in known]
         if self.opened is not None and self.sketch.rule(self.opened) is None:
@@ -112,5 +112,5 @@ class Desk:
             self.just_added = None
 
     def troubles_at(self, about: About, element: str) -> list[Trouble]:
-        """Return the errors and hints of an element."""
+        """Return the errors and hints for an element."""
         return [trouble for trouble in self.troubles if trouble.about is about and trouble.element == element]

@@ -1,4 +1,4 @@
-"""The page "Model": the board on which a team is drawn, and the panels of robots, decisions and rules."""
+"""The page "Model": the board for drawing a team, and the panels for robots, decisions and rules."""
 
 from __future__ import annotations
 
@@ -37,9 +37,9 @@ from robochoc.app.sketch.troubles import About, Trouble
 from robochoc.app.texts import say
 
 TOOLS = {SELECT: "near_me", "add": "add_circle_outline", "block": "block"}
-"""The tools, and their icons."""
+"""The tools and their icons."""
 _QUIET_S = 0.15
-"""The time after an edit until the sketch is checked."""
+"""The time in seconds between an edit and the check of the sketch."""
 
 
 def build_model(project: Project) -> None:
@@ -144,7 +144,7 @@ class ModelPage:
     # Content
 
     def _changed(self) -> None:
-        """Show the team. Errors and links are updated a little later."""
+        """Show the team. Errors and links are updated shortly afterwards."""
         self._desk.drop_removed()
         self._follow()
         self._board.show(self._desk.sketch, robots=robots_of(self._desk.sketch, self._desk.troubles))
@@ -161,7 +161,7 @@ class ModelPage:
         self._guide()
 
     def _clicking_cells(self) -> None:
-        """Switch to the select tool when the editing of cells or of a rule starts."""
+        """Switch to the select tool when the user starts to edit cells or a rule."""
         clicked = self._desk.cells_of or self._desk.opened
         if clicked is not None and clicked != self._clicked:
             self._tools.set_value(SELECT)
@@ -175,7 +175,7 @@ class ModelPage:
         self._board.light(self._desk.pointed or self._desk.opened)
 
     def _guide(self) -> None:
-        """Show the next step."""
+        """Show the next step to the user."""
         desk = self._desk
         key = f"guide.{self._tool}"
         if not desk.sketch.robots:
@@ -193,11 +193,11 @@ class ModelPage:
     def _show_error(self, wrong: str) -> None:
         self._wrong.set_text(wrong)
         self._wrong.set_visibility(bool(wrong))
-        if wrong:  # the board may show the invalid edit
+        if wrong:  # the board may still show the invalid edit
             self._board.show(self._desk.sketch, robots=robots_of(self._desk.sketch, self._desk.troubles))
 
     async def _check(self) -> None:
-        """Compute errors and links in a thread, since this is slow for large teams."""
+        """Compute errors and links in a thread, since that is slow for large teams."""
         self._timer.deactivate()
         if self._is_checking:
             return
@@ -233,7 +233,7 @@ def _style() -> str:
 
 
 class MapFields:
-    """The columns and rows of the map."""
+    """The fields for the columns and rows of the map."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
@@ -257,13 +257,13 @@ class MapFields:
 
 
 def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
-    """Add a robot to a rule, or remove it. A rule of all robots becomes a rule of this robot.
+    """Add a robot to a rule, or remove it. A rule for all robots becomes a rule for this robot.
 
     Raises:
-        EditError: if it is the last robot of the rule: a rule without robots applies to all.
+        EditError: if it is the last robot in the rule, since a rule without robots applies to all robots.
     """
     if sketch.robot(name) is None:
-        return sketch  # the robot was removed meanwhile
+        return sketch  # the robot has been removed in the meantime
     robots = rule.robots
     if robots == (name,):
         raise EditError("edit.last-of-rule", rule.id, robot=name)
@@ -272,10 +272,10 @@ def with_robot_clicked(sketch: Sketch, rule: SketchRule, name: str) -> Sketch:
 
 
 def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: str | None) -> Sketch:
-    """Add a cell to the values of the decision `cells_of` or to the open rule, or remove it.
+    """Add a cell to the decision `cells_of` or to the open rule, or remove it.
 
     Raises:
-        EditError: if the cell is not on the map (any more), or is the last value.
+        EditError: if the cell is not on the map (any more), or is the last one.
     """
     check_cell(sketch, cell)
     decision = None if cells_of is None else sketch.decision(cells_of)

@@ -1,4 +1,4 @@
-"""The content of the board for a sketch: robots with their marks, and rules as links."""
+"""What the board shows for a sketch: robots with their marks, and rules as links."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from robochoc.app.sketch.troubles import About, Trouble
 from robochoc.app.texts import say
 
 COLOURS = 8
-"""The number of colours of rules (`--rule-0`, ... in the style), which are used in turn."""
+"""The number of colours for rules (`--rule-0`, ... in the style), which are used in turn."""
 MOST_LINKS = 12_000
-"""The maximum number of drawn links, for readability; the list of rules marks those that are not drawn."""
+"""The maximum number of links drawn, for readability. The list of rules marks the rules that are not drawn."""
 MOST_NEIGHBOURS = 300
-"""The maximum number of robots of a drawn rule on neighbours."""
+"""The maximum number of robots in a rule about neighbours that is drawn."""
 
 MOST_PAIRS = 300
-"""The maximum number of lines of a rule on pairs. With more, the rule is drawn as a hull around its robots."""
+"""The maximum number of lines for a rule about pairs. With more, the rule is drawn as a hull around its robots."""
 
 _PAIR = 2
 _SHAPES = {Links.EACH: "dots", Links.GROUP: "hull"}
@@ -41,7 +41,7 @@ class DrawnRobot(TypedDict):
 
 
 class DrawnLink(TypedDict):
-    """A rule on the board. `of` has the indices of its robots among all robots, pair by pair for lines."""
+    """A rule on the board. `of` contains the indices of its robots among all robots, in pairs if lines are drawn."""
 
     rule: str
     color: int
@@ -53,20 +53,20 @@ class DrawnLink(TypedDict):
 
 
 class LinksDrawn(msgspec.Struct, frozen=True):
-    """The links of a sketch, and the rules that are not drawn because they have too many."""
+    """The links in a sketch, and the rules that are not drawn because they have too many links."""
 
     drawn: list[DrawnLink]
     left_out: frozenset[str]
 
 
 def colour_of(rule: SketchRule) -> int:
-    """Return the number of a rule's colour, which never changes."""
+    """Return the number of a rule's colour, which is always the same."""
     digits = "".join(letter for letter in rule.id[1:6] if letter.isascii() and letter.isdigit())
     return (int(digits or "1") - 1) % COLOURS
 
 
 def robots_of(sketch: Sketch, troubles: Iterable[Trouble] = ()) -> list[DrawnRobot]:
-    """Return the drawn robots. Robots with errors or hints are marked."""
+    """Return the robots to draw. Robots with errors or hints are marked."""
     bad: dict[str, list[str]] = {}
     for trouble in troubles:
         if trouble.about == About.ROBOT:
@@ -91,7 +91,7 @@ def mark_of(robot: SketchRobot) -> str:
 
 
 def links_of(sketch: Sketch) -> LinksDrawn:
-    """Return the rules as links. Inactive and incomplete rules have none."""
+    """Return the rules as links. Inactive and incomplete rules have no links."""
     place = {robot.name: index for index, robot in enumerate(sketch.robots)}
     drawn: list[DrawnLink] = []
     left_out: set[str] = set()
@@ -109,7 +109,7 @@ def links_of(sketch: Sketch) -> LinksDrawn:
 
 
 def _groups(sketch: Sketch, rule: SketchRule, room: int) -> list[tuple[str, ...]] | None:
-    """Return a rule's links, or None if there are too many."""
+    """Return the groups of robots that a rule links, or None if there are too many."""
     entry, bound = PALETTE[rule.kind], sketch.bound(rule)
     if entry.links == Links.PAIRS and len(bound) * (len(bound) - 1) // 2 > MOST_PAIRS:
         return [bound]

@@ -1,4 +1,4 @@
-"""The panel of robots: the selection, and the names, weights and ranks of selected robots."""
+"""The panel for robots: the selection, and the names, weights and ranks of the selected robots."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class RobotsPanel:
                 self._cards = Cards(box, partial(_SelectedCard, desk))
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the panel to the current sketch."""
         sketch, selected = self._desk.sketch, self._desk.selected
         names = [robot.name for robot in sketch.robots]
         if self._choice.options != names or self._choice.value != selected:
@@ -37,7 +37,7 @@ class RobotsPanel:
         self._choice.set_visibility(bool(names))
         self._hint.set_text(say("model.selected-hint" if names else "model.no-robots-hint"))
         self._hint.set_visibility(not selected)
-        # by index, so that a robot that is being renamed keeps its card
+        # Keys are indices, so that a robot that is being renamed keeps its card.
         self._cards.follow([tuple(map(names.index, selected))] if selected else [])
 
     def _selected(self, names: list[str]) -> None:
@@ -66,7 +66,7 @@ class _SelectedCard:
         return tuple(self._desk.selected)
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the card to the current sketch."""
         robots = [robot for robot in self._desk.sketch.robots if robot.name in self._names]
         if not robots:
             return

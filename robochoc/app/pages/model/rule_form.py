@@ -1,4 +1,4 @@
-"""The form of an open rule: its decision, robots, fields, cost and privacy."""
+"""The form for an open rule: its decision, robots, fields, cost and privacy."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from robochoc.app.sketch.troubles import Trouble
 from robochoc.app.texts import say
 
 _SLIDER = 20
-"""The maximum of a slider, unless the value is larger; larger numbers are typed."""
+"""The maximum of a slider, unless the current value is larger. Larger numbers are typed."""
 _FIRST_COST = 1
 
 
@@ -45,11 +45,11 @@ class RuleForm:
                 ui.button(say("model.done"), icon="check", on_click=lambda: desk.open(None)).props("flat dense no-caps")
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the form to the current sketch."""
         rule = self._desk.sketch.rule(self._id)
         decision = None if rule is None else self._desk.sketch.decision(rule.decision)
         if rule is not None and decision is not None:
-            self._following = True  # changes of fields are not the user's now
+            self._following = True  # from here, changes in fields are not made by the user
             for follow in self._follow:
                 follow(rule, decision)
             self._following = False
@@ -205,7 +205,7 @@ class RuleForm:
 
 
 def _show_why(label: ui.label, off: Trouble | None) -> None:
-    """Show why an option is not available, and the remedy; None if it is available."""
+    """Show why an option is unavailable, and the remedy. None: it is available."""
     label.set_text("" if off is None else f"{off.text} {off.remedy}")
     label.set_visibility(off is not None)
 
@@ -213,7 +213,7 @@ def _show_why(label: ui.label, off: Trouble | None) -> None:
 def _slider_and_field(
     key: str, least: int, most: int, changed: Callable[[int], str | None]
 ) -> tuple[ui.slider, ui.number]:
-    """Add a slider, and a field for larger numbers."""
+    """Add a slider, and a field in which larger numbers can be typed."""
 
     def released(value: object) -> None:
         if isinstance(value, int) and least <= value <= most:
@@ -221,7 +221,7 @@ def _slider_and_field(
 
     slider = ui.slider(min=least, max=min(most, _SLIDER), step=1).props("label").classes("slide")
     slider.props["aria-label"] = say(key)
-    slider.on("change", lambda event: released(event.args))  # when it is released: one edit
+    slider.on("change", lambda event: released(event.args))  # sent when the slider is released: one edit
     field = number_field(key, least, most, changed)
     return slider, field
 
@@ -236,16 +236,16 @@ def _show_number(slider: ui.slider, field: ui.number, value: int, most: int) -> 
 
 
 MOST_PAIRS = 20_000
-"""The maximum number of pairs of a table."""
+"""The maximum number of pairs in a table."""
 _PAIR = 2
 _WORDS = ("caption", "many", "pair", "row", "column", "down", "across", "range", "back", "on")
 
 
 class PairTable(Element, component="pair_table.js"):
-    """Values by values, each a button.
+    """A table of all pairs of values, in which each pair is a button.
 
     Args:
-        changed: Called with the new rows.
+        changed: Called with the new rows after a click.
     """
 
     def __init__(self, changed: Callable[[list[list[Value]]], object]) -> None:
@@ -280,7 +280,7 @@ class PairTable(Element, component="pair_table.js"):
         try:
             top, left, bottom, right, on = msgspec.convert(event.args, tuple[int, int, int, int, bool])
         except msgspec.ValidationError:
-            return  # not from our table
+            return  # not sent by our table
         count = len(self._values)
         if not (0 <= top <= bottom < count and 0 <= left <= right < count):
             return
@@ -301,7 +301,7 @@ class PairTable(Element, component="pair_table.js"):
 def filled(
     rows: list[list[Value]], ones: tuple[Value, ...], others: tuple[Value, ...], *, on: bool
 ) -> list[list[Value]]:
-    """Return the rows of a table after adding, or removing, all pairs of `ones` and `others`."""
+    """Return the rows of a table after adding or removing all pairs of `ones` and `others`."""
     if not on:
         some, more = {*ones}, {*others}
         return [row for row in rows if not (len(row) == _PAIR and row[0] in some and row[1] in more)]

@@ -1,4 +1,4 @@
-"""The panel "Which rules?": each rule as a sentence with its form, and the palette for new rules."""
+"""The panel "Which rules?": each rule as a sentence with its form, and the palette for adding rules."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class RulesPanel:
             self._add = ui.button(say("model.add-rule"), icon="add", on_click=menu.open).props("no-caps unelevated")
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the panel to the current sketch."""
         sketch = self._desk.sketch
         self._add.set_enabled(bool(sketch.decisions))
         self._hint.set_text(say("model.rules-hint" if sketch.decisions else "model.rules-wait"))
@@ -57,7 +57,7 @@ class RulesPanel:
 
 
 class _RuleCard:
-    """A rule: its sentence, and its form when it is open."""
+    """The card of a rule: its sentence, and its form if it is open."""
 
     def __init__(self, desk: Desk, rules: RulesPanel, key: tuple[str, str]) -> None:
         self._desk, self._rules, (self._id, self._kind) = desk, rules, key
@@ -82,7 +82,7 @@ class _RuleCard:
         self.element.on("mouseleave", lambda: self._point(None))
 
     def follow(self) -> None:
-        """Update to the present sketch."""
+        """Update the card to the current sketch."""
         sketch, rule = self._desk.sketch, self._desk.sketch.rule(self._id)
         if rule is None:
             return
@@ -140,7 +140,7 @@ _PREFERENCE, _NEAR = "prefers", "rather"
 
 
 class PaletteMenu:
-    """A dialog with all rules that fit a decision."""
+    """A dialog with all rules that can apply to a decision."""
 
     def __init__(self, desk: Desk) -> None:
         self._desk = desk
@@ -201,7 +201,7 @@ class PaletteMenu:
 
 
 def costs_at_first(entry: PaletteRule) -> bool:
-    """Return whether a new rule of this kind has a cost."""
+    """Return whether a new rule of this kind has a cost by default."""
     return entry.graded or entry.key == _PREFERENCE
 
 
@@ -222,7 +222,7 @@ def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected:
 
 
 def _nearest(sketch: Sketch, robot: str, values: tuple[int | str, ...]) -> Setting:
-    """Return the place that is nearest to a robot's position."""
+    """Return the place nearest to a robot's position."""
     drawn = sketch.robot(robot)
     cells = [value for value in values if isinstance(value, int)]
     if drawn is None or not cells:

@@ -1,4 +1,4 @@
-"""The team's XML and Python sources, which follow the board, and the download of its files."""
+"""The team's XML and Python sources, which are updated after edits, and the download of its files."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 
 _QUIET_S = 0.5
-"""The time after an edit until the sources are written again."""
+"""The time in seconds between an edit and writing the sources again."""
 MOST_AT_ONCE = 40
-"""The maximum number of robots of a team whose sources are updated automatically; others are written on request."""
+"""The maximum number of robots for which sources are updated automatically; for larger teams, on request."""
 _COPY = """(event) => {
   const text = document.getElementById(%s).textContent;
   navigator.clipboard?.writeText(text);
@@ -64,7 +64,7 @@ class Sources:
         self._show_tab()
 
     def changed(self) -> None:
-        """Update the sources, or offer that, after a change of the team."""
+        """After a change in the team, update the sources or offer to update them."""
         large = len(self._desk.sketch.robots) > MOST_AT_ONCE
         self._ask.set_visibility(large and self._written is not self._desk.sketch)
         if not large:
@@ -77,7 +77,7 @@ class Sources:
         await self._write()
 
     async def _write(self) -> None:
-        """Write the sources in a thread, until they are those of the present team."""
+        """Write the sources in a thread, until they match the current team."""
         self._timer.deactivate()
         if self._writing:
             return
@@ -123,7 +123,7 @@ class Sources:
 
 
 def source_texts(sketch: Sketch) -> SourceTexts:
-    """Return the sources of a sketch."""
+    """Return the sources for a sketch."""
     if errors_of(sketch):
         return SourceTexts({}, "", say("model.source-wrong"))
     try:

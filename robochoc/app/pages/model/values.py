@@ -1,4 +1,4 @@
-"""Values of a decision as typed text: "1-5", "1, 2, 5", or names separated by commas."""
+"""The values of a decision as typed text: "1-5", "1, 2, 5", or names separated by commas."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from robochoc.app.sketch.sketch import NUMBERED, Decision, DecisionKind, Sketch
 _RANGE = re.compile(r"(-?\d{1,9})\s*(?:-|\u2013|\.{2,3}|to)\s*(-?\d{1,9})", re.ASCII)
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _FEW = 3
-"""The minimum number of consecutive numbers that are written as a range."""
+"""The minimum number of consecutive numbers written as a range."""
 
 
 def typed_values(kind: DecisionKind, text: str) -> tuple[int | str, ...]:
     """Return the typed values without duplicates.
 
     Raises:
-        EditError: if they are not of this kind, or too many.
+        EditError: if there are too many values, or they do not suit this kind of decision.
     """
     parts = [part.strip() for part in re.split(r"[,;\n]", text) if part.strip()]
     if len(parts) > limits.MAX_VALUES:
@@ -36,7 +36,7 @@ def typed_values(kind: DecisionKind, text: str) -> tuple[int | str, ...]:
 
 
 def written_values(values: tuple[int | str, ...]) -> str:
-    """Return values as text in the form in which they are typed."""
+    """Return values as text, in the form in which users type them."""
     parts: list[str] = []
     run: list[int] = []
     for value in values:
@@ -50,7 +50,7 @@ def written_values(values: tuple[int | str, ...]) -> str:
 
 
 def first_values(sketch: Sketch, kind: DecisionKind, names: str) -> tuple[int | str, ...]:
-    """Return the initial values of a decision: a number for each robot, or some names."""
+    """Return the initial values for a decision: a number for each robot, or some names."""
     if kind == DecisionKind.PLACE:
         return ()
     return tuple(range(1, max(len(sketch.robots), 3) + 1)) if kind in NUMBERED else typed_values(kind, names)
@@ -64,10 +64,10 @@ def free_decision_name(sketch: Sketch, stem: str) -> str:
 
 
 def with_cell(sketch: Sketch, decision: Decision, number: int) -> tuple[int | str, ...]:
-    """Return the cells of a place after adding or removing a cell; empty for all free cells.
+    """Return the cells of a place after adding or removing a cell; empty means all free cells.
 
     Raises:
-        EditError: if it is the last cell.
+        EditError: if the last cell would be removed.
     """
     cells = {*sketch.values(decision)} ^ {number}
     if not cells:

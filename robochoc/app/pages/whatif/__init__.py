@@ -1,1 +1,1 @@
-"""The page `whatif` of a team."""
+"""The page "What if" of a team."""

@@ -1,4 +1,4 @@
-"""The team's decision after a change: changed values, numbers of messages, and a panel if there is no solution."""
+"""The team's decision after a change: changed values, message counts, and a panel if there is no solution."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from robochoc.model.cost_units import cost_shown
 
 
 class WhatIfAnswer:
-    """The part of the page below the map. It is rebuilt after each change of the outcome."""
+    """The part of the page below the map, which is rebuilt after each change in the outcome."""
 
     def __init__(self, project: Project, story: Story) -> None:
         self._project, self._story = project, story
@@ -37,7 +37,7 @@ class WhatIfAnswer:
             self.follow()
 
     def follow(self) -> None:
-        """Show the present state."""
+        """Show the current state."""
         story = self._story
         state = story.running, story.outcome, story.message, story.run, story.run and story.run.state
         messages = _messages(story) if story.running else 0
@@ -189,11 +189,11 @@ def _failure(story: Story) -> str:
 
 
 ASIDE = "whatif-aside"
-"""The purpose of a run with withdrawals after a change."""
+"""The purpose of a run after a change in which robots may withdraw."""
 
 
 class WaysOut:
-    """The panel of the page "Decide" for a team without a solution, here for the changed team."""
+    """The panel for a team without a solution, as on the page "Decide", but for the changed team."""
 
     def __init__(self, project: Project, story: Story, after: Sketch) -> None:
         self._project, self._story, self._after = project, story, after
@@ -209,7 +209,7 @@ class WaysOut:
     def _decide(self, *, withdraw: bool = False) -> None:
         if withdraw:
             self._follow(runs_of(self._project).start(RunOptions(withdraw=True), sketch=self._after, purpose=ASIDE))
-        else:  # a rule was changed: decide again before and after the changes
+        else:  # a rule was changed, so decide again before and after the changes
             self._deciding = asyncio.get_running_loop().create_task(self._story.decide())
 
     def _end(self) -> None:
@@ -241,5 +241,5 @@ class WaysOut:
 def _is_of(run: Run, sketch: Sketch) -> bool:
     try:
         return run.sketch == sketch
-    except (OSError, ValueError):  # its files are damaged
+    except (OSError, ValueError):  # the run's files are damaged
         return False

@@ -1,4 +1,4 @@
-"""The comparison of a team's decisions before and after a change."""
+"""Compares a team's decisions before and after a change."""
 
 from __future__ import annotations
 
@@ -25,12 +25,12 @@ class Fate(StrEnum):
     LEFT = "left"
     NEW = "new"
     OPEN = "open"
-    """Not comparable: no solution before or after the change."""
+    """Not comparable, since there is no solution before or after the change."""
 
 
 @dataclass(frozen=True)
 class ComparisonRow:
-    """A decision of a robot before and after the change, in words; empty if there is none."""
+    """A robot's decision before and after the change, in words; empty if there is none."""
 
     robot: str
     decision: str
@@ -82,7 +82,7 @@ class DecisionComparison:
 
 
 def part_of(sketch: Sketch, model: Model | None, result: RunResult) -> TeamDecision:
-    """Return the decision of a run. `model`: the solved model, if it is not that of the sketch."""
+    """Return the decision in a run. `model`: the solved model, if it is not the model of the sketch."""
     values = decided(sketch, result.values, model)
     return TeamDecision(result.verdict, values, result.cost, result.messages)
 
@@ -90,7 +90,7 @@ def part_of(sketch: Sketch, model: Model | None, result: RunResult) -> TeamDecis
 def parts_of_epochs(
     before: Sketch, after: Sketch, model: Model, result: RunResult
 ) -> tuple[TeamDecision, TeamDecision] | None:
-    """Return the decisions in both epochs of a run; None if the run has only one."""
+    """Return the decisions in the two epochs of a run, or None if the run has only one epoch."""
     sketches = before, after
     if len(result.epochs) != len(sketches):
         return None
@@ -109,7 +109,7 @@ def parts_of_epochs(
 def compare(
     before: tuple[Sketch, TeamDecision], after: tuple[Sketch, TeamDecision], protocol: str
 ) -> DecisionComparison:
-    """Return the comparison of both decisions, with new robots in the last rows."""
+    """Compare both decisions. New robots are in the last rows."""
     rows = tuple(_rows(before, after))
     return DecisionComparison(before[1], after[1], rows, protocol)
 
@@ -143,6 +143,6 @@ def _fate(was: Decision | None, now: Decision | None, old: Value | None, new: Va
 
 
 def _decision(sketch: Sketch, robot: str, name: str) -> Decision | None:
-    """Return a decision of a robot, by its name."""
+    """Return a robot's decision by name."""
     decision = sketch.decision(name)
     return decision if decision is not None and robot in sketch.deciders(decision) else None

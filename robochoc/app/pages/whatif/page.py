@@ -121,7 +121,7 @@ class WhatIfPage:
         self._row.set_value(cell.y + 1)
 
     def _act(self, chosen: BoardAction) -> None:
-        """Add the event that was chosen at a robot or a cell of the map."""
+        """Add the event that the user selected at a robot or a cell of the map."""
         name, cell = chosen.name, Cell(chosen.x, chosen.y)
         changes: dict[str, AnyTeamChange] = {
             "fail": RobotFails(name),
@@ -186,7 +186,7 @@ class WhatIfPage:
                     back.props("flat round dense").props["aria-label"] = say("whatif.back", what=text)
 
     async def _link(self) -> None:
-        """Draw the rules and show errors, which are computed in a thread: this is slow for large teams."""
+        """Draw the rules and show errors. Both are computed in a thread, since that is slow for large teams."""
         self._linking.deactivate()
         after = self._story.after()
         pair = self._project.sketch, after
@@ -207,7 +207,7 @@ def _links_and_errors(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, s
 
 
 def _offered(sketch: Sketch) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the possible events of a robot, and of a cell."""
+    """Return the possible events for a robot, and for a cell."""
     robot = {"fail": say("whatif.fail")}
     if any(decision.kind == DecisionKind.LEVEL for decision in sketch.decisions):
         shares = {"half": FULL // 2, "quarter": FULL // 4}

@@ -1,6 +1,6 @@
-"""The changes of a team on the page "What if", and its decisions before and after them, shared by all tabs.
+"""The changes made to a team on the page "What if", and its decisions before and after, shared by all tabs.
 
-They are saved in the team's folder (`whatif.json`), and the changes of a run in its folder (`change.json`).
+The changes are saved in the team's folder (`whatif.json`), and the changes in a run in its folder (`change.json`).
 """
 
 from __future__ import annotations
@@ -40,13 +40,13 @@ from robochoc.solver.errors import UnsupportedError
 PURPOSE = "whatif"
 """The purpose of the run that decides before and after the change."""
 BESIDE = "whatif-anew"
-"""The purpose of the second run, in which only the changed team decides, from scratch."""
+"""The purpose of the second run, in which the changed team decides from scratch."""
 _STORY = "whatif.json"
 MOST_CHANGES = 50
 
 
 class SavedChange(msgspec.Struct):
-    """The change of a run: the team after it, its events in words, and why the team decides from scratch, if so.
+    """The change in a run: the resulting team, its events in words, and why it decides from scratch, if it does.
 
     `beside`: the id of the second run.
     """
@@ -58,7 +58,7 @@ class SavedChange(msgspec.Struct):
 
 
 class Story:
-    """The changes of a team, and the runs before and after them."""
+    """The changes to a team, and the runs before and after them."""
 
     def __init__(self, project: Project) -> None:
         self._project = project
@@ -78,11 +78,11 @@ class Story:
     # Changes
 
     def after(self) -> Sketch:
-        """Return the team after all changes. Raises `EditError` if they are not possible any more."""
+        """Return the team after all changes. Raises `EditError` if they are no longer possible."""
         return changed(self._project.sketch, self.changes)
 
     def words(self) -> list[str]:
-        """Return the changes in words. Changes that are not possible any more, after an edit, are dropped."""
+        """Return the changes in words. Changes that an edit has made impossible are dropped."""
         while True:
             try:
                 return sentences_of(self._project.sketch, self.changes)
@@ -100,7 +100,7 @@ class Story:
         self._changed()
 
     def remove_change(self, place: int) -> None:
-        """Remove one change, and later changes that are not possible without it."""
+        """Remove one change, and the later changes that are impossible without it."""
         self.changes = self.changes[:place] + self.changes[place + 1 :]
         self.changes = self._possible()
         self._changed()
@@ -157,7 +157,7 @@ class Story:
                 run.stop()
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
-        """Call `callback` after each change; return a function that removes it."""
+        """Call `callback` after each change. Returns a function that removes the callback."""
         return self._listeners.add(callback)
 
     def _on_run_change(self) -> None:
@@ -169,7 +169,7 @@ class Story:
         self._listeners()
 
     def _follow(self) -> None:
-        """Start the second run after the first one, and compute the outcome after both."""
+        """Start the second run after the first, and compute the outcome after both runs."""
         run, saved_change = self.run, self.saved_change
         if run and saved_change and run.state != RunState.RUNNING:
             if self.second_run is None and run.state == RunState.ENDED and run.result and self._needs_second_run(run):
@@ -183,7 +183,7 @@ class Story:
                 self._compute_later(self._comparison)
 
     def _compute_later(self, work: Callable[[], DecisionComparison | None]) -> None:
-        """Compute the outcome in a thread, since this is slow for a large team."""
+        """Compute the outcome in a thread, since that is slow for a large team."""
 
         async def compute() -> None:
             found = await run_query(work)
@@ -198,7 +198,7 @@ class Story:
         self._task = asyncio.get_running_loop().create_task(compute())
 
     def _needs_second_run(self, run: Run) -> bool:
-        """Return whether a run from scratch must be measured: the protocol is dynamic, or the first run is not."""
+        """Return whether a run from scratch must be measured: the protocol is dynamic, or the first run was not."""
         return bool(self.saved_change and self.saved_change.anew) or bool(
             run.result and is_dynamic(run.result.protocol)
         )
@@ -219,7 +219,7 @@ class Story:
         return None
 
     def _find_last(self) -> None:
-        """Load the last runs, from before a restart of the server."""
+        """Load the last runs, which were started before a restart of the server."""
         runs = runs_of(self._project)
         run = runs.latest_for(PURPOSE)
         if run is None or run.state == RunState.RUNNING:
@@ -235,7 +235,7 @@ class Story:
                 (self.run.folder / CHANGE).write_bytes(msgspec.json.encode(self.saved_change))
 
     def _possible(self) -> tuple[AnyTeamChange, ...]:
-        """Return the changes that are possible for the present team."""
+        """Return the changes that are possible for the current team."""
         found: list[AnyTeamChange] = []
         sketch = self._project.sketch
         for change in self.changes:
@@ -257,7 +257,7 @@ class Story:
 
 
 def story_of(project: Project) -> Story:
-    """Return the changes of a team; the same object for all pages."""
+    """Return the changes to a team, which are the same object for all pages."""
     return project.part(Story)
 
 
@@ -276,17 +276,17 @@ def _compared(
 
 
 def _checked(before: Sketch, after: Sketch) -> Model:
-    """Return the model with the changes. Raises `ModelError` or `InvalidInputError` for errors of either team."""
+    """Return the model with the changes. Raises `ModelError` or `InvalidInputError` if either team has errors."""
     _ = model_of(after).team
     return changing_model(before, after)
 
 
 MOST_CHOSEN_FOR = 60
-"""For larger teams, the choice of `auto` is not computed before the run."""
+"""The most robots for which the choice of `auto` is computed before the run."""
 
 
 def why_not_continue(before: Sketch, after: Sketch) -> str:
-    """Return the reason why the team must decide from scratch after a change; empty if it can continue.
+    """Return the reason why the team must decide from scratch after a change, or an empty text if it can continue.
 
     Args:
         before: The team before the change.
@@ -301,7 +301,7 @@ def why_not_continue(before: Sketch, after: Sketch) -> str:
         return _by_protocol(changing_model(before, after).team)
     except FromScratchError as anew:
         return say("whatif.all-anew", why=say(anew.key, **anew.named))
-    except (ModelError, InvalidInputError, UnsupportedError):  # the error is shown elsewhere
+    except (ModelError, InvalidInputError, UnsupportedError):  # another part of the page shows the error
         return ""
 
 
@@ -313,6 +313,6 @@ def _by_protocol(team: Team) -> str:
 
 
 def _has_secrets(sketch: Sketch) -> bool:
-    """Return whether two robots have a rule that only one of them knows."""
+    """Return whether any two robots have a rule that only one of them knows."""
     private = [rule for rule in sketch.rules if rule.on and rule.private and rule.kind in PALETTE]
     return any(PALETTE[rule.kind].links != Links.EACH for rule in private)
