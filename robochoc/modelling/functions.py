@@ -110,9 +110,9 @@ def costs(terms: object, table: Mapping[Any, object] | Iterable[Any], default: o
 
     Args:
         terms: The terms, or a single term.
-        table: Numbers by tuples of values; for a single term, by values. `math.inf` forbids the values. Or a
-            list of numbers for all values of a variable, in the order of its domain; for two variables a matrix with a
-            row for each value of the first one; and so on. Arrays of numpy are lists, too.
+        table: A mapping from tuples of values to numbers; for a single term, from values. `math.inf` forbids.
+            Or a list of numbers, one for each value of a variable in the order of its domain; for two variables a
+            matrix with a row for each value of the first variable, and so on. Arrays of numpy are also allowed.
         default: The number for all other values; `math.inf` forbids them.
     """
     scope = _scope(terms)
