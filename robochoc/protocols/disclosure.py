@@ -1,10 +1,10 @@
 """Statements about robots' problems: messages declare with them what their receivers learn (`Message.proves`).
 
-Each message type declares its own rule. Its proofs are true statements, each on its own: about the problem, which does
-not change during a run, and about the value that a robot has chosen. `robochoc/privacy` adds up the consequences.
-In all of them the *own cost* of a robot's value, in a view of other robots' values, is the cost of this value in the
-robot's private constraints, plus that of every constraint between this robot and robots of the view whose other robots
-are all in the view. `INFINITE` is a broken hard constraint, or a value that is not possible for the robot.
+Each message type declares its own rule. Its proofs are true statements, each by itself, about the problem, which does
+not change during a run, and about the value that a robot has chosen. `robochoc/privacy` adds up the consequences. In
+all statements, the *own cost* of a robot's value, in a view of other robots' values, is the cost of this value in the
+robot's private constraints, plus its cost in every constraint between this robot and robots in the view whose other
+robots are all in the view. `INFINITE` means a broken hard constraint, or a value that is not possible for the robot.
 
 The observer is assumed to know, from the start: its own problem; the constraints that it shares, except other robots'
 parts of partially known ones; the declared domains of all variables that neighbours see; the order; and which robots

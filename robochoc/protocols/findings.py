@@ -39,10 +39,10 @@ class Listing(msgspec.Struct, frozen=True):
 class Findings(msgspec.Struct, frozen=True):
     """A robot's knowledge about the whole search; None for information that the robot or its protocol does not have.
 
-    `bound` is a lower bound on the cost of every assignment of its robots (for a root: those of its tree; for the first
-    robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, as it may need more than 64
-    bits; `listing` has the robot's values in some of them. `left` are the places of the values that remain after
-    preprocessing.
+    `bound` is a lower bound on the cost of every assignment of the robots that it covers (for a root: the robots of its
+    tree; for the first robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, because it
+    may need more than 64 bits; `listing` has the robot's values in some of these optima. `left` contains the indices of
+    the values that remain after preprocessing.
     """
 
     best: Incumbent | None = None

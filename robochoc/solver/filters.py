@@ -2,7 +2,7 @@
 
 A filter is a bitmap over the possible values of the other robot by common knowledge: the product of its interface
 variables' declared domains, in ascending order. Bit 0 of byte 0 is the first (Brito, Meisels, Meseguer and Zivan,
-Constraints 14, 2009: the "filtered domain" that DisFC sends in place of the robot's value).
+Constraints 14, 2009: the "filtered domain" that DisFC sends instead of the robot's value).
 """
 
 from __future__ import annotations

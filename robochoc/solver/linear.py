@@ -1,4 +1,4 @@
-"""Predicates as comparisons of sums for solvers, in place of tables that would be too large.
+"""Predicates as comparisons of sums for solvers, instead of tables that would be too large.
 
 A predicate on two tasks in a job shop, `or(le(add(x,50),y),le(add(y,61),x))`, would have as many rows as the square of
 the horizon. Solvers handle its comparisons quickly. They receive only comparisons of sums with a constant, joined by

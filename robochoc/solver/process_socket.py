@@ -1,4 +1,4 @@
-"""The socket between this process and that of a solver.
+"""The socket between this process and a solver's process.
 
 On POSIX systems the solver's process inherits its end of a socket pair. Windows cannot pass descriptors: there the
 process connects to a port of the loopback interface, and sends a token that it reads from its standard input.
@@ -16,7 +16,7 @@ from collections.abc import Callable
 _HOST = "127.0.0.1"
 _TOKEN_BYTES = 32
 _START_S = 60.0
-"""The longest time in which a new process connects, in seconds."""
+"""The maximum time for a new process to connect, in seconds."""
 _TICK_S = 0.2
 
 

@@ -84,7 +84,7 @@ class Split:
     # Sums
 
     def _compare(self, operator: str, left: Expression, right: Expression) -> None:
-        """Add tables that are equivalent to a comparison, as a sum of terms compared with zero."""
+        """Add tables that are equivalent to a comparison, rewritten as a sum of terms compared with zero."""
         terms: dict[Expression, int] = {}
         target = -collect_terms(left, 1, terms) - collect_terms(right, -1, terms) + _STRICT.get(operator, 0)
         kept = [(term, factor) for term, factor in terms.items() if factor or _may_be_undefined(term)]

@@ -92,7 +92,7 @@ GIB = 1 << 30
 
 
 class DPOPSettings(Settings, frozen=True):
-    """`memory`: the most bytes of a robot's tables. A run that needs more ends before it makes a table."""
+    """`memory`: the maximum number of bytes in a robot's tables. A run that needs more ends before it makes any."""
 
     memory: int = GIB
 

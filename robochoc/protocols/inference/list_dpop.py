@@ -71,7 +71,7 @@ MOST_LISTED = 10_000
 
 
 class ListDPOPSettings(DPOPSettings, frozen=True):
-    """`limit`: the most optima that are listed. `memory`: the most bytes of a robot's tables."""
+    """`limit`: the maximum number of optima listed. `memory`: the maximum number of bytes in a robot's tables."""
 
     limit: int = 100
 
@@ -82,7 +82,7 @@ class ListDPOPSettings(DPOPSettings, frozen=True):
 
 
 Number = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]+\Z", max_length=MOST_BITS // 4)]
-"""Hexadecimal digits, as the number may need more than 64 bits."""
+"""Hexadecimal digits, because the number may need more than 64 bits."""
 
 
 class ListedValues(Message, frozen=True):

@@ -1,9 +1,9 @@
 """Max-Sum.
 
-Local message passing on the factor graph; here it minimises costs, so it is a min-sum. Each robot's variable is a node,
-and so is each function: the sum of all constraints over the same robots. R, from function to variable, is the minimum
-cost of each value by that function, given the other variables' messages. Q, from variable to function, is the cost of
-each value by all other functions. A robot chooses the value with the lowest sum.
+Local message passing on the factor graph; here it minimises costs, so it is a min-sum algorithm. Each robot's variable
+is a node, and so is each function, the sum of all constraints over the same robots. R, from function to variable, is
+the minimum cost of each value in that function, given the other variables' messages. Q, from variable to function, is
+the cost of each value in all other functions. A robot chooses the value with the lowest sum.
 
 - **When to use**: costs, a large team, a graph with few cycles.
 - **Guarantees**: incomplete; it stops after `cycles` cycles. On a graph without cycles the result is optimal (without

@@ -1,8 +1,8 @@
 """Memory-bounded DPOP (MB-DPOP).
 
-DPOP (see `dpop.py`) whose tables have at most `k` dimensions. If a robot's separator is larger, some of its robots are
-fixed: the *cycle-cut* robots. Their values are enumerated by a *cluster root*, which sends them down (`Context`) and
-receives a table for each combination. So memory is bounded, and more messages are needed.
+DPOP (see `dpop.py`) whose tables have at most `k` dimensions. If a robot's separator is larger, some robots in it, the
+*cycle-cut* robots, are fixed. A *cluster root* enumerates their values: it sends each combination down (`Context`) and
+receives a table for it. So memory is bounded, but more messages are needed.
 
 - **When to use**: costs, on a pseudo-tree too wide for `dpop`. If `k` is at least the induced width, it is the same as
   DPOP.

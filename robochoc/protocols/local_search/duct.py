@@ -1,8 +1,8 @@
 """Distributed Upper Confidence Tree (DUCT).
 
 Sampling on a pseudo-tree. A sample starts at the root: each robot receives the values above it that matter to its
-subtree (the context), chooses a value, and sends the context on. The costs of the sample come back from the leaves. A
-robot counts for each context how often it has tried each value, and stores the costs. It tries the value with the best
+subtree (the context), chooses a value, and sends the context on. The costs of the sample come back from the leaves. For
+each context, a robot counts how often it has tried each value, and stores the costs. It tries the value with the best
 confidence bound: cheap values often, and rarely tried values now and then.
 
 - **When to use**: costs, and a pseudo-tree that is too wide for `dpop`: the more samples, the better the result.
@@ -21,8 +21,9 @@ The parts of the algorithm:
     the end of a robot's samples    `Samples.enough`      the value at the end           `Samples.final`
 
 After its samples, the root fixes the value with the best cost. Then its children continue to sample, each as the root
-of its own subtree, until they fix theirs, and so on. A robot stops when with the given confidence no other value is
-better by more than `error`, but after `samples` samples in this context at the latest. Its earlier samples count.
+of its own subtree, until they fix their values, and so on. A robot stops when, with the given confidence, no other
+value is better by more than `error`, or at the latest after `samples` samples in this context. Its earlier samples
+count.
 
 Choices that the paper leaves open, and differences:
 
@@ -262,7 +263,7 @@ class Samples:
         return min(places, key=self._local.__getitem__)
 
     def _mean(self, place: int) -> float:
-        """Return the mean cost of a value's samples, as a part of the highest possible cost of the subtree."""
+        """Return the mean cost of a value's samples, as a fraction of the highest possible cost of the subtree."""
         return self._sums[place] / (self._tries[place] * self._scale)
 
     def _measure(self, place: int, settings: DUCTSettings) -> float:
@@ -285,8 +286,7 @@ class DUCT(TreeProtocol):
     """One agent of DUCT.
 
     State: `separators` of the children, this robot's `separator`, `dearest` (the highest possible cost of the subtree),
-    `known` (the samples of each context), and of the present sample the `view` (the context) and its `samples`.
-    `fixed`: the robots above have chosen their values. `chosen`: this robot has chosen, too.
+    `known` (the samples in each context), and, for the present sample, the `view` (the context) and its `samples`.
     """
 
     messages = TreeMessage | Separator | SampleContext | SampleCost | Fixed

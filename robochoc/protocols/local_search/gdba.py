@@ -86,7 +86,7 @@ Raised = tuple[int, int]
 """The numbers of raises: in cycles that broke the constraint, and in cycles in which it only had a cost."""
 
 Key = tuple[int | None, OtherValues | None]
-"""The entries of a table that are raised together: those of one code of this robot's values, of others' values, all."""
+"""The entries of a table that are raised together: for one code of this robot's values, for others' values, or all."""
 
 MOST = 1 << 62
 """The largest reduction that is sent: effective costs may exceed the integers of a message."""

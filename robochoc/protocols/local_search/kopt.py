@@ -76,7 +76,7 @@ MOST = 8
 
 
 class KOptSettings(CycleSettings, frozen=True):
-    """`k`: the most robots that may move together. `cycles`: the number of cycles."""
+    """`k`: the maximum number of robots that may move together. `cycles`: the number of cycles."""
 
     k: int = 3
 

@@ -148,7 +148,7 @@ class ADOPT(BoundingProtocol):
     def _maintain_allocation_invariant(self) -> None:
         """Split the threshold into this robot's cost and the children's shares; send the shares."""
         index = self.index
-        if self.threshold == INFINITE:  # no value is possible in this context, as the parent will learn
+        if self.threshold == INFINITE:  # no value is possible in this context; the parent will learn this
             return
         split_threshold(self.threshold - self.delta[index], self.t, self.bounds, index)
         for child, t in self.t.items():

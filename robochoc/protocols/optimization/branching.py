@@ -2,10 +2,10 @@
 
 While the robots above keep their values, a robot has the subtrees of its children searched for a cost below a limit. It
 does not commit to a value: it tries its values in each subtree by increasing lower bound, and different subtrees may be
-searched with different values at the same time. For each value and child it knows a lower bound on the subtree's cost,
-and later the cost itself; or that no solution with the value costs less than the best known one. A value is ruled out
-once its own cost and the bounds of all subtrees add up to that cost. The cheapest value with all subtrees searched is
-the best.
+searched with different values at the same time. For each value and child the robot knows a lower bound on the subtree's
+cost. Later it knows the cost itself, or that no solution with the value costs less than the best known solution. A
+value is ruled out once its own cost and the bounds of all subtrees add up to the cost of that solution. The cheapest
+value whose subtrees have all been searched is the best.
 
 A child returns the best assignment of its subtree with the assignment's cost. So nothing is searched again, and the
 root knows the best assignment of its tree at any time.

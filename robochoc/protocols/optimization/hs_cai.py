@@ -168,8 +168,8 @@ class Domain(Message, frozen=True):
 class PreUtil(Message, frozen=True):
     """A lower bound on the cost of the sender's subtree for all values of the robots in `axes` (PREUTIL).
 
-    `dropped`: other robots above that matter to the subtree; the bound holds for all their values. `dearest`: the
-    maximum cost of a solution of the subtree.
+    `dropped`: other robots above that matter to the subtree; the bound holds for all their values. `dearest`: an upper
+    bound on the cost of a solution of the subtree.
     """
 
     axes: list[Axis]

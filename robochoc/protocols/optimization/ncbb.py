@@ -1,9 +1,10 @@
 """No-Commitment Branch and Bound (NCBB).
 
 Complete search for minimum cost on a pseudo-tree, in linear memory. First a greedy assignment gives an upper bound.
-Then each robot has the subtrees of its children searched for one of its values after the other. It does not commit to
-a value: different subtrees may be searched for different values at the same time, each by increasing lower bound. The
-bounds come from the robots of the subtree that it shares constraints with: it asks them before it searches for a value.
+Then each robot has the subtrees of its children searched for its values, one after the other. It does not commit to a
+value: different subtrees may be searched for different values at the same time, each by increasing lower bound. The
+bounds come from those robots in the subtree with which it shares constraints: it asks them before it searches for a
+value.
 
 - **When to use**: costs, a pseudo-tree with branches, little memory.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Each robot

@@ -20,11 +20,12 @@ The methods and messages correspond to AFB's procedures:
     assign_CPA   `_extend`       backtrack      `_explored`
     CPA_MSG      `CPAs`          NEW_SOLUTION   `Solution`
 
-Batches are an addition of this project: one message carries many CPAs, all of the same robots. The first CPAs are sent
-one at a time, down to a first solution. Then each robot doubles the number of CPAs it extends each time, up to `batch`
-and `memory`, the lowest bounds first. The search stays depth first, by batches. One robot acts at a time. With `window`
-at 2 or more, robots extend the next CPAs while lower robots work on the last ones, an idea of concurrent search (Zivan,
-Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it gained nothing.
+Batches are an addition by this project: one message contains many CPAs, all of the same robots. The first CPAs are sent
+one at a time, until a first solution is found. Then each robot doubles the number of CPAs that it extends each time, up
+to `batch` and `memory`, the lowest bounds first. The search remains depth first, batch by batch. One robot acts at a
+time. If `window` is 2 or more, robots extend the next CPAs while lower robots work on the last ones, an idea from
+concurrent search (Zivan, Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). In measurements on two
+cores this gained nothing.
 
 The course of a search: first, two waves exchange the domains of all robots. The first goes down the order; the second
 comes back up, with the charges of the values and an upper bound on all costs. The last robot turns CPAs into solutions.

@@ -1,10 +1,10 @@
 """The bounds in `sfb` for problems without costs: bits instead of numbers.
 
-Without costs the ceiling is 1. So an entry of a vector is 0 if the value is consistent with the chosen values, and 1 if
-not. Here it is a bit, 1 or 0: the vectors of all robots below are one integer, with a field for each robot. Choosing a
-value is one AND of integers. The test for an empty field, which raises the bound to 1, takes one subtraction for all
-fields together. The rows are those of `sfb_bounds` for the same team, in the same order. A row takes fewer bytes, so
-more of them fit into a message.
+Without costs the ceiling is 1. So an entry in a vector is 0 if the value is consistent with the chosen values, and 1 if
+not. Here the entry is a bit, 1 if consistent and 0 if not: the vectors of all robots below are one integer, with a
+field for each robot. Choosing a value takes one AND of integers. The test for an empty field, which raises the bound to
+1, takes one subtraction for all fields together. The rows are the same as those of `sfb_bounds` for the same team, in
+the same order. A row takes fewer bytes, so more rows fit into a message.
 
 A row is a pair: the indices of the values of all robots above, and the integer. The lowest field of the integer belongs
 to the robot that extends the row next. A field has a bit for each value, the first value lowest, and above these a bit

@@ -1,8 +1,8 @@
 """Partial assignments as rows of an array, and the costs that one robot adds to them, for `sfb`.
 
-A row is a partial assignment: its lower bound, its robots' cost, the place of each robot's value, and then, for each
-robot below in priority order, a vector: the cost of each of that robot's values with the values above. The bound is the
-cost plus the least of each vector.
+A row is a partial assignment: its lower bound, the cost of its robots, the index of each robot's value, and then, for
+each robot below in priority order, a vector with the cost of each of that robot's values, given the values above. The
+bound is the cost plus the minimum of each vector.
 
 All costs are whole numbers. The `ceiling`, one more than the maximum sum of all constraints and charges, represents
 infinity, and larger numbers are reduced to it. So the numbers are as small as the problem allows, usually one byte

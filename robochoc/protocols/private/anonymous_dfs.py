@@ -1,13 +1,13 @@
 """Pseudo-trees that robots build without names: messages contain no names of robots, and no numbers of neighbours.
 
 As in `shared/dfs.py` a root is elected by waves of all candidates (the echo algorithm with extinction; Tel,
-"Introduction to Distributed Algorithms", 2nd edition, 2000, Section 7.2), and a token goes depth first from there. The
-differences, for privacy: a candidate has a random score, which reveals neither its name nor its degree; the token
-contains no names, so it bounces off visited robots (Cheung, IEEE TSE 9(4), 1983), two more messages for each edge
-outside the tree; and a robot sends it to its neighbours in a random order.
+"Introduction to Distributed Algorithms", 2nd edition, 2000, Section 7.2), and a token visits all robots depth first
+from there. The differences protect privacy: a candidate has a random score, which reveals neither its name nor its
+degree; the token contains no names, so it bounces off visited robots (Cheung, IEEE TSE 9(4), 1983), which takes two
+more messages for each edge outside the tree; and a robot sends it to its neighbours in a random order.
 
-A robot that receives the token again is above its sender: a visited neighbour below it would have sent the token here
-before.
+A robot that receives the token again is above the sender: if it were below, it would have sent the token to the sender
+earlier.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """The range of costs and the sizes of tables in the linear orders of P2-DPOP, before any table is made.
 
-There is a linear order for each turn: the circle, from the turn's root round to it. A plan goes along it: the axes of
-the later table. A robot asks its neighbours which of them come later. It will add the constraints whose other robots
-all come later: so its table has their axes, and those of the received plan without its own.
+There is a linear order for each turn: the circle, from the root of the turn round to the root again. A plan is sent
+along this order: it contains the axes of the later table. A robot asks its neighbours which of them come later in the
+order. It will add the constraints whose other robots all come later: so its table has the axes of these robots, and the
+axes in the received plan except its own.
 """
 
 from __future__ import annotations

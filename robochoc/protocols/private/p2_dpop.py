@@ -1,11 +1,11 @@
 """P2-DPOP: DPOP on tables that no robot can read; robots do not send their values, domains or costs.
 
-As in P3/2-DPOP the robots form a circle, and are the root in turns that no other robot knows. But tables are encrypted
-to the whole team, and go round the circle, from the root of the turn back to it. Each robot on the way adds its costs,
-minimises over its own values, and encrypts the table again; it reads nothing. Encrypted costs can only be added to
-known ones, not to each other: so there is one table, along a linear order, instead of one for each branch of a tree.
-The root has some ciphers opened by all robots: by bisection it reads the minimum cost, and one of its values that
-attains it. It keeps the value; from then on its costs are those of that value.
+As in P3/2-DPOP the robots form a circle and take turns as the root, in an order that no other robot knows. But tables
+are encrypted to the whole team, and go round the circle, from the root of the turn back to it. Each robot on the way
+adds its costs, minimises over its own values, and encrypts the table again, without reading anything. Encrypted costs
+can only be added to known costs, not to each other: so there is one table, along a linear order, instead of one for
+each branch of a tree. The root has some ciphers opened by all robots: by bisection it finds the minimum cost, and one
+of its values that attains this cost. It keeps the value; from then on it only adds the costs of this value.
 
 - **When to use**: costs, and no robot may learn a value, a domain or a cost. For small problems: a table has a cell for
   each combination of values of the robots that come later and are linked to those before, and each cell has a cipher

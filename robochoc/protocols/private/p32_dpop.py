@@ -1,11 +1,12 @@
 """P3/2-DPOP: P-DPOP in which no robot sends its value; the robots take turns at the root.
 
-P-DPOP's tables go up, under keys, and only the root sees the consequences of its values. Here nothing goes down: the
-root chooses its best value, and keeps it; from then on its tables are those of that value. Then another robot is the
-root, of another tree over the same constraints, until each has been it. Only the robot itself knows its turn. For that
-the robots form a circle, along the first tree. Each has a vector of encrypted bits, a bit for each turn; it goes round,
-and every robot shuffles it, in the same way for all vectors, and encrypts it again. Then all robots but its owner
-remove their shares of the key, and the owner reads its turn as the root.
+In P-DPOP tables go up, protected by keys, and only the root sees the consequences of its values. Here nothing goes
+down: the root chooses its best value, and keeps it; from then on its tables are the tables for that value. Then another
+robot becomes the root, of another tree over the same constraints, until each robot has been the root. Only the robot
+itself knows its turn. To achieve this, the robots form a circle, along the first tree. Each robot has a vector of
+encrypted bits, one bit for each turn. The vector goes round, and every robot shuffles it, in the same way for all
+vectors, and encrypts it again. Then all robots but its owner remove their shares of the key, and the owner reads its
+turn as the root.
 
 - **When to use**: costs, and no robot, not even a neighbour, may learn a value. The price: one P-DPOP for each robot,
   and messages for the vectors that grow with the square of the number of robots.

@@ -1,11 +1,11 @@
 """Private DPOP (P-DPOP): DPOP whose tables use codenames, codes and random keys.
 
-Dynamic programming on a pseudo-tree, as DPOP, for minimum cost. Each robot sends its neighbours below (`Codes`) a
-codename for itself, its values in a random order, and a random key for each value, another for each neighbour. Tables
-(UTIL) contain codenames instead of robots' names, and codes instead of values; the robot that makes a table adds, for
-each neighbour above, the key of that neighbour's value. Robots in between join and minimise without understanding: a
-key depends on an axis that is still there. The robot with the codename knows all keys that were added for it, and
-subtracts them. From the root down, robots receive the codes of the values above them (VALUE).
+Dynamic programming on a pseudo-tree for minimum cost, as in DPOP. Each robot sends its neighbours below (`Codes`) a
+codename for itself, its values in a random order, and a random key for each value; the keys are different for each
+neighbour. Tables (UTIL) contain codenames instead of robots' names, and codes instead of values; the robot that makes a
+table adds, for each neighbour above, the key of that neighbour's value. Robots in between join and minimise tables that
+they cannot read: a key depends on an axis that is still there. The robot with the codename knows all keys that were
+added for it, and subtracts them. From the root down, robots receive the codes of the values above them (VALUE).
 
 - **When to use**: costs, and constraints that third robots must not learn. It can be used if DPOP's tables fit into
   memory; it is slower.

@@ -1,12 +1,12 @@
 """Agile Asynchronous Backtracking (Agile-ABT).
 
-ABT with an order that changes at dead ends, without limits on which robot may move. An Ok carries the sender's
-explanation with the value: the robots that its nogoods depend on, and its number of remaining values. A robot without a
-value left may send the nogood to any robot of the conflict. For each of them it computes an order that is compatible
-with all explanations it holds, extended by the new nogood, with few remaining values first. If the least termination
-vector of these orders is smaller than that of the current order, the robot adopts that order and sends it to all.
-Otherwise it keeps its order and sends the nogood to the lowest-priority robot. A robot that receives an order adopts it
-if it is stronger: its vector is smaller, or equal and its names come first.
+ABT with an order that changes at dead ends; any robot may move. An Ok contains the sender's value and its explanation:
+the robots on which its nogoods depend, and its number of remaining values. A robot without a value left may send the
+nogood to any robot in the conflict. For each of these it computes an order that is compatible with all its
+explanations, extended by the new nogood, with robots with few remaining values first. If the least termination vector
+of these orders is smaller than that of the current order, the robot adopts that order and sends it to all robots.
+Otherwise it keeps its order and sends the nogood to the lowest-priority robot in the conflict. A robot that receives an
+order adopts it if it is stronger: its vector is smaller, or equal and its names come first.
 
 - **When to use**: no costs, and no good static order is known. Messages are large.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.

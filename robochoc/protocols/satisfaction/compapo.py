@@ -1,9 +1,9 @@
 """Complete Asynchronous Partial Overlay (CompAPO).
 
-Cooperative mediation: a robot in conflict first tries to repair it by changing its own value. If it cannot, it
-mediates: it asks the robots of its good_list (those whose constraints it knows) to keep their values, solves their
-common problem by itself, and sends each robot its value. Robots outside that are then in conflict join the good_list.
-So mediators learn the hard parts of the problem, and in the worst case all of it.
+Cooperative mediation: a robot in conflict first tries to repair the conflict by changing its own value. If that is
+impossible, it mediates: it asks the robots in its good_list (those whose constraints it knows) to keep their values,
+solves their common problem by itself, and sends each robot its value. Robots outside the list that are then in conflict
+join it. So mediators learn the hard parts of the problem, and in the worst case the whole problem.
 
 - **When to use**: no costs, robots may learn each other's constraints, and messages should be few but may be long.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. A mediator's search is

@@ -5,7 +5,7 @@ violated weight by their best move; among neighbours the robot with the largest 
 minimum, in which neither a robot nor any of its neighbours can reduce anything, the weights of the robot's violated
 constraints grow by one, until a move reduces them. Robots detect by a termination counter that all constraints hold.
 
-- **When to use**: a large team without costs, where a solution surely exists.
+- **When to use**: a large team without costs, if a solution surely exists.
 - **Guarantees**: incomplete; a solution is correct, because all robots know that no constraint is violated when they
   stop. It never proves that there is no solution (except for a robot with an empty domain), and gives up after `cycles`
   cycles. On a constraint graph without cycles it finds a solution if there is one (Zhang, Wittenburg 2002).

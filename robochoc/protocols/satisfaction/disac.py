@@ -2,9 +2,8 @@
 
 A robot removes each of its values that has no support: a value that some constraint allows with none of the others'
 remaining values, so that it is in no solution. It sends its removals to its neighbours, which remove values in turn.
-The result is
-that of a central algorithm: the largest arc consistent domains. A robot without a value left proves that there is no
-solution.
+The result is the same as that of a central algorithm: the largest arc consistent domains. A robot without a value left
+proves that there is no solution.
 
 This is not a search: at the end each robot has a reduced domain, not one value. The run then continues with the
 requested protocol on these domains.

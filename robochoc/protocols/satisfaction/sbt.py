@@ -83,7 +83,7 @@ class SBT(Protocol):
                 assert_never(never)
 
     def _assign(self, first: int) -> None:
-        """Add the first value from place `first` on that agrees with the CPA, and send it on; else backtrack."""
+        """Add the first value from index `first` on that agrees with the CPA, and send it on; else backtrack."""
         candidates = range(first, len(self.problem.values))
         self.value = next((index for index in candidates if self.problem.conflict(index, self._view) is None), None)
         if self.value is None:

@@ -4,12 +4,12 @@ Each connected component elects the robot with the most neighbours: waves of all
 strongest candidate's wave survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms",
 2nd edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques
 and the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983). In that paper the token bounces off
-visited robots, which takes two more messages for each edge outside the tree. Here the token lists visited robots, and
-is never sent to one of them: two messages for each robot but the root (as in Makki, Havas: "Distributed algorithms for
-depth-first search", IPL 60, 1996). It lists a robot only until all neighbours of that robot know of the visit: beside
-the name is the number of neighbours that do not. So it lists one robot at a time on a path, and those of one branch on
-a tree. A robot sends the token to its unvisited neighbour with the most neighbours. Ties go to the robot of higher
-priority.
+visited robots, which takes two more messages for each edge outside the tree. Here the token lists visited robots and is
+never sent to any of them, which takes two messages for each robot except the root (as in Makki, Havas: "Distributed
+algorithms for depth-first search", IPL 60, 1996). It lists a robot only until all neighbours of that robot know of the
+visit; next to the name it has the number of neighbours that do not know yet. So on a path it lists one robot at a time,
+and on a tree the robots of one branch. A robot sends the token to its unvisited neighbour with the most neighbours.
+Ties go to the robot with higher priority.
 
 Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots in an n-ary
 constraint, because they are all neighbours. The cost is 2 messages for each robot for the token, and at least 2 for
