@@ -11,7 +11,7 @@ Both are thin layers over the code that the command line uses.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,7 @@ from robochoc.journal.events import Observer
 from robochoc.model.original_names import renamed_outcome, renamed_team, robots_called
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
+from robochoc.modelling.option_names import errors_in_python, in_python
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
@@ -77,16 +78,26 @@ class Problem(Solvable):
         return f"<problem {self.team.name}: {counted(len(self.team.robots), 'robot')}, {constraints}>"
 
 
-def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner: str | None = None) -> Problem:
+def load(
+    path: Path | str,
+    *more: Path | str,
+    format: str | None = None,  # noqa: A002 - as the option
+    infinity: int | None = None,
+    owner: str | None = None,
+    allow_code: bool = False,
+) -> Problem:
     """Return the problem in a team's folder, or in a file of another tool.
 
     Args:
         path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time; or a file
             of FRODO, DisChoco, pyDCOP, XCSP3 or toulbar2.
         *more: Further files of the same problem, such as pyDCOP's distribution and scenario.
+        format: For files of other tools: the name of the format, as `robochoc import --help` lists it. None: it is
+            recognised.
         infinity: For files of other tools: costs of this value or more forbid. None: no cost forbids.
         owner: For files of other tools: a regular expression. Variables whose names have the same match (or the same
             first group) belong to one robot. None: each variable has its own robot.
+        allow_code: For pyDCOP's files: whether Python files that they name may be executed.
 
     Raises:
         InvalidInputError: if the files are invalid. It lists every mistake with its file and line.
@@ -96,8 +107,11 @@ def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner
         >>> robochoc.load("instances/queens3d-4").team.name
         'queens3d-4'
     """
-    read = read_problem(Path(path), *map(Path, more), infinity=infinity, owner=owner)
-    return Problem(read.team, read.names if read.foreign else {}, read.notes, ordered=not read.foreign)
+    options: dict[str, Any] = {"infinity": infinity, "owner": owner, "allow_code": allow_code}
+    with errors_in_python((*options, "format")):
+        read = read_problem(Path(path), *map(Path, more), dialect=format, **options)
+    notes = [(keyword, in_python(sentence, (*options, "format"))) for keyword, sentence in read.notes]
+    return Problem(read.team, read.names if read.foreign else {}, notes, ordered=not read.foreign)
 
 
 @dataclass
@@ -225,8 +239,9 @@ class AgentsContainer:
         protocol = protocol_called(self._type.removeprefix(_MASTER))
         folder = self._authority or default_authority_folder()
         watched = any(sniff for _, sniff in self._agents.values())
-        asked = MasterPlan(folder, self._listen or LOOPBACK_ADDRESS, protocol=protocol, **plan)
-        return run_master(asked, observer=observer, watched=watched).outcome
+        with errors_in_python([one.name for one in fields(MasterPlan)]):
+            asked = MasterPlan(folder, self._listen or LOOPBACK_ADDRESS, protocol=protocol, **plan)
+            return run_master(asked, observer=observer, watched=watched).outcome
 
     def _join(self) -> dict[str, Ending]:
         from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - robots' machines only
@@ -247,7 +262,7 @@ class AgentsContainer:
             raise ValueError(f"{name} needs its file, {name}.xml")
         robot = read_robot(file)
         identity = identity_of(name, main, *self._identities.get(name, (None, None)))
-        with Compiler() as compiler:
+        with errors_in_python(("identity",)), Compiler() as compiler:
             return join(robot, main, identity, RobotSettings(PATIENCE_S, sniffed=sniff), compiler)
 
 
@@ -259,4 +274,4 @@ def protocol_called(word: str) -> str:
     for offer in installed_protocols():
         if offer.protocol and word.casefold() in {offer.name.casefold(), offer.protocol.__name__.casefold()}:
             return offer.name
-    raise UnknownProtocolError(f"no protocol {word!r} is installed; robochoc protocols lists them")
+    raise UnknownProtocolError(f"no protocol {word!r} is installed; 'robochoc protocols' lists them")

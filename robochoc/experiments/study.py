@@ -96,7 +96,9 @@ def read_study(path: Path) -> Study:
         tables = toml_tables(text)
     except ValueError as wrong:
         raise invalid_input(
-            path, f"is not a valid TOML file: {shortened(str(wrong))}", "docs/guides/experiments.md shows one"
+            path,
+            f"is not a valid TOML file: {shortened(str(wrong))}",
+            "the page Experiments of the documentation shows one",
         ) from None
     return study_of(tables, Place(path, text))
 
@@ -235,7 +237,7 @@ def _text(path: Path) -> str:
         with path.open("rb") as file:
             content = file.read(LARGEST_FILE + 1)
     except OSError as error:
-        hint = "give the TOML file of a study; docs/guides/experiments.md shows one"
+        hint = "give the TOML file of a study; the page Experiments of the documentation shows one"
         raise invalid_input(path, f"cannot be read: {error.strerror}", hint) from None
     if len(content) > LARGEST_FILE:
         raise invalid_input(

@@ -14,7 +14,7 @@ from typing import Any
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input, shortened, suggestion
 from robochoc.formats.toml import line_of
 
-HINT = "docs/guides/experiments.md describes the file of a study"
+HINT = "the page Experiments of the documentation describes the file of a study"
 MAX_INTEGER = 2**53
 """The largest integer that JSON, SQLite and floats represent exactly."""
 MOST_COMBINATIONS = 100_000

@@ -194,7 +194,9 @@ def parse_once(written: str, names: tuple[str, ...], wanted: Type) -> Expression
 def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
     """Return `error`, which is in the expression of `what` in that `line`, as a mistake of the file."""
     message = f"{what}: {error.message}, at character {error.position + 1}"
-    return MistakeError(message, error.hint or "see docs/reference/format.md, 'Functional expressions'", line)
+    return MistakeError(
+        message, error.hint or "see 'Functional expressions' on the page Format of the documentation", line
+    )
 
 
 def _check_size(expression: object) -> None:

@@ -147,9 +147,7 @@ def _listing(folder: Path) -> list[os.DirEntry[str]]:
     except NotADirectoryError:
         step = "give a team's folder; 'robochoc import' creates one from a file of another tool"
         if folder.suffix == ".xml":
-            step = (
-                f"give the robot's folder, {folder.parent}; for a file of another tool, give its format with --format"
-            )
+            step = f"give the robot's folder, {folder.parent}; for a file of another tool, give its --format"
         raise invalid_input(folder, "is not a folder", step) from None
     except FileNotFoundError:
         raise invalid_input(folder, "does not exist", "check its name" if folder.suffix else _NEXT_STEP) from None

@@ -22,6 +22,7 @@ from robochoc.communication.arrays.description import Description, KnownConstrai
 from robochoc.communication.arrays.layout import ArrayLayout
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.modelling.option_names import errors_in_python
 from robochoc.protocols.message import encode
 from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
@@ -156,13 +157,14 @@ class ArrayProblem:
         """Return an unstarted run, for callers that need each cycle (`cycles_of`). See `solve` for the arguments."""
         options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
         kind = protocol_named(options.protocol)
-        refuse_settings(options.protocol, kind, options.settings)
-        form = array_run_for(kind)
-        if not issubclass(kind, CycleProtocol):
-            raise UnsupportedError(f"{options.protocol} does not work in cycles")
-        known = read_settings(kind, options.settings)
-        chosen = known if isinstance(known, type(kind.settings)) else kind.settings
-        return form(self.layout, chosen, options.seed, clocks=ncccs)
+        with errors_in_python(("settings", "runtime")):
+            refuse_settings(options.protocol, kind, options.settings)
+            form = array_run_for(kind)
+            if not issubclass(kind, CycleProtocol):
+                raise UnsupportedError(f"{options.protocol} does not work in cycles")
+            known = read_settings(kind, options.settings)
+            chosen = known if isinstance(known, type(kind.settings)) else kind.settings
+            return form(self.layout, chosen, options.seed, clocks=ncccs)
 
     def cost(self, values: ArrayLike) -> float:
         """Return the cost of an assignment to all robots. Raises `ValueError` if a value is missing or invalid."""

@@ -34,6 +34,7 @@ from robochoc.modelling.drafts import ObjectiveTerm, split
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, UnknownNameError, calling_line
 from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.numbers import Exact, check_places, whole_number
+from robochoc.modelling.option_names import errors_in_python
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.solution import NamedValues, Solution, UserValues
 from robochoc.modelling.solving import Solvable
@@ -69,7 +70,8 @@ class Model(Solvable):
         Raises:
             InvalidInputError: if the files are invalid.
         """
-        return cls.of(read_team(Path(folder)))
+        with errors_in_python(("format",)):
+            return cls.of(read_team(Path(folder)))
 
     @classmethod
     def of(cls, team: Team) -> Model:

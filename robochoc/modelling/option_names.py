@@ -9,7 +9,9 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 
+from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.system.errors import RobochocError
 
 _ARGUMENTS = {
@@ -20,8 +22,11 @@ _ARGUMENTS = {
     "local-solutions": "local",
     "local-timeout": "local",
     "no-cache": "cache",
+    "host": "hosts",
 }
 """Options whose Python argument has another name. All other arguments have the option's name, with underscores."""
+_FLAGS = {"allow-code": "allow_code=True"}
+"""Options without a value that a message tells the user to add."""
 _WORDS = {
     "runtime": "processes|simulator|network|arrays",
     "schedule": "concurrent|one-by-one|cycles|random",
@@ -37,7 +42,7 @@ _WORDS = {
 _NUMBER = re.compile(r"[\d.]+(e[+-]?\d+)?|[A-Z]+")
 """A number, or a placeholder for a number."""
 _ADJACENT = re.compile(r"(=(?:'[^']*'|\{[^}]*\}|\d+)) (?=[a-z_]+=)")
-_OPTION = re.compile(r"(?<![\w-])--(?P<name>[a-z][a-z-]*)(?:[ =](?P<value>[\w=+-]+(?:\.\w+)*))?")
+_OPTION = re.compile(r"'robochoc [^']*'|(?<![\w-])--(?P<name>[a-z][a-z-]*)(?:[ =](?P<value>[\w=+-]+(?:\.\w+)*))?")
 
 
 def in_python(text: str, arguments: Collection[str]) -> str:
@@ -49,10 +54,12 @@ def in_python(text: str, arguments: Collection[str]) -> str:
     """
 
     def argument(found: re.Match[str]) -> str:
-        name, value = found["name"], found["value"]
+        name, value = found["name"] or "", found["value"]  # no name: a command for the shell
         renamed = _ARGUMENTS.get(name, name.replace("-", "_"))
         if renamed not in arguments:
             return found[0]
+        if name in _FLAGS:
+            return _FLAGS[name] + found[0].removeprefix(f"--{name}")
         if value is None:
             return renamed
         if name == "set" and re.fullmatch(_WORDS["set"], value):
@@ -70,6 +77,13 @@ def errors_in_python(arguments: Collection[str]) -> Iterator[None]:
     """Rewrite the messages of robochoc exceptions raised inside the context with the names of Python arguments."""
     try:
         yield
+    except InvalidInputError as error:
+        error.diagnostics = tuple(
+            replace(one, message=in_python(one.message, arguments), hint=in_python(one.hint, arguments))
+            for one in error.diagnostics
+        )
+        error.args = ("\n".join(map(str, error.diagnostics)),)
+        raise
     except RobochocError as error:
         error.args = tuple(in_python(one, arguments) if isinstance(one, str) else one for one in error.args)
         raise

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Never
 
 from robochoc.journal.events import Observer, combined
-from robochoc.model.outcome import Outcome
+from robochoc.model.outcome import Answer, Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.option_names import errors_in_python, in_python
 from robochoc.modelling.run_journal import recorded
@@ -157,9 +157,7 @@ class Solvable(ABC):
                 outcome = run.solve(observer=observers, progress=progress, environment=environment)
                 if recorder is not None:
                     recorder.outcome = outcome
-        if outcome.reason:
-            outcome = replace(outcome, reason=in_python(outcome.reason, ARGUMENTS))
-        solution = self._solution(outcome, team)
+        solution = self._solution(_texts_in_python(outcome), team)
         if html is not None:
             solution.scene().save(html)
         return solution
@@ -205,6 +203,17 @@ class Solvable(ABC):
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(outcome, team)
+
+
+def _texts_in_python(outcome: Outcome) -> Outcome:
+    """Return `outcome` with arguments instead of options in its texts."""
+
+    def reason(answer: Answer) -> str | None:
+        return answer.reason and in_python(answer.reason, ARGUMENTS)
+
+    epochs = tuple(replace(one, reason=reason(one)) for one in outcome.epochs)
+    chosen = {name: in_python(why, ARGUMENTS) for name, why in outcome.chosen.items()}
+    return replace(outcome, reason=reason(outcome), epochs=epochs, chosen=chosen)
 
 
 def _refuse(unknown: Iterable[str]) -> None:

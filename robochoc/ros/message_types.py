@@ -194,7 +194,7 @@ class Types:
             text = SERVICE_TYPES.get(kind) or definition_of(kind)
             if not text:
                 problem = f"ROS {self.version} has no type {kind!r}"
-                raise UnknownTypeError(f"{problem}; add its definition to its mapping (docs/guides/ros.md)")
+                raise UnknownTypeError(f"{problem}; add its definition to its mapping (documentation, page ROS)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})

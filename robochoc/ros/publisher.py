@@ -58,7 +58,7 @@ class Publisher:
         if all(drone.topic is None for drone in drones):
             problem = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
             raise NothingToPublishError(
-                on_one_line(f"{problem}: give its robot's file a <topic> (docs/reference/format.md)")
+                on_one_line(f"{problem}: give its robot's file a <topic> (documentation, page Format)")
             )
         self.names = TopicNames(drones)
         self._team = team

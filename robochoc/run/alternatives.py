@@ -20,8 +20,7 @@ from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
 
 MOST_NAMED = 3
-"""The maximum number of protocols named in a refusal. A guide helps to choose between them."""
-GUIDE = "docs/guides/which-protocol.md"
+"""The maximum number of protocols named in a refusal. `robochoc protocols` lists the others."""
 
 
 def alternatives(
@@ -51,7 +50,9 @@ def alternatives(
     ]
     if names:
         named = _suited(names, team, options)[:MOST_NAMED]
-        others = f", and {len(names) - len(named)} more: {GUIDE}" if len(names) > len(named) else ""
+        others = (
+            f", and {len(names) - len(named)} more: 'robochoc protocols' lists them" if len(names) > len(named) else ""
+        )
         return f"; these do: {', '.join(named)} (--protocol){others}"
     if _central_solver_fits(team, options):
         return f"; no protocol does, but the central solver (--protocol {CENTRAL})"

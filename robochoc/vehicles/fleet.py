@@ -23,7 +23,7 @@ from robochoc.vehicles.kinds import VehicleKind, address_of, shared_port
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
 _PORTS = range(1, 65_536)
-_EXPECTED = "see docs/guides/autopilots.md for the entries of a fleet file"
+_EXPECTED = "see the page Autopilots of the documentation for the entries of a fleet file"
 _CORNERS, _AXES = 2, 3
 _LARGE = 10**9
 

@@ -320,7 +320,7 @@ def test_what_needs_too_many_ciphers_is_refused_before_any_table_is_made() -> No
 @pytest.mark.usefixtures("quick_encryption")
 def test_a_refusal_names_other_protocols_and_no_other_refusal_names_this_one() -> None:
     with pytest.raises(
-        UnsupportedError, match=r"these do: \w+, p-dpop, p32-dpop \(--protocol\), and \d+ more: docs/guides"
+        UnsupportedError, match=r"these do: \w+, p-dpop, p32-dpop \(--protocol\), and \d+ more: 'robochoc protocols'"
     ):
         solve(RING, options_of("p2-dpop", ciphers="5"))
     with pytest.raises(UnsupportedError, match="these do: ") as refused:

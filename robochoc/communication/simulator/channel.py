@@ -201,7 +201,7 @@ CHANNELS = MappingProxyType({model.name: model for model in _SHIPPED})
 """The models that are shipped, by name."""
 
 
-_HINT = "docs/guides/channels.md shows all fields"
+_HINT = "the page Channels of the documentation shows all fields"
 
 
 def read_channel(path: Path) -> ChannelModel:

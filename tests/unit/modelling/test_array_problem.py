@@ -225,7 +225,7 @@ def test_protocols_and_settings_are_looked_up() -> None:
     assert repr(problem) == "<array problem: 2 robots, 1 edges, 2 values>"
     with pytest.raises(UnsupportedError, match="ABT has no form as arrays"):
         problem.solve("abt")
-    with pytest.raises(UnsupportedError, match=r"--set: .*cycle"):
+    with pytest.raises(UnsupportedError, match=r"settings: .*cycle"):
         problem.solve("dsa", cycle=3)
     with pytest.raises(UnknownProtocolError):
         problem.solve("das")

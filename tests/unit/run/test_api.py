@@ -259,3 +259,15 @@ def test_a_file_of_another_tool_speaks_in_its_own_names(tmp_path: Path) -> None:
     assert solution.values.keys() == {"_x1", "_x2"}
     assert set(solution.values.values()) == {"red", "green"}
     assert solution["_x1"] in {"red", "green"}
+
+
+def test_the_format_of_a_file_and_its_code_are_allowed_by_arguments(tmp_path: Path) -> None:
+    text = COLOURING.replace("function: 1000", "source: outside.py, function: source.large()").replace("0.5", "2")
+    (tmp_path / "outside.py").write_text("def large():\n    return 1000\n")
+    file = tmp_path / "colouring.txt"
+    file.write_text(text)
+    with pytest.raises(InvalidInputError, match="allow_code=True if you trust"):
+        robochoc.load(file, format="pydcop")
+    with pytest.raises(InvalidInputError, match="unknown format"):
+        robochoc.load(file, format="nope", allow_code=True)
+    assert robochoc.load(file, format="pydcop", allow_code=True).solve("syncbb").cost == 2

@@ -68,7 +68,7 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
 @looped(
     ("text", "told"),
     [
-        ("", "is empty; see docs/guides/autopilots.md for the entries of a fleet file"),
+        ("", "is empty; see the page Autopilots of the documentation for the entries of a fleet file"),
         ("[1]", "fleet.yaml:1: a fleet file is not a mapping"),
         ("a: {", "is not YAML"),
         ("a: !!python/object:os.system x", "the tag .* is not allowed"),
