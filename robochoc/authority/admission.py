@@ -16,14 +16,14 @@ _LIFETIME = timedelta(hours=24)
 
 
 class Admission(Protocol):
-    """Decides which names may take part. `Authority` is one."""
+    """Decides which names may take part; implemented by `Authority`."""
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
-        """Return the names with a certificate in force now, sorted.
+        """Return the sorted names that have a certificate in force now.
 
         Args:
-            role: Only names in this role.
-            right: Only names with this right.
+            role: Return only names in this role.
+            right: Return only names with this right.
             invited: Include names that have a token and never had a certificate.
         """
 
@@ -32,7 +32,7 @@ class Admission(Protocol):
 
 
 class InMemoryAuthority:
-    """An Authority without folder and tokens, for robots that one process starts on its machine."""
+    """An Authority without a folder and tokens, for robots started by one process on its own machine."""
 
     def __init__(self, robots: Iterable[str]) -> None:
         self._key = new_key()
@@ -43,11 +43,11 @@ class InMemoryAuthority:
         self._sniffers: set[str] = set()
 
     def identity(self, name: str) -> Identity:
-        """Return a new identity of the robot `name`."""
+        """Return a new identity for the robot `name`."""
         return self._identity(name, None)
 
     def master_identity(self, hosts: tuple[str, ...]) -> Identity:
-        """Return a new identity of the master, which is reached at `hosts`."""
+        """Return a new identity for the master at `hosts`."""
         return self._identity(MASTER, hosts)
 
     def names(
@@ -57,7 +57,7 @@ class InMemoryAuthority:
         *,
         invited: bool = False,  # noqa: ARG002 - there are no tokens
     ) -> tuple[str, ...]:
-        """Return all robots that were not revoked, or those with the right."""
+        """Return all robots that were not revoked; with `right`, only those with this right."""
         there = tuple(n for n in self._robots if n not in self._revoked) if role in {None, Role.ROBOT} else ()
         return there if right is None else tuple(n for n in there if n in self._sniffers)
 

@@ -1,8 +1,8 @@
-"""The Authority: a small certification authority, and the registry of the names that may take part.
+"""The Authority: a small certification authority, and the registry of names that may take part.
 
-A person enrols a name and carries the token to the robot. The robot creates a key and uses the token once. The
-Authority signs a certificate, which is valid for a day and renewed before. A revocation is recorded until the
-certificate would have expired. The holder of the folder's `ca.key` is the Authority.
+A person enrols a name and carries the token to the robot. The robot creates a key, and redeems the token once. The
+Authority signs a certificate, which is valid for a day and is renewed before it expires. A revocation is recorded until
+the certificate would have expired. Whoever holds `ca.key` in the folder can act as the Authority.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ from robochoc.system.files import write_atomically
 TOKEN_LIFETIME = timedelta(hours=24)
 CERTIFICATE_LIFETIME = timedelta(hours=24)
 IN_FORCE_AT_MOST = 16
-"""The largest number of certificates in force for one name. A robot that requests more is faulty or hostile."""
+"""The maximum number of certificates in force for one name. A robot that requests more is faulty or hostile."""
 _KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
 _OTHERS = 0o077
 
 
 class NotGrantedError(RobochocError):
-    """The Authority refuses a request. The message gives the reason, and may be sent to the requester."""
+    """The Authority has refused a request. The message gives the reason, and may be sent to the requester."""
 
 
 class Authority:
@@ -69,9 +69,9 @@ class Authority:
     Several threads and processes may use the same folder at once.
 
     Args:
-        folder: The folder of its files.
-        key: Its private key.
-        certificate: Its certificate.
+        folder: The folder with the Authority's files.
+        key: The Authority's private key.
+        certificate: The Authority's certificate.
         observer: Receives grants and refusals.
         clock: Returns Unix time.
         lifetime: The validity period of certificates.
@@ -154,7 +154,7 @@ class Authority:
     def enrol(
         self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME, may: Iterable[Right] = ()
     ) -> EnrolmentToken:
-        """Return a token for `name`, which can be used once, within `ttl`. See `enrol_all`."""
+        """Return a token for `name` that can be used once, within `ttl`. See `enrol_all`."""
         return self.enrol_all([name], role, ttl, may)[name]
 
     def enrol_all(
@@ -164,11 +164,11 @@ class Authority:
         ttl: timedelta = TOKEN_LIFETIME,
         may: Iterable[Right] = (),
     ) -> dict[str, EnrolmentToken]:
-        """Return a token for each of `names`. Raises `InvalidNameError`, and then enrols none of them.
+        """Return a token for each of `names`. Enrols no name if one is invalid, and raises `InvalidNameError`.
 
-        A name that is already enrolled gets a new token, too. When the token is redeemed, the name's previous
-        certificates are revoked, because a name has one key, and a revoked name is readmitted. The role and the rights
-        `may`, which replace previous rights, are valid at once.
+        A name that is already enrolled also gets a new token. When the token is redeemed, previous certificates of the
+        name are revoked, because a name has one key, and a revoked name is readmitted. The role and the rights `may`,
+        which replace previous rights, are valid at once.
         """
         rights = tuple(sorted(set(may)))
         names = list(names)
@@ -191,7 +191,8 @@ class Authority:
             origin: The origin of the request, for the observer.
 
         Raises:
-            NotGrantedError: when the secret is unknown, used or expired, or the request is not in the token's name.
+            NotGrantedError: The secret is unknown, used or expired, or the name in the request is not that of the
+                token.
         """
         what = "redeem a token"
         with self._reported_refusals(what, request, origin) as (name, holder), self._registry.change() as members:
@@ -210,13 +211,13 @@ class Authority:
         return certificate
 
     def renew(self, request: bytes, current: Certificate, origin: str = "") -> bytes:
-        """Return a new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
+        """Return a new certificate (PEM) for the holder of `current`, with the key in `request` (PKCS 10, PEM).
 
-        The caller has verified by TLS that the request comes from the holder of the key of `current`. That certificate
-        stays in force until it expires. `origin` is the origin of the request, for the observer.
+        The caller has verified by TLS that the request comes from the holder of the key in `current`. The current
+        certificate stays in force until it expires. `origin` is the origin of the request, for the observer.
 
         Raises:
-            NotGrantedError: when `current` is not in force, or the request is in another name.
+            NotGrantedError: `current` is not in force, or the request has another name.
         """
         what = "renew a certificate"
         with self._reported_refusals(what, request, origin) as (name, holder), self._registry.change() as members:
@@ -240,10 +241,10 @@ class Authority:
         return certificate
 
     def master_identity(self, hosts: Sequence[str], folder: Path | None = None) -> Identity:
-        """Return a new identity of the master, for servers that are reached at `hosts` (names or addresses).
+        """Return a new identity for the master, for servers at `hosts` (names or addresses).
 
-        It is written to `folder` (`master` in the Authority's folder if None). No token is needed, because this
-        requires the Authority's key. Raises `HostNameError`.
+        The identity is written to `folder` (None: `master` in the Authority's folder). No token is needed, because the
+        Authority's key is required. Raises `HostNameError`.
         """
         key = new_key()
         with self._registry.change() as members:
@@ -259,8 +260,8 @@ class Authority:
         """Revoke the certificates, the unused token and the rights of `name`.
 
         Raises:
-            NotEnrolledError: when the name is not enrolled; the message lists names that are.
-            InvalidNameError: for the master, as robots would not learn of it.
+            NotEnrolledError: The name is not enrolled; the message lists enrolled names.
+            InvalidNameError: The name is the master's: robots would not learn of the revocation.
         """
         if name == MASTER:
             raise InvalidNameError(
@@ -277,7 +278,7 @@ class Authority:
             )
 
     def is_revoked(self, who: str | int) -> bool:
-        """Return whether the name or the certificate's serial number `who` is revoked or unknown."""
+        """Return whether `who`, a name or the serial number of a certificate, is revoked or unknown."""
         members = self._registry.members()
         if isinstance(who, str):
             return who not in members or members[who].revoked
@@ -285,7 +286,7 @@ class Authority:
         return not any(one.serial == serial for member in members.values() for one in member.certificates)
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
-        """Return the names with a certificate in force now, sorted. See `Admission.names`."""
+        """Return the sorted names that have a certificate in force now. See `Admission.names`."""
         now = self.clock()
         return tuple(
             member.name
@@ -297,7 +298,7 @@ class Authority:
         )
 
     def members(self) -> tuple[EnrolledName, ...]:
-        """Return all names that were ever enrolled, sorted."""
+        """Return all names that were ever enrolled, in sorted order."""
         return tuple(member for _, member in sorted(self._registry.members().items()))
 
     def report(self, event: AuthorityEvent) -> None:
@@ -317,7 +318,7 @@ class Authority:
     def _reported_refusals(
         self, what: str, request: bytes, origin: str
     ) -> Iterator[tuple[str, ec.EllipticCurvePublicKey]]:
-        """Yield the name and the key in `request`, and report a refusal in the block."""
+        """Yield the name and the key in `request`; report a refusal raised in the block."""
         who = "unknown"
         try:
             try:
@@ -334,7 +335,7 @@ class Authority:
 def _redeemable(
     members: Mapping[str, EnrolledName], known: str, name: str, now: float
 ) -> tuple[EnrolledName, Invitation]:
-    """Return the entry and the invitation of the token with the digest `known`.
+    """Return the record and the invitation for the token with the digest `known`.
 
     Raises `NotGrantedError` if the token cannot be redeemed for `name` now.
     """

@@ -1,9 +1,10 @@
 """Keys and X.509 certificates (RFC 5280): issued by the Authority, and checked by all participants.
 
-All keys are on P-256. The Authority's certificate signs leaves only (pathlen 0). A robot's certificate is for clients:
-its common name is the robot's name, which zenoh's access control uses, and it has no host name, so that no robot can
-impersonate a server. The master's certificate is for servers as well. Its subject alternative names, which rustls
-(zenoh's TLS) checks, are `MASTER` and the master's hosts.
+All keys are on P-256. The Authority's certificate signs only leaf certificates (pathlen 0). A robot's certificate is
+for
+clients: its common name is the robot's name, which is used by zenoh's access control, and it has no host name, so that
+no robot can impersonate a server. The master's certificate is also for servers. Its subject alternative names, which
+rustls (zenoh's TLS) checks, are `MASTER` and the master's hosts.
 """
 
 from __future__ import annotations
@@ -23,12 +24,12 @@ from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.system.errors import RobochocError
 
 MASTER = "MASTER"
-"""The master's name, forbidden for robots in any capitalization, because host names ignore it."""
+"""The master's name, forbidden for robots in any capitalization, because host names are case-insensitive."""
 SKEW = timedelta(minutes=5)
 """The tolerated difference between the clocks of two machines."""
 CA_LIFETIME = timedelta(days=3650)
 LONGEST_NAME = 64
-"""The most characters of a common name (RFC 5280, ub-common-name)."""
+"""The maximum length of a common name, in characters (RFC 5280, ub-common-name)."""
 _DIGITAL_SIGNATURE = x509.KeyUsage(
     digital_signature=True,
     content_commitment=False,
@@ -58,11 +59,11 @@ class CertificateError(RobochocError, ValueError):
 
 
 class HostNameError(RobochocError, ValueError):
-    """A certificate cannot contain this host."""
+    """The host name or address is not possible in a certificate."""
 
 
 def utc_time(t: float) -> datetime:
-    """Return a Unix time as in certificates: UTC, whole seconds."""
+    """Convert a Unix time to the form in certificates: UTC, in whole seconds."""
     return datetime.fromtimestamp(int(t), UTC)
 
 
@@ -72,24 +73,24 @@ def new_key() -> ec.EllipticCurvePrivateKey:
 
 
 def key_pem(key: ec.EllipticCurvePrivateKey) -> bytes:
-    """Return `key` as PKCS 8, unencrypted: it is protected by the file's permissions."""
+    """Return `key` as unencrypted PKCS 8; the key is protected by file permissions."""
     pem, pkcs8 = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
     return key.private_bytes(pem, pkcs8, serialization.NoEncryption())
 
 
 def pem(certificate: x509.Certificate) -> bytes:
-    """Return `certificate` as text."""
+    """Return `certificate` as PEM text."""
     return certificate.public_bytes(serialization.Encoding.PEM)
 
 
 def fingerprint(certificate: x509.Certificate) -> bytes:
-    """Return the SHA-256 of `certificate`, 32 bytes."""
+    """Return the SHA-256 hash of `certificate` (32 bytes)."""
     return certificate.fingerprint(hashes.SHA256())
 
 
 def ca_certificate(key: ec.EllipticCurvePrivateKey, now: datetime) -> x509.Certificate:
     """Return the Authority's self-signed certificate."""
-    # The key's identifier is a part of the name, so that Authorities have different names.
+    # The name contains the key's identifier, so that Authorities have different names.
     own = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
     name = _subject(f"robochoc authority {own.digest.hex()[:16]}")
     return (
@@ -108,9 +109,9 @@ def leaf_certificate(
     hosts: Sequence[str] | None,
     times: tuple[datetime, datetime],
 ) -> x509.Certificate:
-    """Return a certificate for the key `holder` of `name`, valid within `times`. Raises `HostNameError`.
+    """Return a certificate for `name` with the key `holder`, valid within `times`. Raises `HostNameError`.
 
-    `hosts`: the names and addresses of a server; None for a client only.
+    `hosts` are the names and addresses of a server; None for a mere client.
     """
     issuer, key = ca
     usages = [ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -138,7 +139,7 @@ def signing_request(key: ec.EllipticCurvePrivateKey, name: str) -> bytes:
 
 
 def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
-    """Return the name and the key of a request signed with this key. Raises `CertificateError`."""
+    """Return the name and the key in a request, which must be signed with this key. Raises `CertificateError`."""
     try:
         request = x509.load_pem_x509_csr(content)
         holder, genuine = request.public_key(), request.is_signature_valid
@@ -151,7 +152,7 @@ def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
 
 
 def read_certificate(content: bytes) -> x509.Certificate:
-    """Return the one certificate in `content`. Raises `CertificateError`."""
+    """Return the single certificate in `content`. Raises `CertificateError`."""
     try:
         found = x509.load_pem_x509_certificates(content)
     except (ValueError, TypeError, x509.InvalidVersion) as error:
@@ -190,9 +191,9 @@ def common_name(subject: x509.Name) -> str:
 
 
 def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datetime) -> str:
-    """Check that `ca` has issued `certificate`, and that it is valid `now`; return its name. Raises `CertificateError`.
+    """Check that `certificate` was issued by `ca` and is valid `now`; return its name. Raises `CertificateError`.
 
-    X.509 path validation by `cryptography`, for a client's certificate (the master's is one, too).
+    The check is the X.509 path validation of `cryptography` for client certificates, which include the master's.
     """
     try:
         name = common_name(certificate.subject)
@@ -211,7 +212,7 @@ def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datet
 
 
 def hosts_of(certificate: x509.Certificate) -> tuple[str, ...]:
-    """Return the host names and addresses of `certificate`, without the holder's name."""
+    """Return the host names and addresses in `certificate`, without the holder's name."""
     try:
         names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except x509.ExtensionNotFound:

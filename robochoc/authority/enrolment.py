@@ -1,8 +1,8 @@
-"""The robot's side of enrolment: the first certificate requires a token, each further one the previous certificate.
+"""The robot's side of enrolment. The first certificate requires a token, later certificates the previous certificate.
 
-A new robot trusts no server yet. It requests the Authority's certificate from the service, compares it with the
-fingerprint in its token, and closes the connection. It sends the token's secret only on a second connection, after
-OpenSSL has verified by this certificate that the other end is the master.
+A new robot trusts no server yet. It requests the Authority's certificate from the service, compares the certificate
+with the fingerprint in its token, and closes the connection. It sends the token's secret only on a second connection,
+after OpenSSL has verified by this certificate that the other end is the master.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
 
 PATIENCE_S = 30.0
-"""The longest time for a request, including its wait at the service, in seconds."""
+"""The longest time for a request, including the wait at the service, in seconds."""
 
 
 class EnrolmentError(RobochocError):
@@ -55,7 +55,7 @@ class EnrolmentError(RobochocError):
 
 
 class NotReachableError(EnrolmentError):
-    """No service listens at that address (yet). Nothing was sent, so the same token can be used again."""
+    """No service listens at this address (yet). Nothing was sent, so the same token can be used again."""
 
 
 class NotTrustedError(EnrolmentError):
@@ -68,7 +68,7 @@ def enrol(
     """Create a key in `folder`, and have the Authority at `host` and `port` certify it as the key of `name`.
 
     An identity in `folder` is replaced after the certificate was granted. Raises `TokenError`, `NotTrustedError`,
-    `NotReachableError`, `EnrolmentError` (refused), `OSError` (the folder).
+    `NotReachableError`, `EnrolmentError` (refused), and `OSError` (for the folder).
     """
     token = token if isinstance(token, EnrolmentToken) else EnrolmentToken.parse(token)
     folder = Path(folder)
@@ -83,9 +83,9 @@ def enrol(
 
 
 def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE_S) -> Identity:
-    """Return the identity with a new certificate, which is also written to its folder.
+    """Return the identity with a new certificate, which is also written to the identity's folder.
 
-    The key does not change: only one file is replaced, so no crash can separate a key from its certificate. Raises
+    The key does not change, so only one file is replaced, and no crash can separate a key from its certificate. Raises
     `NotTrustedError`, `EnrolmentError`.
     """
     context = _tls_context(identity.ca)
@@ -97,11 +97,11 @@ def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE
 
 
 def _request_ca(place: tuple[str, int], token: EnrolmentToken, patience_s: float) -> x509.Certificate:
-    """Return the certificate of the Authority of `token` from the server at `place`."""
+    """Return the certificate of the Authority that issued `token`, from the server at `place`."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.check_hostname = False
-    context.verify_mode = ssl.CERT_NONE  # nothing secret is sent here, and every answer is checked
+    context.verify_mode = ssl.CERT_NONE  # nothing secret is sent, and all answers are checked
     answer = _ask(place, Introduce(), context, patience_s)
     try:
         ca = read_certificate(answer.ca) if isinstance(answer, Introduction) else None
@@ -125,7 +125,7 @@ def _tls_context(ca: x509.Certificate) -> ssl.SSLContext:
 
 
 def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, patience_s: float) -> Answer:
-    """Return the answer of the server at `place`, if it passes `context`."""
+    """Return the answer of the server at `place`, which must be accepted by `context`."""
     try:
         raw = socket.create_connection(place, patience_s)
     except OSError as error:
@@ -133,7 +133,7 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
     try:
         with raw:
             Exchange(raw, patience_s).wait()
-            # The name in the certificate is the master's, wherever it listens.
+            # The certificate has the master's name, whatever address the server has.
             with context.wrap_socket(raw, server_hostname=MASTER) as connection:
                 exchange = Exchange(connection, patience_s)
                 exchange.send(question)

@@ -1,8 +1,8 @@
-"""The enrolment service of the Authority on a TLS port, which the master runs.
+"""The Authority's enrolment service on a TLS port, which is run by the master.
 
-All connections use TLS 1.3 with the master's certificate. A robot with a token has no certificate yet and needs none.
-Renewal uses mutual TLS: in the handshake, OpenSSL checks the robot's certificate (chain, time, purpose) and its
-possession of the key, so no additional signature format is needed.
+All connections use TLS 1.3 with the master's certificate. A robot with a token needs no certificate yet. Renewal uses
+mutual TLS: in the handshake, OpenSSL checks the robot's certificate (chain, time, purpose) and its possession of the
+key, so no additional signature format is needed.
 """
 
 from __future__ import annotations
@@ -37,17 +37,17 @@ from robochoc.authority.identity import Identity
 from robochoc.authority.registry import AuthorityError
 
 CONNECTIONS = 32
-"""The number of connections served at once. Others wait to be accepted."""
+"""The maximum number of connections served at once. Further connections wait to be accepted."""
 PATIENCE_S = 10.0
 """The longest duration of a connection, in seconds."""
 _BACKLOG = 256
 
 
 class EnrolmentServer:
-    """Serves `authority` at `host` and `port` (0: any free one; see `address`) within its context.
+    """Serves `authority` at `host` and `port` (0: any free port; see `address`) within its context.
 
-    `identity` is the master's. After half of its validity, the Authority creates a new one for the same hosts. Refusals
-    are reported to the Authority's observer from the threads of this server, one at a time.
+    `identity` is the master's. After half of its validity, the Authority creates a new identity for the same hosts.
+    Refusals are reported to the Authority's observer from the threads of this server, one at a time.
     """
 
     def __init__(
@@ -113,7 +113,7 @@ class EnrolmentServer:
                 self._admit()
 
     def _admit(self) -> None:
-        """Accept a connection and serve it in a thread. Its failure does not affect the others."""
+        """Accept a connection and serve it in a thread. Its failure does not affect other connections."""
         try:
             raw, peer = self._listener.accept()
             origin = f"{peer[0]}:{peer[1]}"
@@ -170,7 +170,7 @@ class EnrolmentServer:
             return EnrolmentDenied("the Authority cannot answer now; ask its operator")
 
     def _answer(self, question: Question, shown: bytes | None, origin: str) -> Answer:
-        """Return the answer to a robot that has `shown` a certificate (DER) or None in the handshake."""
+        """Return the answer to a robot; `shown` is its certificate (DER) in the handshake, None without one."""
         match question:
             case Introduce():
                 return Introduction(pem(self._authority.certificate))
@@ -216,6 +216,6 @@ def _server_context(identity: Identity) -> ssl.SSLContext:
 
 
 def _hang_up(connection: socket.socket) -> None:
-    """End all waits for `connection`. `SSLSocket.shutdown` is not used, because it would continue without TLS."""
+    """End all waits on `connection`. `SSLSocket.shutdown` is not used, because it would continue without TLS."""
     with suppress(OSError):
         socket.socket.shutdown(connection, socket.SHUT_RDWR)

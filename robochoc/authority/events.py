@@ -13,4 +13,4 @@ AuthorityObserver = Callable[[AuthorityEvent], None]
 
 
 def unobserved(_event: AuthorityEvent) -> None:
-    """Ignore an event: the default observer of an Authority."""
+    """Ignore an event; this is the default observer of an Authority."""

@@ -1,7 +1,7 @@
-"""The messages between robots and the enrolment service: one question, one answer, each a length and msgpack.
+"""The messages between robots and the enrolment service: one question and one answer, each a length and msgpack.
 
-The length is 4 bytes, most significant first. Input is read up to a deadline and a size, and decoded into one of these
-structs or rejected.
+The length has 4 bytes, most significant first. Input is read up to a deadline and a maximum size, and decoded to one of
+these structs, or rejected.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import msgspec
 from robochoc.system.errors import RobochocError
 
 LARGEST_BYTES = 16384
-"""The largest frame. A request for a certificate has about 350 bytes, a certificate 800."""
+"""The maximum size of a frame. A request for a certificate has about 350 bytes, a certificate 800."""
 _LENGTH_BYTES = 4
 
 
@@ -23,7 +23,7 @@ class FrameError(RobochocError, ValueError):
 
 
 class _Frame(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True):
-    """Base of all frames."""
+    """The base class of all frames."""
 
 
 class Introduce(_Frame, frozen=True):
@@ -86,7 +86,7 @@ def decode_answer(content: bytes) -> Answer:
 
 
 class Exchange:
-    """Frames on a connected socket, all within `seconds` from now, even if their bytes arrive slowly."""
+    """Exchanges frames on a connected socket, all within `seconds` from now, even if their bytes arrive slowly."""
 
     def __init__(self, connection: socket.socket, seconds: float) -> None:
         self._connection = connection
@@ -106,11 +106,11 @@ class Exchange:
         self._connection.sendall(len(content).to_bytes(_LENGTH_BYTES, "big") + content)
 
     def question(self) -> Question:
-        """Return the next frame, a question. Raises `OSError`, `FrameError`."""
+        """Return the next frame, which must be a question. Raises `OSError`, `FrameError`."""
         return decode_question(self._receive())
 
     def answer(self) -> Answer:
-        """Return the next frame, an answer. Raises `OSError`, `FrameError`."""
+        """Return the next frame, which must be an answer. Raises `OSError`, `FrameError`."""
         return decode_answer(self._receive())
 
     def _receive(self) -> bytes:

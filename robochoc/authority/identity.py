@@ -1,4 +1,4 @@
-"""An identity: the proof of a machine's name, as a folder of three files.
+"""An identity: the proof of a machine's name, in a folder with three files.
 
 `key.pem` is created on the machine and never leaves it; `cert.pem` contains the holder's name; `ca.pem` is the
 certificate of the issuing Authority, the only one that this machine accepts.
@@ -41,7 +41,7 @@ class IdentityError(RobochocError):
 
 
 class IdentityTexts(NamedTuple):
-    """An identity as PEM. `key` is secret."""
+    """An identity as PEM texts. `key` is secret."""
 
     key: bytes
     certificate: bytes
@@ -60,7 +60,7 @@ class Identity:
 
     @classmethod
     def load(cls, folder: Path | str, now: float | None = None) -> Identity:
-        """Return the identity in `folder`. `now`: Unix time, if not the clock's.
+        """Return the identity in `folder`. `now` is the Unix time; None: the clock's.
 
         Raises `IdentityError` if a file is missing or malformed, if others may read the key, if the key does not belong
         to the certificate, or if the certificate was not issued by the Authority or is not valid now.
@@ -78,7 +78,7 @@ class Identity:
 
     @classmethod
     def from_texts(cls, texts: IdentityTexts) -> Identity:
-        """Return the identity of `texts`, which are trusted, as they come from this program."""
+        """Return the identity in `texts`, which are trusted because they come from this program."""
         key, certificate, ca = read_key(texts.key), read_certificate(texts.certificate), read_certificate(texts.ca)
         return cls(Path(), common_name(certificate.subject), key, certificate, ca)
 
@@ -104,16 +104,16 @@ class Identity:
 
     @property
     def expires(self) -> datetime:
-        """The expiry of the certificate."""
+        """The expiry time of the certificate."""
         return self.certificate.not_valid_after_utc
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """The host names and addresses in the certificate; only the master's has any."""
+        """The host names and addresses in the certificate; only the master's certificate has any."""
         return hosts_of(self.certificate)
 
     def is_due(self, now: float | None = None) -> bool:
-        """Return whether the certificate should be renewed: more than half of its validity has passed at `now`."""
+        """Return whether the certificate should be renewed because more than half of its validity has passed."""
         left = self.expires - utc_time(time.time() if now is None else now)
         return left < (self.expires - self.certificate.not_valid_before_utc) / 2
 
@@ -122,7 +122,7 @@ class Identity:
 
 
 def save(folder: Path, key: ec.EllipticCurvePrivateKey, certificate: Certificate, ca: Certificate) -> None:
-    """Write an identity. The certificate comes last, so that an incomplete identity is recognised."""
+    """Write an identity. The certificate is written last, so that an incomplete identity can be recognised."""
     private_folder(folder)
     for name in (CERTIFICATE, CA, KEY):
         (folder / name).unlink(missing_ok=True)
@@ -132,9 +132,9 @@ def save(folder: Path, key: ec.EllipticCurvePrivateKey, certificate: Certificate
 
 
 def private_folder(folder: Path) -> None:
-    """Create `folder` with access for its owner only. An existing empty folder is restricted as well.
+    """Create `folder` with access only for its owner. Access to an existing empty folder is also restricted.
 
-    Raises `OSError`, also for a folder with content that others can access, as it has another purpose.
+    Raises `OSError`, also for a folder with content that others can access, since it has another purpose.
     """
     folder.mkdir(parents=True, exist_ok=True, mode=0o700)
     mode = folder.stat().st_mode

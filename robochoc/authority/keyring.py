@@ -1,9 +1,9 @@
-"""Key cards and key rings, by which robots authenticate each other's messages end to end.
+"""Key cards and key rings, with which robots authenticate each other's messages end to end.
 
-For each run, a robot creates two new key pairs, which never leave its memory: Ed25519 (RFC 8032) to sign, X25519
-(RFC 7748) to agree on secrets. Its card contains the public keys, signed with the key of its certificate. Everyone with
-the Authority's certificate can check a card, however it was transferred. After the run the private keys are deleted, so
-recorded messages cannot be decrypted later, not even with the key of a certificate.
+For each run, a robot creates two new key pairs: Ed25519 (RFC 8032) for signatures, X25519 (RFC 7748) for agreement on
+secrets. The private keys never leave its memory. The robot's card contains the public keys, signed with the key of its
+certificate. Everyone with the Authority's certificate can check a card, however it was transferred. After the run the
+private keys are deleted, so recorded messages cannot be decrypted later, even with the key of a certificate.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class KeyCardError(RobochocError, ValueError):
 
 
 class UnknownPeerError(RobochocError, LookupError):
-    """No card of the robot was admitted."""
+    """No card has been admitted for the robot."""
 
 
 class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -57,7 +57,7 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     @classmethod
     def decode(cls, content: bytes) -> Self:
-        """Return the card in `content`, which is checked later by `KeyRing.admit`. Raises `KeyCardError`."""
+        """Return the card in `content`, to be checked by `KeyRing.admit`. Raises `KeyCardError`."""
         if len(content) > _LARGEST_CARD_BYTES:
             raise KeyCardError(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
         try:
@@ -73,8 +73,8 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 class KeyRing:
     """The keys of the robot `own` for `run`, and the cards of its peers.
 
-    It belongs to one process: a copy would repeat numbers that must be unique. So it cannot be copied, or used in a
-    forked child.
+    A key ring belongs to one process and cannot be copied, or used in a forked child, since a copy would repeat numbers
+    that must be unique.
     """
 
     def __init__(self, own: Identity, run: str) -> None:
@@ -92,10 +92,10 @@ class KeyRing:
         self.card = msgspec.structs.replace(unsigned, signature=signature)
 
     def admit(self, card: KeyCard, now: float) -> None:
-        """Accept `card` at the Unix time `now`. It replaces an older card of that robot.
+        """Accept `card` at the Unix time `now`, replacing an older card of the robot.
 
-        Raises `KeyCardError` if its certificate was not issued by the Authority, is not valid now or has another name,
-        if the signature is wrong, or if the card is from another run.
+        Raises `KeyCardError` if the card's certificate was not issued by the Authority, is not valid now or has another
+        name, if the signature is wrong, or if the card is from another run.
         """
         who = on_one_line(shortened(card.name))
         try:
@@ -114,12 +114,12 @@ class KeyRing:
             raise KeyCardError(f"the keys on the card of {who} do not have {_PUBLIC_BYTES} bytes")
         try:
             self._sealing.exchange(X25519PublicKey.from_public_bytes(card.sealing))
-        except ValueError as error:  # a point of small order: the agreed secret would be public
+        except ValueError as error:  # a point of small order, for which the agreed secret would be public
             raise KeyCardError(f"the sealing key on the card of {who} is not a valid key") from error
         self._peers[card.name] = card
 
     def dismiss(self, name: str) -> None:
-        """Remove the card of `name`: its robot was revoked, or has left."""
+        """Remove the card of the robot `name`, which was revoked or has left."""
         self._peers.pop(name, None)
 
     def card_of(self, name: str) -> KeyCard:
@@ -130,11 +130,11 @@ class KeyRing:
             raise UnknownPeerError(f"no key card of {on_one_line(shortened(name))} was admitted") from None
 
     def sign(self, content: bytes) -> bytes:
-        """Return an Ed25519 signature, 64 bytes."""
+        """Return an Ed25519 signature of `content` (64 bytes)."""
         return self._signing.sign(content)
 
     def is_signed(self, name: str, signature: bytes, content: bytes) -> bool:
-        """Return whether `name` has signed `content`. Raises `UnknownPeerError`."""
+        """Return whether `signature` is a signature of `content` by `name`. Raises `UnknownPeerError`."""
         card = self.card_of(name)
         try:
             Ed25519PublicKey.from_public_bytes(card.signing).verify(signature, content)
@@ -145,8 +145,8 @@ class KeyRing:
     def shared_secret(self, sender: str, receiver: str, purpose: bytes) -> bytes:
         """Return the 32 secret bytes shared by `sender` and `receiver`, one of which is this robot.
 
-        X25519, then HKDF with SHA-256 (RFC 5869) over the run, names, public keys and `purpose`. The opposite direction
-        has another secret. Raises `UnknownPeerError`.
+        The secret results from X25519, then HKDF with SHA-256 (RFC 5869) over the run, names, public keys and
+        `purpose`. The opposite direction has another secret. Raises `UnknownPeerError`.
         """
         peer = self.card_of(receiver if sender == self.name else sender)
         cards = (self.card, peer) if sender == self.name else (peer, self.card)
@@ -157,7 +157,7 @@ class KeyRing:
         return HKDF(hashes.SHA256(), _SECRET_BYTES, salt=None, info=agreed).derive(secret)
 
     def next_number(self) -> int:
-        """Return a new number of this key ring, for nonces.
+        """Return a number, for nonces, that this key ring has not returned before.
 
         Raises `RuntimeError` in a forked child, where numbers would be repeated.
         """

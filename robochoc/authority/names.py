@@ -1,4 +1,4 @@
-"""Checks of the names of members, and descriptions of the enrolled names."""
+"""Checks names of members, and describes the enrolled names."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class NotEnrolledError(RobochocError, LookupError):
 
 
 def describe_enrolled(name: str, members: Collection[str]) -> str:
-    """Return a list of the enrolled names as text, with the most similar one to `name`."""
+    """Return the enrolled names as text, with the name most similar to `name`."""
     known = sorted(known for known in members if known != MASTER)
     if not known:
         return "there are no enrolled names; run: robochoc authority enrol NAME"
@@ -33,7 +33,7 @@ def describe_enrolled(name: str, members: Collection[str]) -> str:
 
 
 def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
-    """Raise `InvalidNameError` if `name` cannot take part as `role`."""
+    """Raise `InvalidNameError` if `name` is not allowed for `role`."""
     shown = on_one_line(shortened(name))
     if not is_name(name):
         raise InvalidNameError(

@@ -1,8 +1,8 @@
 """The Authority's registry: enrolled names and their certificates, in a JSON file that processes can share.
 
-A change reads and replaces the file while it holds the lock (flock(2)) of another file in the folder: `robochoc
-authority enrol` and a running master do not lose each other's changes. Readers need no lock: they see the old file or
-the new one, and cache its content until the file changes.
+A change reads and replaces the file while it holds a lock (flock(2)) on another file in the folder, so that `robochoc
+authority enrol` and a running master do not overwrite each other's changes. Readers need no lock: they see the old or
+the new file, and cache its content until the file changes.
 """
 
 from __future__ import annotations
@@ -37,22 +37,22 @@ class Role(StrEnum):
 
 
 class Right(StrEnum):
-    """A right besides those of the role. It must be granted."""
+    """A right in addition to those of the role, which must be granted."""
 
-    SNIFF = "sniff"  # follow runs: receive the master's journal with the robots' messages
+    SNIFF = "sniff"  # to follow runs: receive the master's journal with the robots' messages
 
 
 class EnrolmentState(StrEnum):
     """The state of an enrolment."""
 
-    INVITED = "invited"  # it has a valid token
+    INVITED = "invited"  # the name has a valid token
     IN_FORCE = "in force"
-    EXPIRED = "expired"  # its last certificate or its unused token has expired
+    EXPIRED = "expired"  # the name's last certificate or unused token has expired
     REVOKED = "revoked"
 
 
 class Invitation(msgspec.Struct, frozen=True):
-    """The token of a name: the digest of its secret, and its expiry (Unix time)."""
+    """The token of a name: the digest of the token's secret, and the expiry (Unix time)."""
 
     digest: str
     expires: float
@@ -73,9 +73,9 @@ class EnrolledName(msgspec.Struct, frozen=True):
     role: Role
     invitation: Invitation | None = None
     certificates: tuple[Issued, ...] = ()
-    """In force, unless they have expired."""
+    """The certificates in force, unless they have expired."""
     withdrawn: tuple[Issued, ...] = ()
-    """Revoked, or replaced by those of a new key."""
+    """Certificates that were revoked, or replaced by certificates for a new key."""
     revoked: bool = False
     may: tuple[Right, ...] = ()
 
@@ -95,7 +95,7 @@ class EnrolledName(msgspec.Struct, frozen=True):
         return not self.certificates and not self.withdrawn
 
     def expires(self, now: float) -> float:
-        """Return the expiry (Unix time) of its token if it is invited, else of its last certificate; 0 if none."""
+        """Return the expiry (Unix time) of the token if invited, else of the last certificate; 0 if there is none."""
         token = self.invitation.expires if self.invitation and not self.invitation.used else 0
         if self.state(now) == EnrolmentState.INVITED:
             return token
@@ -116,7 +116,7 @@ class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Registry:
-    """The registry in `folder`."""
+    """Reads and changes the registry in `folder`."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -131,7 +131,7 @@ class Registry:
             known = self._known
             if known[0] != seen:
                 known = (seen, msgspec.json.decode(path.read_bytes(), type=_Content).members)
-                # The content may be newer than `seen`; then the next call reads it again.
+                # The content may be newer than `seen`; the next call then reads the file again.
                 self._known = known
         except FileNotFoundError:
             return {}
@@ -143,7 +143,7 @@ class Registry:
 
     @contextmanager
     def change(self) -> Iterator[dict[str, EnrolledName]]:
-        """Yield the records for an exclusive change, which is written after the block unless it raises."""
+        """Yield the records for an exclusive change, which is written after the block unless the block raises."""
         with locked(self._folder):
             members = dict(self.members())
             before = dict(members)
@@ -155,7 +155,7 @@ class Registry:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """Exclude all other processes and threads from `folder` during the block."""
+    """Lock `folder` against all other processes and threads during the block."""
     descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)

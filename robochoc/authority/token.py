@@ -1,8 +1,8 @@
-"""Tokens: a person carries one from the Authority to a new robot, so that they can authenticate each other.
+"""Tokens, which a person carries from the Authority to a new robot so that the two can authenticate each other.
 
 A token contains a secret, which the robot uses once, and the fingerprint of the Authority's certificate, by which the
-robot recognises the Authority before it has a certificate. Its text is base32 in lower case (RFC 4648), which can be
-read aloud, and in which no letter resembles a digit.
+robot recognises the Authority before it has a certificate. The text of a token is base32 in lower case (RFC 4648),
+which can be read aloud, and in which no letter resembles a digit.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ class TokenError(RobochocError, ValueError):
 
 @dataclass(frozen=True, repr=False)
 class EnrolmentToken:
-    """A secret for one use, and the SHA-256 fingerprint of the Authority's certificate."""
+    """A single-use secret, and the SHA-256 fingerprint of the Authority's certificate."""
 
     secret: bytes
     fingerprint: bytes
@@ -37,7 +37,7 @@ class EnrolmentToken:
 
     @classmethod
     def parse(cls, text: str) -> EnrolmentToken:
-        """Parse a token, ignoring surrounding blanks and the case of letters. Raises `TokenError`."""
+        """Parse a token, ignoring surrounding whitespace and case. Raises `TokenError`."""
         secret, dot, fingerprint = text.strip().partition(".")
         try:
             token = cls(_decoded(secret), _decoded(fingerprint))
@@ -51,12 +51,12 @@ class EnrolmentToken:
         return f"{_encoded(self.secret)}.{_encoded(self.fingerprint)}"
 
     def __repr__(self) -> str:
-        """Return a text without the secret: a token may appear in a traceback or a log."""
+        """Return a text without the secret, since a token may appear in a traceback or a log."""
         return f"<Token of the Authority {self.fingerprint.hex()[:16]}>"
 
 
 def digest(secret: bytes) -> str:
-    """Return the digest of a secret, which the Authority stores. The digest cannot be redeemed."""
+    """Return the digest of a secret, for storage by the Authority. A digest cannot be redeemed."""
     return hashlib.sha256(b"robochoc token\0" + secret).hexdigest()
 
 

@@ -1,1 +1,1 @@
-"""The loop of deciding and observing: decisions go to sinks, and reports from sources change the problem."""
+"""The loop of deciding and observing: decisions are sent to sinks, and reports from sources change the problem."""

@@ -1,7 +1,7 @@
-"""The closed loop: decisions reach robots, and the robots' situation changes the problem (the paper, Section 4.2).
+"""The closed loop: decisions are sent to robots, and the robots' situation changes the problem (paper, Section 4.2).
 
-After each epoch the decision is published; then the loop waits for reports of the robots. The first report that changes
-the problem opens the next epoch, together with further reports within `TOGETHER_S`, and the team solves again.
+After each epoch, the loop publishes the decision and waits for reports from the robots. The first report that changes
+the problem, together with further reports within `TOGETHER_S`, opens the next epoch, in which the team solves again.
 """
 
 from __future__ import annotations
@@ -34,18 +34,18 @@ from robochoc.robots.situation import BATTERY, Situation
 
 _ANSWERED = (Verdict.SOLUTION, Verdict.OPTIMAL)
 _WITHDRAWN = "withdr"
-"""The part of the master's text that stands for withdrawn robots."""
+"""The part of the master's text that indicates withdrawn robots."""
 
 
 TOGETHER_S = 0.5
-"""Reports within this number of seconds after one that changes the problem belong to the same event."""
+"""The time after a report that changes the problem in which reports belong to the same event, in seconds."""
 
 
 _FLOWN = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
 class ReportedChanges(NamedTuple):
-    """Changes that were reported during the search. Reports until `until_s` belong to the same event."""
+    """Changes that were reported during a search. Reports until `until_s` belong to the same event."""
 
     changes: list[Change]
     until_s: float
@@ -59,7 +59,7 @@ class Feedback(ABC):
     idle: Callable[[], None] = staticmethod(lambda: None)
     """Called regularly while no report arrives."""
     simulated: bool = False
-    """True if the robots are simulated here: then their reports are published here as well."""
+    """True if this object simulates the robots, and so also publishes their reports."""
 
     @property
     def notes(self) -> list[str]:
@@ -68,7 +68,7 @@ class Feedback(ABC):
 
     @abstractmethod
     def now_ns(self) -> int:
-        """Return the time by the reports' clock, in nanoseconds."""
+        """Return the present time of the clock used for reports, in nanoseconds."""
 
     @abstractmethod
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
@@ -76,22 +76,22 @@ class Feedback(ABC):
 
     @abstractmethod
     def next(self, until_s: float | None) -> Report | None:
-        """Return the next report, if it arrives before `until_s`; None if no more follow."""
+        """Return the next report that arrives before `until_s`; None if there is none."""
 
     def poll(self) -> Report | None:
-        """Return a received report without waiting; None in a simulation, whose time stops while the team decides."""
+        """Return a received report without waiting; None in a simulation, where time stops while the team decides."""
         return None
 
 
 class ClosedLoop:
-    """An environment of a run: publishes each decision, and opens an epoch when robots report a change.
+    """The environment of a run, which publishes each decision, and opens an epoch when robots report a change.
 
-    Reports received over ROS are not published there again; they are only recorded.
+    Reports received over ROS are only recorded, not published over ROS again.
 
     Args:
-        team: The team as its files have it.
+        team: The team as defined in its files.
         publishers: Publishers of decisions and reports. The caller opens and closes their sinks.
-        feedback: The source of reports, and of the time; None: nothing changes the problem.
+        feedback: The source of reports and of the time; None: nothing changes the problem.
         scale: The length of a unit of the problem, in metres; None: chosen by `mission.py`.
         battery: The charge below which a drone is out of order.
         ground: A map of the ground, if there is one.
@@ -129,7 +129,7 @@ class ClosedLoop:
         self._legs: list[Leg] = []
         self._goals: dict[int, Goal] = {}
         self._improved: Leg | None = None
-        """The last published answer of the current epoch."""
+        """The last improved decision published in the current epoch."""
         self._news: ReportedChanges | None = None
         self._past_events = 0
         self._lost = True
@@ -161,14 +161,14 @@ class ClosedLoop:
         return event
 
     def publish(self, outcome: Outcome) -> None:
-        """Publish the decisions of a run that was not connected to this loop."""
+        """Publish the decisions of a run that was made without this loop."""
         mission = mission_of(outcome, self._team, self._scale, self._ground)
         self._legs = [*mission.legs]
         for leg in mission.legs:
             self._decide(leg)
 
     def improve(self, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        """Publish a better answer during the search: only waypoints of drones whose goals have changed.
+        """Publish an improved decision during a search, with waypoints only for drones whose goals have changed.
 
         A simulation flies only the last decision of an epoch, since its time stops while the team decides.
         """
@@ -181,7 +181,7 @@ class ClosedLoop:
         self._decide(replace(leg, goals=goals))
 
     def has_news(self, team: Team) -> bool:
-        """Return whether a received report changes the problem of `team`, which opens the next epoch."""
+        """Return whether a received report changes the problem of `team`, and thus opens the next epoch."""
         feedback, builder = self.feedback, self._builder
         if feedback is None or builder is None or self._improved is None:
             return False
@@ -194,12 +194,12 @@ class ClosedLoop:
 
     @property
     def team(self) -> Team:
-        """The team with a scenario of all planned events, and all events from robots' reports."""
+        """The team with a scenario of all planned events and all events caused by robots' reports."""
         return replace(self._team, scenario=(*self._team.scenario, *self.events))
 
     @property
     def mission(self) -> Mission | None:
-        """The mission so far. None before the first epoch has ended."""
+        """The mission so far; None before the end of the first epoch."""
         return self._builder.mission(self._team.name, self._legs) if self._builder else None
 
     @property
@@ -211,7 +211,7 @@ class ClosedLoop:
     # Decisions
 
     def _new_builder(self, assignment: Assignment) -> MissionBuilder:
-        """Return a builder for all drones. They stand below their first places, or below possible ones."""
+        """Return a builder for all drones, whose homes are below their first places, or below possible places."""
         first = {**_values(self._robots, 0), **assignment}
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
@@ -227,13 +227,13 @@ class ClosedLoop:
     # The situation
 
     def _after_known_events(self, team: Team, happened: int) -> Team:
-        """Return `team` after all known events, of which the first `happened` are already applied."""
+        """Return `team` after all known events, the first `happened` of which have already been applied."""
         for event in self.team.scenario[happened:]:
             team, _ = apply_possible_changes(team, event.changes)
         return team
 
     def _event_of_reports(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
-        """Return the event of the first reports that change `team`; None if there is no such report."""
+        """Return the event caused by the first reports that change `team`; None if there are no such reports."""
         situation = self._situation_of(builder)
         changes: list[Change] = []
         until_s = None
@@ -256,13 +256,13 @@ class ClosedLoop:
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:
-    """Return all drones of the team and of its events. Their places are not known before the first decision."""
+    """Return all drones of the team and its events, whose places are unknown before the first decision."""
     robots = all_robots(team)
     return MissionBuilder(robots, _values(robots, 0)).drones
 
 
 def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> dict[str, int]:
-    """Return each variable's least value (`place` 0) or greatest (-1); only of domains no wider than `span`."""
+    """Return the least (`place` 0) or greatest (-1) value of each variable whose domain is no wider than `span`."""
     found = {}
     for variable in (variable for robot in robots for variable in robot.variables):
         ranges = variable.domain.ranges
@@ -277,15 +277,15 @@ def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
 
 
 def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
-    """Return the goals of the drones of one robot on its own machine, where other robots' places are not known.
+    """Return the goals of one robot's drones on its own machine, where the places of other robots are unknown.
 
-    Goals are by the drones' numbers in `drones_of_robot`. A withdrawn robot lands at its first place, below its cell: a
-    point at the edge might belong to another robot. A drone without a cell in its file stays in place; so do all drones
-    if there is no solution.
+    Goals are given by the drones' numbers in `drones_of_robot`. The drones of a withdrawn robot land at their first
+    places, below their cells, since a point at the edge might belong to another robot. Drones without a cell in the
+    robot's file stay in place; so do all drones if there is no solution.
 
     Args:
         robot: The robot.
-        why: The master's text on the end of the run: `optimal, 6 withdraw`.
+        why: The master's text about the end of the run, such as `optimal, 6 withdraw`.
         assignment: The robot's decision; empty if it has withdrawn.
         scale: The length of a unit, in metres.
     """

@@ -1,7 +1,7 @@
-"""Opens sinks and sources of installed packages by name: `mcap:run.mcap`, `rosbridge://localhost:9090`, `rospy`.
+"""Opens sinks and sources in installed packages by name: `mcap:run.mcap`, `rosbridge://localhost:9090`, `rospy`.
 
-They are found under the entry point groups `robochoc.sinks` and `robochoc.sources`, and called with the text after the
-name. The caller closes them.
+Sinks and sources are found in the entry point groups `robochoc.sinks` and `robochoc.sources`, and called with the text
+after the name. The caller closes them.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from robochoc.system.termination import Terminated
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 
 _ENDINGS = {".mcap": "mcap", ".bag": "rosbag", ".db3": "rosbag2"}
-"""Endings of files that may be given without the name of their format."""
+"""The extensions of files that may be given without the name of their format."""
 
 
 class UnknownSinkError(SinkError):
-    """No sink of that name is installed, or it cannot be used. The message has the package to install, or a hint."""
+    """No sink with this name is installed, or it cannot be used. The message has the package to install, or a hint."""
 
 
 class UnknownSourceError(SourceError):
-    """No source of that name is installed, or it cannot be used. The message has the package to install, or a hint."""
+    """No source of this name is installed, or it cannot be used. The message has the package to install, or a hint."""
 
 
 def open_sink(text: str) -> Sink:
@@ -55,7 +55,7 @@ def place_of(text: str) -> Path | str:
 
 
 def _parts(text: str) -> tuple[str, str]:
-    """Split a text into name and place: `rosbridge` and `localhost:9090` for `rosbridge://localhost:9090`."""
+    """Split `rosbridge://localhost:9090` into the name `rosbridge` and the place `localhost:9090`."""
     name, colon, place = text.partition(":")
     alone = next((kind for ending, kind in _ENDINGS.items() if text.endswith(ending)), None)
     if alone and (not colon or "/" in name):
@@ -70,7 +70,7 @@ def _load_class(group: str, kind: str, name: str, base: type, error_type: type[E
         hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
         if "?" in name:
             hint = f"; options follow a colon: {name.replace('?', ':?', 1)}"
-        also = ("flight",) if group == SOURCES else ()  # the simulated one
+        also = ("flight",) if group == SOURCES else ()  # the simulated source
         raise error_type(on_one_line(not_installed_message(group, kind, name, also=also) + hint))
     entry = entries[0]
     missing = _missing_extra(entry) if len(entries) == 1 else ""
@@ -83,7 +83,7 @@ def _load_class(group: str, kind: str, name: str, base: type, error_type: type[E
 
 
 def missing_packages_of(name: str) -> str:
-    """Return the missing packages of the sink `name`, as advice; empty if it can be used."""
+    """Return advice on the missing packages for the sink `name`; empty if the sink can be used."""
     entries = entry_points_named(SINKS, name)
     return on_one_line(_missing_extra(entries[0])) if entries else ""
 
@@ -93,7 +93,7 @@ def _fault(found: object, base: type) -> str:
 
 
 def _missing_extra(entry: EntryPoint) -> str:
-    """Return an error text for a missing extra of the package of `entry`; empty if nothing is missing."""
+    """Return an error text for a missing extra of the package that has `entry`; empty if nothing is missing."""
     try:
         entry.load()
     except ModuleNotFoundError as error:
@@ -104,11 +104,11 @@ def _missing_extra(entry: EntryPoint) -> str:
             return f"{entry.name} needs {error.name}, which is not installed: pip install '{package}'"
     except Terminated:
         raise
-    except (Exception, SystemExit):  # noqa: BLE001 - raised when it is loaded once more
+    except (Exception, SystemExit):  # noqa: BLE001 - raised when the entry is loaded again
         return ""
     return ""
 
 
 def _normalised(extra: str) -> str:
-    """Return the normalised name of an extra: metadata and `pyproject.toml` may spell it differently."""
+    """Return the normalised name of an extra, since metadata and `pyproject.toml` may spell it differently."""
     return re.sub(r"[-_.]+", "-", extra).lower()

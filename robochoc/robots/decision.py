@@ -26,14 +26,14 @@ from robochoc.verification.objective import Objective
 PERIOD_S = 0.5
 """The shortest time between two messages of feedback, in seconds."""
 FEEDBACK_CHARACTERS_MAX = 128 * 1024
-"""An assignment that makes feedback longer is left out."""
+"""The maximum length of feedback, in characters. Assignments that would exceed it are left out."""
 
 SendFeedback = Callable[[str], None]
 """Sends feedback, as JSON on one line."""
 
 
 class CancellableDecision:
-    """Solves teams' problems, one at a time. Any thread may cancel the current search.
+    """Solves the problems of teams, one at a time. Any thread may cancel the current search.
 
     Args:
         send: Called with feedback during a search. None: no feedback, and events are ignored.
@@ -61,7 +61,7 @@ class CancellableDecision:
     def cancel(self, _: Fields) -> dict[str, Any]:
         """Cancel the current decision; return the answer to the request `std_srvs/Trigger_Request`.
 
-        The decision ends with the best known assignment, as at the end of its time, and is then answered.
+        The decision ends with the best known assignment, as if its time were over, and its request is then answered.
         """
         with self._lock:
             if not self._team:
@@ -75,7 +75,7 @@ class CancellableDecision:
 
 
 class _Feedback:
-    """Feedback of one decision: its duration, its number of messages, and the cheapest assignment so far."""
+    """Feedback on one decision: its duration, its number of messages, and the cheapest assignment so far."""
 
     def __init__(self, team: Team, options: Options, send: SendFeedback) -> None:
         self._team, self._send_text = team, send
@@ -89,7 +89,7 @@ class _Feedback:
         self._assignment: dict[str, int] = {}
         self._objective: Objective | None = None
         self._reader = TeamReader()
-        with suppress(Exception):  # `solve` reports errors of the team
+        with suppress(Exception):  # `solve` reports errors in the team
             objective = objective_to_record(team, options)
             self._objective = objective and objective()
 

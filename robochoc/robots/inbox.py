@@ -10,9 +10,9 @@ from typing import NamedTuple
 from robochoc.robots.source import ReceivedMessage
 
 PER_TOPIC_MAX = 100
-"""The number of newest messages stored for each topic."""
+"""The maximum number of messages stored for each topic; the newest are kept."""
 WEIGHT_MAX = 16_000_000
-"""The number of characters and fields stored for all topics together."""
+"""The maximum number of characters and fields stored for all topics together."""
 
 
 class _StoredMessage(NamedTuple):
@@ -22,10 +22,10 @@ class _StoredMessage(NamedTuple):
 
 
 class MessageInbox:
-    """Messages in the order of their arrival. Any thread may add messages; one thread reads them.
+    """Stores messages in the order of their arrival. Any thread may add messages; one thread reads them.
 
-    A topic with too many messages loses its own oldest ones, not those of other topics: battery reports ten times a
-    second during a search do not displace a report of a blocked cell.
+    If a topic has too many messages, its own oldest messages are dropped, not those on other topics. So ten battery
+    reports per second during a search do not displace a report of a blocked cell.
     """
 
     def __init__(self, per_topic: int = PER_TOPIC_MAX, weight: int = WEIGHT_MAX) -> None:
@@ -36,7 +36,7 @@ class MessageInbox:
         self._arrived = threading.Condition()
 
     def put(self, received: ReceivedMessage, weight: int = 1) -> None:
-        """Add `received`, with this number of characters and fields."""
+        """Add `received`, whose `weight` is the number of its characters and fields."""
         with self._arrived:
             stored = self._topics.setdefault(received.topic, deque())
             stored.append(_StoredMessage(self._count, received, weight))
@@ -50,7 +50,7 @@ class MessageInbox:
             self._arrived.notify()
 
     def wake(self) -> None:
-        """Wake the waiting thread: nothing more will arrive."""
+        """Wake the waiting thread, since nothing more will arrive."""
         with self._arrived:
             self._arrived.notify()
 
@@ -71,7 +71,7 @@ class MessageInbox:
 
 
 def weight_of(value: object) -> int:
-    """Return the number of characters and fields of `value`."""
+    """Return the number of characters and fields in `value`."""
     match value:
         case dict():
             return 1 + sum(map(weight_of, value.values()))

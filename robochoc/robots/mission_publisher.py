@@ -1,4 +1,4 @@
-"""Publishers of a mission: decisions, reports and poses of its drones, also from a simulated flight."""
+"""Publishers for a mission: the drones' decisions, reports and poses, also from a simulated flight."""
 
 from __future__ import annotations
 
@@ -32,20 +32,20 @@ class MissionPublisher(ABC):
 
     @abstractmethod
     def report(self, report: Report) -> None:
-        """Publish a drone's report, at the report's time."""
+        """Publish a drone's report, with the time in the report."""
 
     @abstractmethod
     def poses(self, positions: npt.NDArray[np.float64], attitudes: npt.NDArray[np.float64], at_s: float) -> None:
-        """Publish all drones' poses: positions in metres (N, 3), and quaternions x, y, z, w (N, 4)."""
+        """Publish the poses of all drones: positions (N, 3) in metres, and quaternions x, y, z, w (N, 4)."""
 
     @property
     @abstractmethod
     def summary(self) -> str:
-        """The numbers of published messages as text, such as `10 waypoints, 6 landings`."""
+        """The counts of published messages as text, such as `10 waypoints, 6 landings`."""
 
 
 class FlightBroadcast:
-    """Publishes a flight step by step: reports, and all poses `POSES_HZ` times a second."""
+    """Publishes a flight step by step: reports, and the poses of all drones at `POSES_HZ`."""
 
     def __init__(self) -> None:
         self._ticks = 0
@@ -53,7 +53,7 @@ class FlightBroadcast:
     def publish(
         self, publishers: Sequence[MissionPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
     ) -> None:
-        """Publish the poses of `flown` since the last call, up to `until_s`, and `reports` in the same order of time.
+        """Publish the poses in `flown` since the last call, up to `until_s`, and `reports`, in chronological order.
 
         Raises `SinkError`.
         """
@@ -70,7 +70,7 @@ class FlightBroadcast:
 
 
 def publish_flight(mission: Mission, flown: FlightLog, publishers: Sequence[MissionPublisher]) -> None:
-    """Publish a whole flight: each leg's waypoints as it begins, poses, and drones that fall. Raises `SinkError`."""
+    """Publish a whole flight: waypoints at the beginning of each leg, poses, and falling drones. Raises `SinkError`."""
     if not publishers:
         return
     fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
@@ -92,5 +92,5 @@ def _report(publishers: Sequence[MissionPublisher], report: Report) -> None:
 
 
 def nanoseconds(at_s: float) -> int:
-    """Return a time in seconds as nanoseconds."""
+    """Convert a time from seconds to nanoseconds."""
     return round(at_s * SECOND_NS)

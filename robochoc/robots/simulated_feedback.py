@@ -21,9 +21,9 @@ from robochoc.robots.mission_publisher import FlightBroadcast, nanoseconds
 from robochoc.system.errors import RobochocError
 
 NAMES_MAX = 12
-"""The largest number of drones named in an error."""
+"""The maximum number of drones named in an error."""
 FAILS_S = 2.0
-"""The default time of a failure: the drone is then in the air."""
+"""The default time of a failure, at which the drone is in the air, in seconds."""
 
 
 class CannotFlyError(RobochocError):
@@ -31,15 +31,15 @@ class CannotFlyError(RobochocError):
 
 
 class UnknownDroneError(RobochocError):
-    """A drone that is to fail does not exist. The message names the existing drones."""
+    """A drone that should fail does not exist. The message names the existing drones."""
 
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """Conditions of a simulated flight, before its mission is known.
+    """The conditions of a simulated flight, before its mission is known.
 
-    `failures` are names of robots or drones, with the second at which a motor stops; of a robot's drones, the first
-    fails. `obstacles` are in units of the problem. The other attributes are those of `FlightConditions`.
+    `failures` are names of robots or drones, with the time in seconds at which a motor stops; for a robot, its first
+    drone fails. `obstacles` are in units of the problem. The other attributes are those of `FlightConditions`.
     """
 
     distance: float | None = None
@@ -68,7 +68,7 @@ class FlightSettings:
 
 
 def _drone_named(drones: Sequence[Drone], name: str) -> str:
-    """Return the name of the drone called `name`, or of the first drone of that robot."""
+    """Return `name` if it is a drone's name, or the name of the first drone of the robot `name`."""
     found = [drone for drone in drones if drone.name == name] or [drone for drone in drones if drone.robot == name]
     if not found:
         known = [drone.name for drone in drones]
@@ -81,10 +81,10 @@ def _drone_named(drones: Sequence[Drone], name: str) -> str:
 class SimulatedFeedback(Feedback):
     """Flies each decision in the simulation. A decision is complete when all drones have reached their places.
 
-    A report ends the leg early: all other drones slow down and hover. After a report without effect they continue.
-    Nothing is reported twice. Time begins at 0 with the first leg. Each decision is a leg of the log, even if it was
-    outdated before a drone could follow it. The team decides while all drones hover, and only after all reports of an
-    event. So a recording of the reports leads to the same run.
+    A report ends the leg early: all other drones slow down and hover, and continue if the report has no effect. Nothing
+    is reported twice. Time begins at 0 with the first leg. Each decision is a leg in the log, even if it was outdated
+    before a drone could follow it. The team decides while all drones hover, and only after all reports on an event, so
+    a recording of the reports leads to the same run.
     """
 
     settings: FlightSettings
@@ -92,7 +92,7 @@ class SimulatedFeedback(Feedback):
     _flight: Flight | None = None
     _leg: Leg | None = None
     _is_unfinished: bool = False
-    """True if the decision has not been flown completely."""
+    """True if the latest decision has not been flown completely."""
     _calls: list[int] = field(default_factory=list)
     """The number of calls of `Flight.fly` for each decision."""
     _waiting: deque[Report] = field(default_factory=deque)
@@ -105,7 +105,7 @@ class SimulatedFeedback(Feedback):
         return nanoseconds(self._now_s)
 
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
-        """Store a decision: `next` flies it."""
+        """Store a decision, which `next` flies."""
         if self._flight is None:
             homes = np.array([drone.home for drone in builder.drones], dtype=float).reshape(-1, 3)
             try:
@@ -137,7 +137,7 @@ class SimulatedFeedback(Feedback):
         return self._waiting.popleft()
 
     def log(self) -> FlightLog | None:
-        """Return the flight log, a leg for each decision; None if nothing was flown. Raises `CannotFlyError`."""
+        """Return the flight log, with a leg for each decision; None if nothing was flown. Raises `CannotFlyError`."""
         if self._flight is None or self._leg is None:
             return None
         if not self._calls[-1]:
@@ -150,7 +150,7 @@ class SimulatedFeedback(Feedback):
         )
 
     def _fly(self, flight: Flight, leg: Leg) -> None:
-        """Fly until a drone makes a new report, or all have reached their goals."""
+        """Fly until a drone makes a new report, or all drones have reached their goals."""
         reports = self._fly_leg(flight, leg, leg.goals, stop_on_report=True)
         new = self._not_yet_reported(reports)
         if reports and not new:
@@ -181,13 +181,13 @@ class SimulatedFeedback(Feedback):
         return [OutOfOrderReport(name, "has fallen", float(flown.times[-1])) for name in lost if name not in known]
 
     def _not_yet_reported(self, reports: Sequence[Report]) -> list[Report]:
-        """Return the new reports, in the order of their times."""
+        """Return the new reports, sorted by time."""
         new = sorted((one for one in reports if _without_time(one) not in self._known), key=lambda report: report.at_s)
         self._known.update(map(_without_time, new))
         return new
 
     def _publish(self, flown: FlightLog, reports: Sequence[Report]) -> None:
-        """Publish the flight since the last call, with its reports."""
+        """Publish the flight since the last call, with `reports`."""
         self._now_s = float(flown.times[-1]) if len(flown.times) else self._now_s
         if self.publishers:
             self._broadcast.publish(self.publishers, flown, reports, self._now_s)

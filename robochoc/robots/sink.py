@@ -1,4 +1,4 @@
-"""Sinks, which publish a mission's messages. Packages offer them under the entry point group `robochoc.sinks`."""
+"""Sinks publish the messages of a mission. Packages offer sinks in the entry point group `robochoc.sinks`."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from robochoc.system.errors import RobochocError
 
 @dataclass(frozen=True)
 class Waypoint:
-    """The goal of a drone: the paper's `/drone3.1/waypoint3.1` (Section 4.2)."""
+    """The goal of a drone, such as `/drone3.1/waypoint3.1` in the paper (Section 4.2)."""
 
     drone: int
     """The drone's number in the mission."""
     topic: str
-    """The topic, by its name in ROS."""
+    """The ROS name of the topic."""
     kind: str
     """The ROS type given in the robot's file."""
     at: Point
     """The place in metres, in `frame`."""
     lands: bool
-    """True if the drone is to land there, because its robot has withdrawn."""
+    """True if the drone should land there, because its robot has withdrawn."""
     frame: str
     stamp: int
     """The time of the decision, in nanoseconds."""
@@ -35,8 +35,8 @@ class Waypoint:
 
 
 Fields = Mapping[str, Any]
-"""A message's fields by their ROS names, nested. Times (`stamp`) are integers, in nanoseconds. A field without a value
-is zero, or empty.
+"""The nested fields of a message, by their ROS names. Times (`stamp`) are integers, in nanoseconds. A missing field is
+zero or empty.
 """
 
 
@@ -45,44 +45,44 @@ class SinkError(RobochocError):
 
 
 class Sink(ABC):
-    """Receives messages. It is a context manager: the caller that opens it closes it.
+    """Receives messages; a context manager. The caller that opens a sink closes it.
 
-    `place` is the text after its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
+    `place` is the text after the sink's name on the command line: `run.mcap` in `mcap:run.mcap`. Raises `SinkError`.
     """
 
     live: bool = True
     """True if robots may receive the messages. False for a recording."""
 
     arms: bool = False
-    """True if it commands robots, which it may arm only after `allow_arming`."""
+    """True if the sink commands robots, which it may arm only after `allow_arming`."""
     summary: str = ""
-    """The results of the decisions, after `close`; empty if it only publishes."""
+    """A summary of the results of decisions, available after `close`; empty if the sink only publishes."""
 
     def __init__(self, place: str) -> None:
         self.place = place
 
     def allow_arming(self) -> None:  # noqa: B027 - most send no commands
-        """Allow arming; without it a sink that `arms` only observes. Raises `SinkError`."""
+        """Allow arming. Before this call, a sink that `arms` sends no commands. Raises `SinkError`."""
 
     def assign(self, drones: Sequence[Drone]) -> None:  # noqa: B027 - only sinks that command robots need them
-        """Set the drones of the waypoints, by their numbers. Raises `SinkError`."""
+        """Set the drones to which the numbers in waypoints refer. Raises `SinkError`."""
 
     def decide(self, waypoints: Sequence[Waypoint]) -> None:  # noqa: B027 - most publish each waypoint separately
-        """Receive all waypoints of a decision, before they are published one by one. Raises `SinkError`."""
+        """Receive all waypoints in a decision, before they are published one by one. Raises `SinkError`."""
 
     def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only recordings store them
-        """Set the names of topics in the team's files, by their ROS names. Raises `SinkError`."""
+        """Set the original names of topics, from the team's files, by ROS name. Raises `SinkError`."""
 
     def advertise(self, topics: Mapping[str, str]) -> None:  # noqa: B027 - nothing to do for files
-        """Announce topics and the types of their messages, both by their ROS names. Raises `SinkError`."""
+        """Announce topics and the types of their messages, both with ROS names. Raises `SinkError`."""
 
     @abstractmethod
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Publish a message of the ROS type `kind` on `topic`, at a time since the epoch. Raises `SinkError`."""
+        """Publish a message of the ROS type `kind` on `topic`; `at_ns` is since the epoch. Raises `SinkError`."""
 
     @abstractmethod
     def close(self) -> None:
-        """Finish after the last message. A file appears in its place only now. Raises `SinkError`."""
+        """Finish after the last message. A file appears only now. Raises `SinkError`."""
 
     def discard(self) -> None:
         """Finish after an error, without partial output."""

@@ -1,7 +1,7 @@
-"""Derives changes of the problem from robots' reports: the paper's "read the robot situation" (Section 4.2).
+"""Derives changes of the problem from robots' reports: "read the robot situation" in the paper (Section 4.2).
 
-An obstacle removes values. A drone that cannot fly any more removes its robot from the team. When an obstacle is gone,
-its values are added again. Without side effects: from a team and a report follow the changes of that team.
+If there is an obstacle, values are removed; they are added again when the obstacle is gone. If a drone can no longer
+fly, its robot is removed from the team. The team itself is not modified.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, Remove
 
 _Cell = tuple[int, int, int]
 _A_HAIR_MORE = 1 + 1e-9
-"""A point just outside a cube may still be near: distances are rounded."""
+"""A factor on distances, since a point just outside a cube may still be near because of rounding."""
 BATTERY = 0.2
 """The default charge below which a drone is out of order."""
 WITHIN = 0.5
 """The distance, in units, within which an obstacle blocks places."""
 VALUES_MAX = 10_000
-"""The largest domain whose values are tried one by one."""
+"""The size of the largest domain whose values are tried one by one."""
 OBSTACLES_MAX = 10_000
-"""The largest number of stored obstacles."""
+"""The maximum number of stored obstacles."""
 NOTES_MAX = 20
-"""The largest number of notes about reports that change nothing."""
+"""The maximum number of notes about reports that change nothing."""
 FLIES, LIES = 0.5, 0.25
-"""Heights above its home, in units: a drone flies from the first on, and lies on the ground below the second."""
+"""Heights above a drone's home, in units: above the first it is in the air, below the second on the ground."""
 LIES_S, LIES_TIMES = 1.0, 3
-"""A drone that has flown is out of order after this number of reports on the ground, over this number of seconds."""
+"""The time in seconds, and the number of reports, on the ground after which a drone that has flown is out of order."""
 _HAIR = 1e-6
 
 
@@ -50,12 +50,12 @@ class _PoseHistory:
 
 
 class Situation:
-    """The known situation of obstacles and of the drones.
+    """Tracks obstacles and the state of drones.
 
-    A drone is also out of order if its poses show it: it was in the air (`FLIES`), and now lies on the ground (`LIES`)
-    for at least `LIES_TIMES` reports over at least `LIES_S` seconds, although its robot is in the team and so should
-    not land. Its distance from its goal is not used: it may be on its way, wait for others to pass, or hover while the
-    team decides.
+    A drone is also out of order if its poses show that it has fallen: it was in the air (`FLIES`), and has now been on
+    the ground (`LIES`) for at least `LIES_TIMES` reports over at least `LIES_S` seconds, although its robot is in the
+    team and so should not land. The drone's distance from its goal is not used, since the drone may be on its way, wait
+    for others to pass, or hover while the team decides.
 
     Args:
         drones: All drones that ever fly.
@@ -78,7 +78,7 @@ class Situation:
         self.notes = []
 
     def changes(self, team: Team, report: Report) -> tuple[Change, ...]:
-        """Return the changes of `team` that follow from `report`; none if the drone's robot is not in the team."""
+        """Return the changes to `team` caused by `report`; none if the drone's robot is not in the team."""
         drone = self._drones.get(report.drone)
         if drone is None or drone.robot not in team:
             return ()
@@ -112,7 +112,7 @@ class Situation:
         return found
 
     def _cleared(self, team: Team, place: Point) -> tuple[Change, ...]:
-        """Return the values that no other obstacle blocks."""
+        """Return the changes that add values again which no other obstacle blocks."""
         if not self._obstacles.remove_near(place, WITHIN + _HAIR):
             return ()
         free = [
@@ -129,7 +129,7 @@ class Situation:
         )
 
     def _removed_values(self, team: Team, place: Point) -> Iterator[RemoveValue]:
-        """Yield, and record, the values that would send a drone of `team` to `place`."""
+        """Yield, and record, the removal of values that would send a drone of `team` to `place`."""
         for robot in team.robots:
             gone = set()
             for number, craft in enumerate(crafts_of(robot, {})):
@@ -139,7 +139,7 @@ class Situation:
             yield from (RemoveValue(variable, value) for variable, value in sorted(gone))
 
     def _values_at(self, robot: Robot, number: int, craft: Craft, place: Point) -> Iterator[tuple[str, int, Point]]:
-        """Yield the variable and the values that would send a drone near `place`, and its exact place."""
+        """Yield the variable and each value that would send a drone near `place`, with the drone's exact place."""
         if not _may_reach(craft, self._homes.get((robot.name, craft.name)), place):
             return
         if len(craft.decided_by) != 1:
@@ -158,7 +158,7 @@ class Situation:
                 yield variable, value, there
 
     def _place_of(self, craft: Craft) -> Point | None:
-        """Return the place to which a craft flies, in units; a craft without a cell flies above its home."""
+        """Return the place to which a craft flies, in units. A craft without a cell flies above its home."""
         home = self._homes.get((craft.robot, craft.name))
         across = craft.cell or (home[:2] if home else None)
         return None if craft.level is None or across is None else (*across, craft.level)
@@ -193,7 +193,7 @@ class Situation:
 
 
 def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
-    """Return whether the fixed coordinates of a craft's place lie near `place`."""
+    """Return whether the fixed coordinates of a craft's place are near `place`."""
     topic = craft.topic
     across: list[float | None] = [None, None]
     if topic and topic.x is not None and topic.y is not None:
@@ -205,7 +205,7 @@ def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
 
 
 def _candidates(craft: Craft, variable: str, domain: Domain, place: Point) -> Iterable[int] | None:
-    """Return the values of `domain` that might send the craft near `place`; None if there are too many to try."""
+    """Return the values in `domain` that might send the craft near `place`; None if there are too many to try."""
     topic = craft.topic
     given: list[Expression | None] = [topic.x, topic.y, topic.z] if topic else [None, None, None]
     if given[2] is None:
@@ -241,7 +241,7 @@ def _point_text(place: Point) -> str:
 
 
 class PointIndex:
-    """Points in space, grouped by unit cube, so that near points are found quickly.
+    """Finds near points quickly, by grouping points into unit cubes.
 
     The same point may be added several times. Only cubes that contain points use memory.
     """
@@ -265,13 +265,13 @@ class PointIndex:
         self._count += 1
 
     def any_near(self, place: Point, within: float) -> bool:
-        """Return whether a point is within a distance of `place`."""
+        """Return whether a point is within the distance `within` of `place`."""
         return any(
             math.dist(place, other) <= within for cell in self._around(place, within) for other in self._cubes[cell]
         )
 
     def remove_near(self, place: Point, within: float) -> bool:
-        """Remove the points within a distance of `place`; return whether there were any."""
+        """Remove the points within the distance `within` of `place`; return whether there were any."""
         before = self._count
         for cell in self._around(place, within):
             points = self._cubes.pop(cell)
@@ -282,7 +282,7 @@ class PointIndex:
         return self._count < before
 
     def _around(self, place: Point, within: float) -> Iterator[_Cell]:
-        """Yield the cubes that contain points and are within a distance of `place`."""
+        """Yield the cubes that contain points and are within the distance `within` of `place`."""
         reach = within * _A_HAIR_MORE
         spans = (range(math.floor(at - reach), math.floor(at + reach) + 1) for at in place)
         for x, y, z in product(*spans):

@@ -1,4 +1,4 @@
-"""Sources of messages about the robots' situation. Packages offer them under the entry points `robochoc.sources`."""
+"""Sources of messages about the robots' situation. Packages offer sources in the entry points `robochoc.sources`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REPORTS: Mapping[str, str] = MappingProxyType(
         "out_of_order": "std_msgs/String",
     }
 )
-"""The topics in a drone's namespace, besides its waypoints: the last token, and the ROS type."""
+"""The topics in a drone's namespace other than waypoints, by their last tokens, with their ROS types."""
 
 
 class SourceError(RobochocError):
@@ -27,7 +27,7 @@ class SourceError(RobochocError):
 
 
 class ReceivedMessage(NamedTuple):
-    """A message: its topic, its ROS type, its fields (as in a sink), and the time of its receipt."""
+    """A message: its topic, ROS type, fields (as in a sink), and time of reception."""
 
     topic: str
     kind: str
@@ -36,32 +36,33 @@ class ReceivedMessage(NamedTuple):
 
 
 class Source(ABC):
-    """Yields messages. It is a context manager: the caller that opens it closes it.
+    """Returns messages; a context manager. The caller that opens a source closes it.
 
-    `place` is the text after its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
+    `place` is the text after the source's name on the command line: `run.mcap` in `mcap:run.mcap`. Raises
+    `SourceError`.
     """
 
     live: bool = True
-    """True if messages arrive in real time. A recording already has all messages, so there is no waiting."""
+    """True if messages arrive in real time. False for a recording, in which all messages are available at once."""
 
     def __init__(self, place: str) -> None:
         self.place = place
         self.others: dict[str, str] = {}
-        """Other topics of a recording, with their types; the first few only."""
+        """The first few other topics in a recording, with their types."""
 
     @property
     def is_busy(self) -> bool:
-        """Whether robots are still flying: the wait for their reports begins at their arrival."""
+        """Whether robots are still flying: the wait for their reports begins after their arrival."""
         return False
 
     def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only sources that know robots by name need them
-        """Set the namespaces of drones' reports, by the drones' names. Raises `SourceError`."""
+        """Set the namespaces of drones' reports, by drone name. Raises `SourceError`."""
 
     @abstractmethod
     def listen(self, topics: Mapping[str, str]) -> None:
-        """Subscribe to these topics with these types, both by their ROS names. Raises `SourceError`.
+        """Subscribe to `topics` (name to type, both with ROS names). Raises `SourceError`.
 
-        Messages of another type on such a topic are ignored.
+        Messages with another type on these topics are ignored.
         """
 
     @abstractmethod

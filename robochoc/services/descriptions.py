@@ -1,4 +1,4 @@
-"""Descriptions of agents in the Directory Facilitator, and their comparison with templates (FIPA00023)."""
+"""Descriptions of agents in the Directory Facilitator, and comparison with templates (FIPA00023)."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from robochoc.system.errors import RobochocError
 
 MAX_SERVICES = 64
 MAX_NAMES = 256
-"""The most protocols, ontologies, languages or addresses in one description."""
+"""The maximum number of protocols, ontologies, languages or addresses in one description."""
 MAX_PROPERTIES = 1024
 MAX_CHARACTERS = 1024
-"""The most characters of a name or value."""
+"""The maximum length of a name or value, in characters."""
 MAX_SIZE = 1 << 16
-"""The largest total number of characters in one description."""
+"""The maximum total length of one description, in characters."""
 MAX_LEASE_S = 99 * 86_400.0
-"""The longest lease. FIPA's relative times express more days only in months, which have no fixed length."""
+"""The longest lease, in seconds. More days must be given in months in FIPA's relative times, without a fixed length."""
 
 
 class Reason(StrEnum):
-    """The reason for the failure of a request: a proposition of FIPA00023, with its name."""
+    """The reason for the failure of a request: the name of a proposition in FIPA00023."""
 
     UNAUTHORISED = "unauthorised"
     UNSUPPORTED_FUNCTION = "unsupported-function"
@@ -40,11 +40,11 @@ class Reason(StrEnum):
 
 
 FAILURES = frozenset({Reason.ALREADY_REGISTERED, Reason.NOT_REGISTERED, Reason.INTERNAL_ERROR})
-"""Reasons found during a request, which are answered by FAILURE. Requests with other reasons are refused."""
+"""Reasons that are found during a request, and answered by FAILURE. For other reasons, requests are refused."""
 
 
 class RequestRefusedError(RobochocError):
-    """The Directory refuses a request for `reason`, with the arguments `about` of this proposition."""
+    """The Directory refuses a request for `reason`, a proposition with the arguments `about`."""
 
     def __init__(self, reason: Reason, *about: str) -> None:
         super().__init__(" ".join((reason, *about)))
@@ -53,7 +53,7 @@ class RequestRefusedError(RobochocError):
 
 
 class ServiceDescription(msgspec.Struct, frozen=True):
-    """One service of an agent. Empty fields of a template match everything."""
+    """One service of an agent. Empty fields in a template match everything."""
 
     name: str = ""
     type: str = ""
@@ -66,9 +66,9 @@ class ServiceDescription(msgspec.Struct, frozen=True):
 
 
 class AgentDescription(msgspec.Struct, frozen=True):
-    """An agent, by the name of its AID, and its services. Empty fields of a template match everything.
+    """An agent, by the name in its AID, and its services. Empty fields in a template match everything.
 
-    `lease_s` is the duration of its registration in seconds; None: until it leaves.
+    `lease_s` is the duration of the registration in seconds; None: until the agent leaves.
     """
 
     name: str = ""
@@ -83,8 +83,8 @@ class AgentDescription(msgspec.Struct, frozen=True):
 def matches(template: AgentDescription, description: AgentDescription) -> bool:
     """Return whether `description` matches `template` (FIPA00023, the search function).
 
-    Names must be equal, or equal before `@` if the template's name has no `@`. Sets must contain those of the template,
-    and each service of the template must match one of the agent. The lease is ignored.
+    Names must be equal, or equal before `@` if the template's name has no `@`. Sets must contain those in the template,
+    and each service in the template must match a service of the agent. The lease is ignored.
     """
     return (
         template.name in {"", description.name, description.name.partition("@")[0]}

@@ -1,7 +1,8 @@
 """The Directory Facilitator of FIPA00023: the registered agents and their services.
 
-Pure: times are arguments, in seconds on any monotonic clock. Agents can change only their own registration; the caller
-has authenticated the `requester`. Besides FIPA's functions, a registration can be renewed without its description.
+Times are arguments, in seconds on any monotonic clock; there is no other input or output. Agents can change only their
+own registrations; the caller has authenticated the `requester`. In addition to FIPA's functions, a registration can be
+renewed without sending its description.
 """
 
 from __future__ import annotations
@@ -40,7 +41,7 @@ class _Registration(NamedTuple):
 
 
 class Directory:
-    """The registrations of a platform. Invalid requests raise `RequestRefusedError`, and change nothing."""
+    """Stores the registrations on a platform. Invalid requests raise `RequestRefusedError`, and change nothing."""
 
     def __init__(self) -> None:
         self._registered: dict[str, _Registration] = {}
@@ -50,7 +51,7 @@ class Directory:
         self._next_end = math.inf
 
     def __len__(self) -> int:
-        """Return the number of registrations, including those that have expired since the last given time."""
+        """Return the number of registrations, including those that have expired since the last time given."""
         return len(self._registered)
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
@@ -81,7 +82,7 @@ class Directory:
         self._registered[name] = _Registration(description, _end(description, now))
 
     def deregister(self, name: str, *, requester: str) -> None:
-        """Deregister `name` on its own request."""
+        """Deregister `name` at its own request."""
         if not name:
             raise RequestRefusedError(Reason.MISSING_PARAMETER, "df-agent-description", "name")
         _authorise(name, requester)
@@ -91,7 +92,7 @@ class Directory:
     def search(
         self, template: AgentDescription, now: float, max_results: int | None = None
     ) -> tuple[AgentDescription, ...]:
-        """Return the agents that match `template`, by name; at most `max_results` (None or negative: all)."""
+        """Return the agents that match `template`, sorted by name; at most `max_results` (None or negative: all)."""
         check_bounds(template)
         self._remove_expired(now)
         known = self._registered
@@ -100,14 +101,14 @@ class Directory:
         return found if max_results is None or max_results < 0 else found[:max_results]
 
     def expire(self, now: float) -> tuple[str, ...]:
-        """Remove agents whose lease has ended. Return the names of all removed since the last call of `expire`."""
+        """Remove agents whose lease has ended; return the names of all agents removed since the last `expire`."""
         self._remove_expired(now)
         names = tuple(self._expired)
         self._expired.clear()
         return names
 
     def subscribe(self, subscriber: str, template: AgentDescription, now: float) -> None:
-        """Notify `subscriber` of the agents that match `template`, now and whenever that changes."""
+        """Notify `subscriber` of the agents that match `template`, now and whenever these change."""
         check_bounds(template)
         if (subscriber, template) not in self._subscriptions:
             if len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
@@ -119,7 +120,7 @@ class Directory:
             self._add_notice(subscriber, description.name, description)
 
     def unsubscribe(self, subscriber: str, template: AgentDescription | None = None) -> None:
-        """End the subscription to `template`; None: all subscriptions, with notices that were not sent yet."""
+        """End the subscription to `template` (None: all subscriptions), and drop notices that were not sent yet."""
         kept = [
             one for one in self._subscriptions if one[0] != subscriber or (template is not None and one[1] != template)
         ]
@@ -130,7 +131,7 @@ class Directory:
             self._notices = {key: notice for key, notice in self._notices.items() if key[0] != subscriber}
 
     def notices(self) -> Sequence[Notice]:
-        """Return new notices for subscribers, oldest first, with only the newest notice on each agent."""
+        """Return new notices for subscribers, oldest first, and only the newest notice on each agent."""
         notices = tuple(self._notices.values())
         self._notices.clear()
         return notices
@@ -160,7 +161,7 @@ class Directory:
         self._next_end = min((known.ends for known in self._registered.values()), default=math.inf)
 
     def _notify(self, name: str, before: AgentDescription | None, after: AgentDescription | None) -> None:
-        """Add notices to all subscribers on the change of the description of `name`."""
+        """Add notices to subscribers about the change of the description of `name`."""
         concerned: dict[str, bool] = {}
         for subscriber, template in self._subscriptions:
             if after is not None and matches(template, after):

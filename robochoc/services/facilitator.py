@@ -1,7 +1,7 @@
-"""The Directory Facilitator as an agent: it answers requests by the protocol fipa-request (FIPA00026).
+"""The Directory Facilitator as an agent that answers requests by the protocol fipa-request (FIPA00026).
 
-It fulfils requests at once, so it sends no AGREE first, as FIPA00026 allows: the answer is REFUSE, FAILURE, INFORM, or
-NOT-UNDERSTOOD.
+Requests are fulfilled at once, without sending AGREE first, as FIPA00026 allows. The answer is REFUSE, FAILURE, INFORM,
+or NOT-UNDERSTOOD.
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ from robochoc.services.symbolic import Expression, String, SymbolicExpressionErr
 
 
 def handle(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str]:
-    """Fulfil the REQUEST `content` of the agent `requester`; return the answer's performative and content.
+    """Fulfil a REQUEST with `content` from the agent `requester`; return the answer's performative and content.
 
-    The caller has authenticated the requester. `now` is in seconds, see `Directory`. Never raises for invalid requests.
+    The caller has authenticated the requester. `now` is in seconds; see `Directory`. Invalid requests raise nothing.
     """
     try:
         action = action_in(content)
@@ -45,8 +45,8 @@ def handle(directory: Directory, requester: str, content: str, now: float) -> tu
 def subscribe(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str]:
     """Subscribe `requester` to the results of the search in a SUBSCRIBE's `content` (see `notification`), and agree.
 
-    This is fipa-subscribe (FIPA00035), except that its content would be an `iota` expression, which SL0 lacks: here it
-    is the equivalent search action. Refusals are as of `handle`.
+    This is fipa-subscribe (FIPA00035), except that the content is a search action instead of the equivalent `iota`
+    expression, which SL0 lacks. Refusals are as for `handle`.
     """
     try:
         action = action_in(content)
@@ -62,7 +62,7 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
 
 
 def notification(df: AgentIdentifier, notice: Notice) -> str:
-    """Return the content of the INFORM on `notice` to a subscriber: the present result of a search for the agent."""
+    """Return the content of an INFORM to a subscriber about `notice`: the present result of a search for the agent."""
     searched = described(AgentDescription(notice.name))
     action = list_of("action", expression_of(df), list_of(DirectoryFunction.SEARCH, searched))
     found = [] if notice.description is None else [described(notice.description)]
@@ -89,7 +89,7 @@ def _answer(directory: Directory, requester: str, action: DirectoryAction, now: 
 
 
 def _search(directory: Directory, action: DirectoryAction, now: float) -> Sequence[AgentDescription]:
-    """Search. Without constraints, which FIPA00023 requires, all results are returned."""
+    """Return the results of a search; all results without constraints, though FIPA00023 requires them."""
     template, *constraints = _arguments(action, at_most=2)
     wanted = max_results_of(constraints[0]) if constraints else None
     return directory.search(description_of(template), now, wanted)
@@ -109,5 +109,5 @@ def _arguments(action: DirectoryAction, at_most: int) -> tuple[Expression, ...]:
 
 
 def _proposition(reason: Reason, about: Sequence[str]) -> Expression:
-    """Return the proposition `reason` in SL0; without arguments it is a single word."""
+    """Return the proposition `reason` in SL0, which is a single word if there are no arguments."""
     return list_of(reason, *map(name, about)) if about else Word(reason)

@@ -22,7 +22,7 @@ WHAT = "an agent-identifier"
 class AgentIdentifier(msgspec.Struct, frozen=True):
     """`name` is the agent's name, `@`, and its platform's name: `Robot3.1@192.168.1.14:7447/robochoc`.
 
-    `addresses` are its addresses, the preferred one first; `resolvers` are agents that may know further addresses.
+    `addresses` are the agent's addresses, the preferred first; `resolvers` are agents that may know further addresses.
     """
 
     name: str
@@ -31,12 +31,12 @@ class AgentIdentifier(msgspec.Struct, frozen=True):
 
     @property
     def local(self) -> str:
-        """The agent's name on its platform; the whole name if it contains no platform."""
+        """The agent's name on its platform; the whole name if the name contains no platform."""
         return self.name.rpartition("@")[0] or self.name
 
     @property
     def platform(self) -> str:
-        """The platform in the name; empty if it contains none."""
+        """The platform in the name; empty if the name contains no platform."""
         local, _, platform = self.name.rpartition("@")
         return platform if local else ""
 
@@ -44,7 +44,7 @@ class AgentIdentifier(msgspec.Struct, frozen=True):
 def identifier_on(platform: str, local: str, addresses: tuple[str, ...] = ()) -> AgentIdentifier:
     """Return the identifier of the agent `local` on `platform`.
 
-    Raises `ValueError` if the two could not be separated again.
+    Raises `ValueError` if the two names could not be separated again.
     """
     if not local or not platform or "@" in platform:
         raise ValueError(f"{local!r} on platform {platform!r}: both need a name, and the platform's has no '@'")

@@ -1,4 +1,4 @@
-"""The content of messages to and from the Directory Facilitator, in FIPA-SL0 (FIPA00008), with the terms of FIPA00023.
+"""The content of messages to and from the Directory Facilitator, in FIPA-SL0 (FIPA00008) with the terms of FIPA00023.
 
 >>> from robochoc.services.descriptions import AgentDescription
 >>> template = AgentDescription(protocols=("abt",))
@@ -53,7 +53,7 @@ class DirectoryFunction(StrEnum):
 
 
 class DirectoryAction(NamedTuple):
-    """A requested action: its `(action ...)` expression, its actor, the name of its function, and its arguments."""
+    """A requested action: the `(action ...)` expression, the actor, the name of the function, and the arguments."""
 
     expression: Expression
     actor: AgentIdentifier
@@ -69,7 +69,7 @@ def df_on(platform: str) -> AgentIdentifier:
 def request(
     df: AgentIdentifier, function: DirectoryFunction, description: AgentDescription, max_results: int | None = None
 ) -> str:
-    """Return the content of a REQUEST for `function` to `df`; for a search, `description` is a template."""
+    """Return the content of a REQUEST to `df` for `function`; in a search, `description` is a template."""
     arguments: list[Expression] = [described(description)]
     if function == DirectoryFunction.SEARCH:
         constraints = () if max_results is None else (Word(":max-results"), Word(str(max_results)))
@@ -82,7 +82,7 @@ def action_in(content: str) -> DirectoryAction:
     (whole,) = _content(content, REQUEST_CAPS)
     what = "an action"
     actor_and_act = items_of(whole, ("action",), what)
-    if len(actor_and_act) != 2:  # noqa: PLR2004 - who, and what
+    if len(actor_and_act) != 2:  # noqa: PLR2004 - the actor, and the act
         raise SymbolicExpressionError("an action is (action <agent-identifier> (<function> ...))", whole.at)
     actor, act = actor_and_act
     function = head_of(act, "the act of an action")
@@ -90,9 +90,9 @@ def action_in(content: str) -> DirectoryAction:
 
 
 def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
-    """Return the descriptions in the answer to a search, the INFORM `((result <action> (set ...)))`.
+    """Return the descriptions in the answer to a search, an INFORM `((result <action> (set ...)))`.
 
-    Raises `SymbolicExpressionError`, and `RequestRefusedError` for unknown parameters of a description.
+    Raises `SymbolicExpressionError`, and `RequestRefusedError` for unknown parameters in a description.
     """
     (whole,) = _content(content, ANSWER_CAPS)
     parts = items_of(whole, ("result",), "the answer to a search")
@@ -113,7 +113,7 @@ def searched_in(content: str) -> AgentDescription:
 
 
 def content_of(*expressions: Expression) -> str:
-    """Return the content of a message: its expressions in parentheses."""
+    """Return the content of a message, which is its expressions in parentheses."""
     return text_form(List(expressions))
 
 
@@ -150,7 +150,7 @@ def description_of(expression: Expression) -> AgentDescription:
 def max_results_of(expression: Expression) -> int | None:
     """Return the maximum number of results in `(search-constraints ...)`; None for all.
 
-    Its other parameters are for federations, and ignored. Raises the exceptions of `description_of`.
+    Other parameters are for federations, and are ignored. Raises the same exceptions as `description_of`.
     """
     slots = _slots(expression, "search-constraints", {"max-results", "max-depth", "search-id"})
     if "max-results" not in slots:
@@ -207,7 +207,7 @@ def _property_of(expression: Expression) -> tuple[str, str]:
 
 
 def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expression]:
-    """Return the parameters of `(what ...)`, including user-defined ones (`:X-...`).
+    """Return the parameters in `(what ...)`, including user-defined parameters (`:X-...`).
 
     Raises `RequestRefusedError` for other unknown parameters.
     """
@@ -219,7 +219,7 @@ def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expr
 
 
 def _members(expression: Expression | None, what: str) -> tuple[Expression, ...]:
-    """Return the elements of a set, or of a sequence, which JADE writes in place of FIPA00023's sets."""
+    """Return the elements of a set, or of a sequence, which JADE writes instead of the sets in FIPA00023."""
     return () if expression is None else items_of(expression, ("set", "sequence"), what)
 
 
@@ -242,7 +242,7 @@ def _set(key: str, members: Iterable[Expression]) -> list[Expression]:
 
 
 def _lease_text(lease_s: float) -> str:
-    """Return a relative DateTime of FIPA00008, in whole milliseconds, of which there is at least one."""
+    """Return a relative DateTime (FIPA00008) in whole milliseconds, at least one."""
     seconds, milliseconds = divmod(max(1, round(lease_s * 1000)), 1000)
     minutes, second = divmod(seconds, 60)
     hours, minute = divmod(minutes, 60)
@@ -251,7 +251,7 @@ def _lease_text(lease_s: float) -> str:
 
 
 def _lease_of(expression: Expression) -> float:
-    """Return a lease in seconds. Absolute times are refused: the Directory has no wall clock."""
+    """Return a lease in seconds. Absolute times are refused, since the Directory has no wall clock."""
     found = _LEASE.fullmatch(text_of(expression, ":lease-time"))
     if not found:
         raise RequestRefusedError(Reason.UNRECOGNISED_PARAMETER_VALUE, _AGENT, "lease-time")

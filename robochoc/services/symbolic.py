@@ -1,10 +1,10 @@
-r"""Symbolic expressions, the syntax of FIPA's messages (FIPA00070) and of their contents in SL (FIPA00008).
+r"""Symbolic expressions, the syntax of FIPA messages (FIPA00070) and of their contents in SL (FIPA00008).
 
 `(df-agent-description :name (agent-identifier :name "Robot3.1@host:7447/robochoc"))` is a list of words, strings and
-lists. Reading takes linear time, does not recurse, and stops at the `Caps`.
+lists. Reading takes linear time, does not recurse, and stops at the limits in `Caps`.
 
-FIPA00070 has one escape in strings, `\"`. With it alone, no string could end in a backslash, so `\\` is an escape, too,
-as in Lisp; any other backslash is literal.
+FIPA00070 has only one escape in strings, `\"`, so that no string could end in a backslash. Therefore `\\` is also an
+escape, as in Lisp; other backslashes are literal.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from robochoc.system.errors import RobochocError
 
 
 class SymbolicExpressionError(RobochocError, ValueError):
-    """The text is not an expression, or not the expected one. `at` is the index of the character, from 0."""
+    """The text is not an expression, or not the expected expression. `at` is the index of the character, from 0."""
 
     def __init__(self, message: str, at: int) -> None:
         super().__init__(message)
@@ -25,7 +25,7 @@ class SymbolicExpressionError(RobochocError, ValueError):
 
 
 class Caps(NamedTuple):
-    """Limits on a text: its characters, its words and strings, its lists, and the depth of lists."""
+    """Limits for a text: the numbers of characters, of words and strings, and of lists, and the depth of lists."""
 
     characters: int
     expressions: int
@@ -42,7 +42,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class String:
-    """A quoted string: its content, without the quotes."""
+    """The content of a quoted string, without the quotes."""
 
     text: str
     at: int = field(default=0, compare=False)
@@ -50,7 +50,7 @@ class String:
 
 @dataclass(frozen=True, slots=True)
 class List:
-    """A list: the items between two parentheses."""
+    """A list of items between parentheses."""
 
     items: tuple[Expression, ...]
     at: int = field(default=0, compare=False)
@@ -62,15 +62,15 @@ _SPACE = re.compile(r"[\x00-\x20]*")
 _WORD = re.compile(r'[^\x00-\x20()"]+')
 _SIZE = re.compile(r'#([0-9]{1,9})"')
 _STRING = re.compile(r'"([^"\\]*+(?:\\.[^"\\]*+)*+)"', re.DOTALL)
-"""Possessive quantifiers: the match neither backtracks nor uses memory for each escape."""
+"""Matches a string. With possessive quantifiers, the match neither backtracks nor uses memory for each escape."""
 _SAFE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.:@/+*!?<>=-]*")
 _SHOWN = 40
 
 
 def read(text: str, caps: Caps) -> Expression:
-    """Parse `text`, a single expression.
+    """Parse `text`, which must be a single expression.
 
-    Raises `SymbolicExpressionError` with the error and its place.
+    Raises `SymbolicExpressionError` with the error and its position.
     """
     if (size := len(text)) > caps.characters:
         raise SymbolicExpressionError(f"{size} characters are too many: at most {caps.characters}", caps.characters)
@@ -99,7 +99,7 @@ def read(text: str, caps: Caps) -> Expression:
 
 
 def text_form(expression: Expression) -> str:
-    """Return the text of `expression`, one line except for line breaks in strings. `read` is the inverse function.
+    """Return the text of `expression`, on one line except for line breaks in strings. `read` is the inverse.
 
     Raises `ValueError` for an invalid word.
     """
@@ -118,7 +118,7 @@ def text_form(expression: Expression) -> str:
 
 
 def name(text: str) -> Word | String:
-    """Return `text` as a word if possible, otherwise as a string: a word must not begin with a digit."""
+    """Return `text` as a word if possible, otherwise as a string, since a word must not begin with a digit."""
     return Word(text) if _SAFE_NAME.fullmatch(text) else String(text)
 
 
@@ -128,7 +128,7 @@ def list_of(head: str, *items: Expression) -> List:
 
 
 def text_of(expression: Expression, what: str) -> str:
-    """Return the text of a word or a string. Raises `SymbolicExpressionError`, where `what` names the expression."""
+    """Return the text of a word or a string. Raises `SymbolicExpressionError`, which names the expression `what`."""
     if isinstance(expression, List):
         raise SymbolicExpressionError(f"{what} must be a word or a string, not a list", expression.at)
     return expression.text
@@ -137,7 +137,7 @@ def text_of(expression: Expression, what: str) -> str:
 def head_of(expression: Expression, what: str) -> str:
     """Return the first word of a list in lower case.
 
-    Raises `SymbolicExpressionError` if it has none.
+    Raises `SymbolicExpressionError` if there is no such word.
     """
     if not isinstance(expression, List) or not expression.items or not isinstance(expression.items[0], Word):
         raise SymbolicExpressionError(f"{what} must be a list that begins with a word", expression.at)
@@ -158,7 +158,10 @@ def items_of(expression: Expression, heads: tuple[str, ...], what: str) -> tuple
 
 
 def parameters(items: tuple[Expression, ...], what: str) -> dict[str, Expression]:
-    """Parse `:key value :key value ...`; keys are in lower case, without colons. Raises `SymbolicExpressionError`."""
+    """Parse `:key value :key value ...`; returned keys are in lower case, without colons.
+
+    Raises `SymbolicExpressionError`.
+    """
     found: dict[str, Expression] = {}
     for key, value in zip(items[::2], items[1::2], strict=False):
         if not isinstance(key, Word) or not key.text.startswith(":"):
@@ -185,7 +188,7 @@ def _closed(text: str, at: int, opened: list[tuple[int, list[Expression]]]) -> t
 
 
 def _atom(text: str, at: int) -> tuple[Word | String, int]:
-    """Return the word or string at `at`, and its end."""
+    """Return the word or string that begins at the index `at`, and the index of its end."""
     if text[at] == '"':
         return _string(text, at)
     if sized := _SIZE.match(text, at):
@@ -200,7 +203,7 @@ def _string(text: str, began: int) -> tuple[String, int]:
     found = _STRING.match(text, began)
     if not found:
         raise SymbolicExpressionError("a string is never closed", began)
-    # Double backslashes are split first: the parts then have no escaped backslashes.
+    # Double backslashes are split first, so that the parts have no escaped backslashes.
     content = "\\".join(part.replace('\\"', '"') for part in found[1].split("\\\\"))
     return String(content, began), found.end()
 

@@ -1,4 +1,4 @@
-"""A scene as meshcat commands: the ground, the box with its grid and axes, the drones, and their flight."""
+"""Draws a scene as meshcat commands: the ground, the box with its grid and axes, the drones, and their flight."""
 
 from __future__ import annotations
 
@@ -24,56 +24,56 @@ from robochoc.view.scene import DrawnDrone, Scene
 from robochoc.view.walls import blocked_cell_faces, mesh_of_faces
 
 _EM = 44
-"""Font size in pixels: sharp at close range, and small in memory."""
+"""The font size in pixels, sharp at close range and small in memory."""
 _HEIGHT = 64
 _LONGEST = 24
 
 
 _Corners = npt.NDArray[np.float64]
-"""The lowest and the highest x, y and z, a row each."""
+"""Two rows: the lowest x, y and z, and the highest x, y and z."""
 _Corner = npt.NDArray[np.float64]
-"""An x, a y and a z."""
+"""The x, y and z of a point."""
 
 _LINE: Colour = (0.45, 0.52, 0.60)
 _GROUND: Colour = (0.50, 0.56, 0.62)
 _WHITE: Colour = (1, 1, 1)
 _MARGIN = 0.8
-"""The width of the ground around the outermost drones, in cells."""
+"""The width of the ground beyond the outermost drones, in cells."""
 _EYE = np.array([0.7, -1.0, 0.42])
-"""The direction of the camera: in front of row 1, a little to the right, from above."""
+"""The direction of the camera: in front of row 1, a little to the right, and above."""
 _FIELD_OF_VIEW_DEG = 28
 _VIEW_MARGIN = 1.06
-"""The size of the view, in sizes of the scene: the axes' labels need space."""
+"""The size of the view relative to the scene, since the axes' labels need space."""
 _TEXT = 0.045
 """The height of text, in radii of the scene."""
 _READABLE = 0.03
-"""The least height of text, in radii of the scene."""
+"""The minimum height of text, in radii of the scene."""
 _NAME_WIDTH = 0.8
-"""The greatest width of a drone's name, in cells: the name of its neighbour needs space, too."""
+"""The maximum width of a drone's name, in cells, since the neighbour's name needs space, too."""
 FPS = 30
-"""Frames a second of the animation."""
+"""The number of frames per second of the animation."""
 _FADE = 25
 """The number of frames in which a withdrawing drone turns grey."""
 _CLOSE_CELLS = 0.002
 """The largest deviation of an animated drone from its flown position, in cells."""
 _ALIKE_RAD = math.radians(0.5)
-"""The largest deviation of its attitude, in radians."""
+"""The largest deviation of an animated drone's attitude, in radians."""
 _OBSTACLE_SIZE = 0.9
 """The size of an obstacle, in cells."""
 _OPACITIES = {"body": 0.35, "edges": 0.9}
-"""Opacities of an obstacle's parts."""
+"""The opacities of an obstacle's parts."""
 _BLOCK = 0.94
-"""The width of a blocked cell's block, in cells: neighbouring blocks are distinguishable."""
+"""The width of a blocked cell's block, in cells, with which neighbouring blocks are distinguishable."""
 _BLOCK_OPACITY = 0.85
 _WALL_OPACITY = 0.6
 _BESIDE_UNIT = 3.4
-"""The distance of the name of an axis with a unit from its numbers, in their heights: such a name is wider."""
+"""The distance from an axis's numbers to its name if it has a unit, in heights of the numbers: such names are wider."""
 _FLAT = 0.02
 """The height of flat areas on the ground, in cells."""
 
 
 def commands(scene: Scene) -> list[bytes]:
-    """Return the packed commands that make meshcat's viewer show `scene` and play its flight once."""
+    """Return the packed commands with which meshcat's viewer shows `scene` and plays its flight once."""
     if scene.playback is None:
         return _draw_scene(scene, [drone.end for drone in scene.drones]).commands
     meshcat = _draw_scene(scene, [drone.home for drone in scene.drones])
@@ -83,12 +83,12 @@ def commands(scene: Scene) -> list[bytes]:
 
 
 def commands_at_home(scene: Scene) -> list[bytes]:
-    """Return the commands without the flight: every drone stays at home."""
+    """Return the commands without the flight, in which every drone stays at home."""
     return _draw_scene(scene, [drone.home for drone in scene.drones]).commands
 
 
 def path_of(number: int, name: str) -> str:
-    """Return the path of a drone in meshcat's tree, from its name and its number, counted from 0.
+    """Return the path of a drone in meshcat's tree, from its name and its number (from 0).
 
     The number makes paths unique, and different from names with a meaning in JavaScript.
     """
@@ -96,7 +96,7 @@ def path_of(number: int, name: str) -> str:
 
 
 def corners(scene: Scene) -> list[list[float]]:
-    """Return points around all visible objects and names of axes, in a frame scaled to radius 1 around the drones."""
+    """Return points around all visible objects and axis names, in a frame scaled to radius 1 around the drones."""
     extent, radius = _extent_and_radius(scene)
     names = [2 * name_at - origin for _, _, origin, name_at in _axis_lines(scene.axes, _TEXT * radius)]
     found: list[list[float]] = ((np.array([*_corners(extent), *names]) - extent.mean(axis=0)) / radius).tolist()
@@ -144,7 +144,7 @@ def _corners(extent: _Corners) -> _Corners:
 
 
 def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
-    """Scale the scene to radius 1 around the origin, where the lights are, and place the camera so that it sees all."""
+    """Scale the scene to radius 1 around the origin, where the lights are, and place the camera to show everything."""
     x, y, z = (float(part) for part in -extent.mean(axis=0) / radius)
     meshcat.place("", (x, y, z), (1 / radius, 1 / radius, 1 / radius))
     for default in ("/Grid", "/Axes"):
@@ -153,7 +153,7 @@ def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
     x, y, z = (float(part) for part in _camera_position(around))
     camera = "/Cameras/default/rotated/<object>"
     meshcat.set(camera, "fov", _FIELD_OF_VIEW_DEG)
-    meshcat.set(camera, "position", [x, z, -y])  # the camera's own y is up
+    meshcat.set(camera, "position", [x, z, -y])  # in the camera's frame, y is up
 
 
 def _camera_position(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
@@ -167,7 +167,7 @@ def _camera_position(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64
 
 
 def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
-    """Draw a plane, and each drone's pad in the colour of its row."""
+    """Draw a plane, and a pad for each drone in the colour of its row."""
     (left, front, _), (right, back, _) = extent
     corners = np.array([[left, front, 0], [right, front, 0], [right, back, 0], [left, back, 0]])
     plane = TriangleMesh(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)))
@@ -181,7 +181,7 @@ def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> No
 
 
 def _draw_box(meshcat: MeshcatCommands, axes: Sequence[BoxAxis]) -> None:
-    """Draw the edges, the back and bottom sides with their grid, and every cell very faintly."""
+    """Draw the edges, the back and bottom sides with their grids, and very faintly every cell."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
     parts = {
@@ -206,7 +206,7 @@ def _label_axes(meshcat: MeshcatCommands, axes: Sequence[BoxAxis], height: float
 
 
 def _axis_lines(axes: Sequence[BoxAxis], height: float) -> Iterator[tuple[int, BoxAxis, _Corner, _Corner]]:
-    """Yield the named axes: number, axis, the middle of the line of its numbers, the point of its name."""
+    """Yield each named axis: its index, the axis, the middle of the line of its numbers, and the place of its name."""
     low, high = _box(axes)
     middle = (low + high) / 2
     near = 1.2 * height
@@ -222,7 +222,7 @@ def _axis_lines(axes: Sequence[BoxAxis], height: float) -> Iterator[tuple[int, B
 
 
 def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
-    """Return both ends of all lines that are parallel to an axis."""
+    """Return both ends of all lattice lines, which are parallel to the axes."""
     ends = []
     for along in range(3):
         across = [walls[axis] if axis != along else walls[axis][[0, -1]] for axis in range(3)]
@@ -254,7 +254,7 @@ def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> Non
 
 
 def _blocks(scene: Scene) -> dict[float, TriangleMesh]:
-    """Return the blocks of blocked cells by the time of their appearance, joined to one mesh each."""
+    """Return the blocks of blocked cells, joined into one mesh for each time of appearance."""
     found: dict[float, list[TriangleMesh]] = {}
     for block in (block for block in scene.blocks if not block.is_cube):
         x, y, top = block.top
@@ -275,7 +275,7 @@ def _walls(scene: Scene) -> TriangleMesh | None:
 
 
 def _draw_walls(meshcat: MeshcatCommands, scene: Scene) -> None:
-    """Draw walls as high as the box, and unknown parts flat on the ground."""
+    """Draw walls with the height of the box, and unknown parts flat on the ground."""
     if scene.walls is None:
         return
     top = scene.axes[2].high + 0.5
@@ -342,7 +342,7 @@ def _appearance_track(path: str, at_s: float, opacity: float) -> Track:
 
 
 def _drone_texts(names: Sequence[str], readable: float) -> list[str]:
-    """Return the texts on the drones: their names; if those would be too small, only numbers, as 3.1 of `Robot3.1`."""
+    """Return the texts on the drones: their names, or only numbers (3.1 for `Robot3.1`) if names would be too small."""
     if all(_NAME_WIDTH / label_picture(name).aspect >= readable for name in names):
         return list(names)
     word = re.split("[0-9]", names[0])[0]
@@ -358,14 +358,14 @@ def _draw_text(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[n
 
 
 def row_colours(drones: Sequence[DrawnDrone]) -> list[Colour]:
-    """Return the colour of each drone, which is that of its row."""
+    """Return the colour of each drone, given by its row."""
     groups = sorted({drone.group for drone in drones})
     shades = dict(zip(groups, colours(len(groups)), strict=True))
     return [shades[drone.group] for drone in drones]
 
 
 def colour_of(state: DroneState, colour: Colour) -> Colour:
-    """Return the colour of a drone in a state; `colour` is that of its row."""
+    """Return the colour of a drone in `state`; `colour` is the colour of its row."""
     match state:
         case DroneState.FLIES:
             return colour
@@ -378,14 +378,14 @@ def colour_of(state: DroneState, colour: Colour) -> Colour:
 
 
 class LabelPicture(NamedTuple):
-    """An SVG picture of a label, and its width divided by its height. The browser draws it in its own fonts."""
+    """An SVG picture of a label, drawn with the browser's fonts, and the ratio of its width to its height."""
 
     svg: str
     aspect: float
 
 
 def label_picture(text: str) -> LabelPicture:
-    """Return `text` in white with a dark outline, readable on any background; cut if it is too long."""
+    """Return `text` in white with a dark outline, readable on any background, and truncated if it is too long."""
     shown = printable(text)
     if len(shown) > _LONGEST:
         shown = shown[: _LONGEST - 1] + "…"

@@ -10,14 +10,14 @@ import numpy.typing as npt
 Samples = npt.NDArray[np.float64]
 """Times: (T,). Positions: (T, 3). Attitudes: (T, 4), unit quaternions x, y, z, w."""
 Keys = npt.NDArray[np.int64]
-"""The numbers of the chosen samples, in order; always with the first and the last."""
+"""The indices of the chosen samples, in ascending order, including the first and the last."""
 
 _NEARLY_ONE = 1 - 1e-9
-"""Quaternions with a larger product count as equal."""
+"""Quaternions with a larger scalar product count as equal."""
 
 
 def position_keys(times: Samples, positions: Samples, tolerance: float) -> Keys:
-    """Return the samples between which straight moves deviate from the motion by at most `tolerance`."""
+    """Return key samples between which linear interpolation deviates from the motion by at most `tolerance`."""
 
     def error(first: int, last: int, between: Samples) -> Samples:
         start, end = positions[first], positions[last]
@@ -28,7 +28,7 @@ def position_keys(times: Samples, positions: Samples, tolerance: float) -> Keys:
 
 
 def attitude_keys(times: Samples, attitudes: Samples, tolerance: float) -> Keys:
-    """Return the samples for attitudes, with uniform turns between them (slerp). `tolerance` is an angle in radians."""
+    """Return key samples of attitudes, with uniform rotations in between (slerp). `tolerance` is in radians."""
 
     def error(first: int, last: int, between: Samples) -> Samples:
         turned = slerp(attitudes[first], attitudes[last], between)
@@ -38,7 +38,7 @@ def attitude_keys(times: Samples, attitudes: Samples, tolerance: float) -> Keys:
 
 
 def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
-    """Return attitudes on the shortest turn from `start` to `end`, at the fractions `between` (T,)."""
+    """Return attitudes on the shortest rotation from `start` to `end`, at the fractions `between` (T,)."""
     cosine = float(start @ end)
     if cosine < 0:
         end, cosine = -end, -cosine
@@ -52,8 +52,8 @@ def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
 
 
 def angle(one: Samples, other: Samples) -> Samples:
-    """Return the angles, in radians, between two rows of attitudes."""
-    # By the sine: the cosine of any small angle is 1 in floating point.
+    """Return the angles between the attitudes in `one` and `other`, in radians."""
+    # The sine is used, since the cosine of any small angle is 1 in floating point.
     apart = np.minimum(_lengths(one - other), _lengths(one + other))
     return np.asarray(4 * np.arcsin(np.clip(apart / 2, 0, 1)))
 
@@ -63,7 +63,7 @@ def _lengths(rows: Samples) -> Samples:
 
 
 def _key_samples(times: Samples, error: Callable[[int, int, Samples], Samples], tolerance: float) -> Keys:
-    """Return the key samples, after Douglas and Peucker: the furthest sample between two keys becomes a key.
+    """Return the key samples by the Douglas-Peucker algorithm: the furthest sample between two keys becomes a key.
 
     D. Douglas, T. Peucker: Algorithms for the reduction of the number of points required to represent a digitized
     line. Cartographica 10(2), 1973.

@@ -1,7 +1,7 @@
 """The scene in meshcat's live viewer: our own server sends the page, and the commands over a WebSocket.
 
-meshcat's server is not used: it listens on every interface, opens a zmq socket, and outlives its parent. This server
-runs in the calling thread, on the loopback interface only, below an unguessable path (`loopback.py`).
+meshcat's server is not used, since it listens on all interfaces, opens a zmq socket, and outlives its parent. Our
+server runs in the calling thread, only on the loopback interface, below an unguessable path (`loopback.py`).
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ from robochoc.view.scene import Scene
 def serve_scene(
     scene: Scene, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
 ) -> None:
-    """Show `scene` to browsers of this machine, until interrupted (Ctrl-C); then return.
+    """Show `scene` to browsers on this machine; return after an interrupt (Ctrl-C).
 
     Args:
         scene: The scene.
-        port: The port; 0 stands for any free port.
+        port: The port; 0 selects any free port.
         open_browser: Whether to open the scene in the user's browser.
         ready: Called with the URL once it can be opened.
 

@@ -1,4 +1,4 @@
-"""Addresses of pages that are served on this machine's loopback interface, and files that redirect a browser there."""
+"""Addresses of pages served on this machine's loopback interface, and files that redirect browsers to them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _SECRET_BYTES = 18
 
 
 def loopback_socket(port: int = 0) -> socket:
-    """Return a socket that listens on the loopback interface; port 0 stands for any free port.
+    """Return a socket that listens on the loopback interface; port 0 selects any free port.
 
     Raises `OSError` if the port is in use.
     """
@@ -32,20 +32,20 @@ def loopback_socket(port: int = 0) -> socket:
 
 
 def url_of(listener: socket, path: str = "") -> str:
-    """Return the URL of `path` for a browser of this machine."""
+    """Return the URL of `path` for a browser on this machine."""
     return f"http://{_LOOPBACK}:{listener.getsockname()[1]}/{path}"
 
 
 def secret_path() -> str:
-    """Return an unguessable path: this machine may have other users."""
+    """Return an unguessable path, since this machine may have other users."""
     return token_urlsafe(_SECRET_BYTES)
 
 
 class RedirectFile:
-    """A file that redirects a browser to the secret `url`, as Jupyter does it, until it is closed.
+    """A file that redirects a browser to the secret `url`, like Jupyter's, until it is closed.
 
     All users of a machine can read command lines, and the environment of some processes. So the browser gets the path
-    of a file with mode 0600, in a folder with mode 0700, which contains the address.
+    of a file that contains the address. The file has mode 0600, and its folder mode 0700.
 
     Raises `OSError` if the file cannot be written.
     """
@@ -60,7 +60,7 @@ class RedirectFile:
             self.close()
             raise
         self.url = file.as_uri()
-        """The URL for the browser: `file://...`, which is not secret."""
+        """The URL for the browser (`file://...`), which is not secret."""
 
     def __enter__(self) -> Self:
         return self

@@ -1,8 +1,8 @@
-"""A web server for pages on this machine alone.
+"""A web server for pages that are only accessible on this machine.
 
-It listens on the loopback interface only, in the calling thread, and ends with it. All paths are below an unguessable
-one, since the machine may have other users. Other sites in the same browser have no access: a Host that is not this
-machine's (DNS rebinding) gets 404, and tornado refuses a WebSocket of another Origin.
+The server runs in the calling thread, and listens only on the loopback interface. All paths are below an unguessable
+path, since the machine may have other users. Other sites in the same browser have no access: requests for another Host
+(DNS rebinding) get 404, and tornado refuses WebSockets with another Origin.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ from robochoc.view.local_address import RedirectFile
 
 _HOSTS = r"(127\.0\.0\.1|localhost)$"
 _LONGEST_MESSAGE_BYTES = 1024
-"""Browsers do not send messages."""
+"""The maximum size of a message from a browser, in bytes; browsers send none."""
 _LONGEST_REQUEST_BYTES = 1 << 16
 REQUEST_S = 30.0
-"""The time limit for receiving a request; a connection without one is then closed."""
+"""The time limit for receiving a request, in seconds, after which the connection is closed."""
 MAX_CONNECTIONS = 200
-"""The maximum number of open connections; more are closed at once."""
+"""The maximum number of open connections; further connections are closed at once."""
 
 
 def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) -> Application:
-    """Return `handlers` (tornado's: pattern, class, arguments) for requests that are meant for this machine."""
+    """Return an application with `handlers` (pattern, class, arguments), for requests to this machine only."""
     made = Application(
         compress_response=compress,
         websocket_max_message_size=_LONGEST_MESSAGE_BYTES,
@@ -55,7 +55,7 @@ class _Server(HTTPServer):
 
 @asynccontextmanager
 async def served(application: Application, listening: socket) -> AsyncIterator[None]:
-    """Serve `application` on a socket for as long as the context lasts."""
+    """Serve `application` on a socket within the context."""
     listening.setblocking(False)
     server = _Server(
         application,
@@ -74,9 +74,9 @@ async def served(application: Application, listening: socket) -> AsyncIterator[N
 
 @asynccontextmanager
 async def in_browser(url: str, *, enabled: bool) -> AsyncIterator[None]:
-    """Open `url` in the user's browser, if `enabled`. Its command line does not contain the secret path.
+    """Open `url` in the user's browser, if `enabled`. The browser's command line does not contain the secret path.
 
-    It is started in a thread: a browser for the terminal returns only when it is closed.
+    The browser is started in a thread, since a terminal browser returns only when it is closed.
     """
     if not enabled:
         yield
@@ -87,15 +87,15 @@ async def in_browser(url: str, *, enabled: bool) -> AsyncIterator[None]:
 
 
 def check_secret(given: str, secret: str) -> None:
-    """Raise `HTTPError` 404 unless the path `given` is the `secret` one, in constant time."""
+    """Raise `HTTPError` 404 unless the path `given` equals `secret`, compared in constant time."""
     if not hmac.compare_digest(given.encode(), secret.encode()):
         raise HTTPError(404)
 
 
 class SecretHandler(RequestHandler):
-    """Answers requests whose URL begins with the secret path, except those from pages of other sites.
+    """Answers requests whose URLs begin with the secret path, except requests from pages of other sites.
 
-    Browsers store nothing: the next server at this port is a different one.
+    Browsers must store nothing, since the next server on this port is a different one.
     """
 
     secret: str
@@ -108,7 +108,7 @@ class SecretHandler(RequestHandler):
             raise HTTPError(403)
 
     def set_default_headers(self) -> None:
-        """Forbid storing, framing, and sending the URL to other sites."""
+        """Set headers that forbid storing, framing, and sending the URL to other sites."""
         for name, value in (
             ("Cache-Control", "no-store"),
             ("Referrer-Policy", "no-referrer"),
@@ -123,7 +123,7 @@ class SecretHandler(RequestHandler):
         """Return None, since browsers store nothing."""
 
     def write_error(self, status_code: int, **_: Any) -> None:  # noqa: ANN401 - tornado's signature
-        """Answer with one line of text: the error."""
+        """Answer with the error as one line of text."""
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code}: {self._reason}")
 
@@ -132,7 +132,7 @@ class SecretPage(SecretHandler):
     """A static page."""
 
     def initialize(self, secret: str, page: bytes) -> None:
-        """Store the page, which is HTML in UTF-8."""
+        """Store the page (HTML in UTF-8)."""
         self.secret = secret
         self.page = page
 
@@ -143,7 +143,7 @@ class SecretPage(SecretHandler):
 
 
 class SecretSocket(WebSocketHandler):
-    """A WebSocket at the secret path. Messages of browsers are ignored."""
+    """A WebSocket at the secret path. Messages from browsers are ignored."""
 
     secret: str
 

@@ -29,7 +29,7 @@ class Track(NamedTuple):
 
 
 _FRONT, _BOTH = 0, 2
-"""The visible sides of faces, as three.js numbers them."""
+"""The visible sides of faces, as numbered by three.js."""
 _BY_VERTEX = 2
 """Colours of vertices, as the viewer's three.js numbers them."""
 _ARRAYS = {"uint8": ("Uint8Array", 0x12), "uint32": ("Uint32Array", 0x16), "float32": ("Float32Array", 0x17)}
@@ -50,11 +50,11 @@ class MeshcatCommands:
     def mesh(
         self, path: str, shape: TriangleMesh, colour: Colour, opacity: float = 1, *, one_sided: bool = False
     ) -> None:
-        """Draw a solid at `path`. Its faces are flat, its colours are its shades times `colour`.
+        """Draw a solid with flat faces at `path`. Its colours are its shades multiplied by `colour`.
 
-        If it is `one_sided`, a face is visible only from the side from which its corners lie counterclockwise.
+        If `one_sided`, a face is visible only from the side on which its corners are counterclockwise.
         """
-        # Bytes, where they suffice, halve the size of every drone.
+        # Using bytes where possible halves the size of every drone.
         few = len(shape.vertices) <= np.iinfo(np.uint8).max
         material = {
             **_material(path, "MeshPhongMaterial", colour, opacity, side=_FRONT if one_sided else _BOTH),
@@ -70,13 +70,13 @@ class MeshcatCommands:
         self._draw(path, "Mesh", {"attributes": attributes, "index": index}, material)
 
     def segments(self, path: str, points: npt.NDArray[np.float64], colour: Colour, opacity: float = 1) -> None:
-        """Draw thin lines at `path`. Each pair of the N x 3 `points` has the ends of one line."""
+        """Draw thin lines at `path`. Each pair of rows in `points` (N, 3) has the ends of one line."""
         material = {**_material(path, "LineBasicMaterial", colour, opacity, side=_BOTH), "depthWrite": False}
         attributes = {"position": _packed(points.astype(np.float32))}
         self._draw(path, "LineSegments", {"attributes": attributes}, material)
 
     def sprite(self, path: str, svg: str) -> None:
-        """Draw a picture at `path`, one unit wide and high. It faces the viewer, and nothing covers it."""
+        """Draw a picture at `path`, one unit wide and high, which faces the viewer and is never covered."""
         picture = f"data:image/svg+xml;base64,{base64.b64encode(svg.encode()).decode()}"
         material = {"uuid": "material", "type": "SpriteMaterial", "map": "texture", "transparent": True}
         sprite = {

@@ -13,13 +13,13 @@ _Vertices = npt.NDArray[np.float64]
 _Faces = npt.NDArray[np.int64]
 
 _SHELL, _ROTOR, _DARK = 0.95, 1.0, 0.42
-"""Shades that multiply the drone's colour."""
+"""The factors for the drone's colour."""
 _REACH = 0.23
-"""The distance from the centre of the drone to that of a rotor, along x and along y."""
+"""The distance from the centre of the drone to the centre of a rotor, along x and along y."""
 _DECK = 0.17
-"""Height of the arms."""
+"""The height of the arms."""
 HUB = (0.0, 0.0, _DECK)
-"""The centre of rotation, from the point on which the drone stands."""
+"""The centre of rotation, relative to the point on which the drone stands."""
 
 
 class TriangleMesh(NamedTuple):
@@ -32,9 +32,9 @@ class TriangleMesh(NamedTuple):
 
 @cache
 def quadrotor() -> TriangleMesh:
-    """Return the mesh of all drones, around its `HUB`: a body on skids, four arms, four guarded rotors.
+    """Return the mesh for all drones, around its `HUB`: a body on skids, four arms, and four guarded rotors.
 
-    It is about 0.8 cells wide. It is so small that every drone can have a copy.
+    The mesh is about 0.8 cells wide, and has so few faces that every drone can have a copy.
     """
     corners = [(x, y) for x in (-_REACH, _REACH) for y in (-_REACH, _REACH)]
     parts = [_body(), _bar((-_REACH, -_REACH), (_REACH, _REACH)), _bar((-_REACH, _REACH), (_REACH, -_REACH))]
@@ -62,7 +62,7 @@ def box(centre: tuple[float, float, float], size: float | tuple[float, float, fl
 
 
 def prisms(footprints: _Vertices, low: float, high: float) -> TriangleMesh:
-    """Return upright blocks on footprints (K, 4, 2), with their corners counterclockwise."""
+    """Return upright blocks on footprints (K, 4, 2), whose corners are counterclockwise."""
     count = len(footprints)
     heights = np.repeat([low, high], 4)
     vertices = np.empty((count, 8, 3))
@@ -75,7 +75,7 @@ def prisms(footprints: _Vertices, low: float, high: float) -> TriangleMesh:
 
 
 def joined_shapes(parts: list[TriangleMesh]) -> TriangleMesh:
-    """Return several meshes as one."""
+    """Return several meshes joined into one."""
     before = np.cumsum([0, *(len(part.vertices) for part in parts)])
     return TriangleMesh(
         np.concatenate([part.vertices for part in parts]),
@@ -113,7 +113,7 @@ def _body() -> TriangleMesh:
 
 
 def _bar(start: tuple[float, float], stop: tuple[float, float]) -> TriangleMesh:
-    """Return an arm from one rotor through the body to the opposite one: a flat box."""
+    """Return an arm, a flat box from one rotor through the body to the opposite rotor."""
     ends = np.array([start, stop])
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     side = 0.025 * np.array([-along[1], along[0]])
@@ -126,7 +126,7 @@ def _bar(start: tuple[float, float], stop: tuple[float, float]) -> TriangleMesh:
 
 
 def _rotor(x: float, y: float) -> TriangleMesh:
-    """Return a ring, the guard, around two blades."""
+    """Return two blades, and the guard ring around them."""
     sides, height = 12, _DECK + 0.03
     ring = np.concatenate([_circle(0.13, height, sides), _circle(0.17, height, sides)])
     guard = _painted(ring, _band(sides), _ROTOR)

@@ -1,7 +1,7 @@
 """A scene as one self-contained HTML page: meshcat's viewer, its commands, a caption, a legend and a player.
 
-Names of teams and robots may come from foreign files. They are inserted into HTML as escaped text only. The page's
-Content-Security-Policy allows only the page's two scripts, and loads nothing.
+Names of teams and robots may come from foreign files, and are inserted into HTML only as escaped text. The page's
+Content-Security-Policy allows only the page's two scripts, and no loading.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from robochoc.view.playback import DroneState, Playback
 from robochoc.view.scene import Scene
 
 _SWATCHES_MAX = 9
-"""If there are more rows, the legend shows one colour ramp with its two ends."""
+"""The maximum number of rows with legend entries; for more rows, the legend shows a colour ramp with its two ends."""
 
 
 _PLAYER = ("labels.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
@@ -30,15 +30,15 @@ _PLAYER = ("labels.js", "trails.js", "camera.js", "player.js", "timeline.js", "p
 
 
 def scene_page(scene: Scene) -> bytes:
-    """Return the page, UTF-8.
+    """Return the page in UTF-8.
 
-    It plays the flight once by itself, needs no server and no network, and is identical for equal scenes.
+    The page plays the flight once, needs no server and no network, and is identical for equal scenes.
     """
     return _page(scene, "\n".join(base64.b64encode(command).decode() for command in commands(scene)), "'none'")
 
 
 def live_page(scene: Scene, port: int) -> bytes:
-    """Return the page without its commands: it gets them from its server, at `port` of this machine."""
+    """Return the page without the commands, which it receives from its server, at `port` of this machine."""
     return _page(scene, "", f"ws://127.0.0.1:{port} ws://localhost:{port}")
 
 
@@ -66,13 +66,13 @@ def _text(text: str) -> str:
 
 
 def legend(scene: Scene) -> str:
-    """Return the legend of `scene` as HTML: the colours of rows, grey and red; empty if all drones look alike."""
+    """Return the legend of `scene` as HTML: the colours of rows, grey and red; empty if all drones look the same."""
     entries = [*_row_entries(scene), *_state_entries(scene)]
     return f'<ul id="legend" aria-label="Legend">{"".join(entries)}</ul>\n' if entries else ""
 
 
 def _row_entries(scene: Scene) -> Iterator[str]:
-    """Yield an entry for each row, by the first axis: drones of a row have the same colour."""
+    """Yield an entry for each row along the first axis, since drones in a row have the same colour."""
     rows = sorted({drone.group for drone in scene.drones})
     axis = scene.axes[0]
     name = f"{axis.name} = " if axis.name == "x" else f"{axis.name or 'row'} "
@@ -89,7 +89,7 @@ def _row_entries(scene: Scene) -> Iterator[str]:
 
 
 def _state_entries(scene: Scene) -> Iterator[str]:
-    """Yield an entry for each colour that does not stand for a row."""
+    """Yield an entry for each colour that does not represent a row."""
     changes = scene.playback.states if scene.playback else ()
     seen = {state for drone in changes for _, state in drone}
     if DroneState.WITHDRAWN in seen:
@@ -118,8 +118,8 @@ def _entry(background: str, text: str, kind: str = "") -> str:
 def playback_json(scene: Scene) -> str:
     """Return the player's data as JSON that is safe in HTML: drones, epochs, events, and the extent of the scene.
 
-    Times are in seconds. `corners` and `cell` are in meshcat's frame as `drawing` scales it. Names may come from
-    foreign files: they are escaped so that they cannot end the script element.
+    Times are in seconds. `corners` and `cell` are in meshcat's frame, as scaled by `drawing`. Names may come from
+    foreign files, and are escaped so that they cannot end the script element.
     """
     data = {
         "corners": [[round(part, 5) for part in corner] for corner in corners(scene)],

@@ -1,7 +1,7 @@
 """The scripts of a page with a scene, and its Content-Security-Policy.
 
-The policy lets a browser load nothing, and run only the scripts of the page, which it knows by their hashes. Markup in
-names from foreign files stays text.
+With this policy, a browser loads nothing, and runs only the scripts of the page, identified by their hashes. Markup in
+names from foreign files remains text.
 """
 
 from __future__ import annotations

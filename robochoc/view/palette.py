@@ -1,4 +1,4 @@
-"""Colours of the scene. Rows have a ramp from dark violet to light yellow, so that they differ in lightness, too."""
+"""Colours of the scene. The colours of rows, from dark violet to light yellow, also differ in lightness."""
 
 from __future__ import annotations
 

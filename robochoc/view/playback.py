@@ -1,4 +1,4 @@
-"""A flight log prepared for playback: positions of drones over time, epochs on the time line, and events.
+"""A flight log prepared for playback: positions of drones over time, epochs on the timeline, and events.
 
 Lengths are in cells, as in `scene`; times in seconds from the beginning.
 """
@@ -24,7 +24,7 @@ _Array = npt.NDArray[np.float64]
 
 
 class DroneState(StrEnum):
-    """The state of a drone, shown by its colour: that of its row, grey, or red."""
+    """The state of a drone, shown by its colour: the colour of its row, grey, or red."""
 
     FLIES = "flies"
     WITHDRAWN = "withdrawn"
@@ -33,7 +33,7 @@ class DroneState(StrEnum):
 
 @dataclass(frozen=True)
 class Chapter:
-    """An epoch: the beginning of its flight, the event that opened it, and its result."""
+    """An epoch: the beginning of its flight, the event that opened the epoch, and its result."""
 
     begins_s: float
     opened_by: str
@@ -42,7 +42,7 @@ class Chapter:
 
 @dataclass(frozen=True)
 class EventMark:
-    """An event of a drone, by its number."""
+    """An event of a drone (by number)."""
 
     at_s: float
     drone: int
@@ -51,14 +51,14 @@ class EventMark:
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """A flight to be shown: arrays over T times and N drones.
+    """The data for showing a flight, with T samples of N drones.
 
-    `states` are each drone's changes of state, in order: the time, and the new state.
+    `states` has the state changes of each drone in order: the time, and the new state.
     """
 
     times: _Array
     positions: _Array
-    """(T, N, 3)"""
+    """(T, N, 3): positions, in cells."""
     attitudes: _Array
     """(T, N, 4): unit quaternions x, y, z, w."""
     states: tuple[tuple[tuple[float, DroneState], ...], ...]
@@ -74,7 +74,7 @@ class Playback:
 
 
 def playback_of(mission: Mission, flown: FlightLog) -> Playback:
-    """Return the playback of `flown`, the flight of a mission, in the mission's box."""
+    """Return the playback of `flown`, the flight of a mission, in cells of the mission's box."""
     marks = [EventMark(event.at_s, event.drone, event.what) for event in flown.events]
     obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
     return Playback(
@@ -92,7 +92,7 @@ def playback_of(mission: Mission, flown: FlightLog) -> Playback:
 
 
 def fallen_drones(flown: FlightLog) -> dict[int, FlightEvent]:
-    """Return the fallen drones by number, each with the cause: its last event before it hit the ground."""
+    """Return the fallen drones by number, with the cause: the drone's last event before it hit the ground."""
     events: dict[int, list[FlightEvent]] = {}
     for event in flown.events:
         if np.isnan(flown.errors_m[event.drone]):
@@ -118,7 +118,7 @@ def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[f
 
 
 def _flown_legs(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
-    """Return the flown legs, each with its beginning."""
+    """Return the flown legs, each with its start time."""
     return [(leg, times.begins_s) for leg, times in zip(mission.legs, flown.legs, strict=False)]
 
 

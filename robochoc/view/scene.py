@@ -1,6 +1,6 @@
-"""The scene of an outcome, as data: the drones, their flight, and the box around them.
+"""The scene of an outcome: data on the drones, their flight, and the box around them.
 
-Lengths are in cells: one cell is one row, one column or one level. `drawing` draws it.
+Lengths are in cells: one cell is one row, one column or one level. Scenes are drawn by `drawing`.
 """
 
 from __future__ import annotations
@@ -23,29 +23,29 @@ from robochoc.view.walls import DrawnWalls, Faces, wall_faces, wall_footprints
 
 @dataclass(frozen=True)
 class DrawnDrone:
-    """A drone that begins at `home`, on the ground.
+    """A drone that starts at `home`, on the ground.
 
-    It ends at its `place` in the air, or at its `landing`, or stays at home.
+    The drone ends at its `place` in the air, or at its `landing`, or stays at home.
     """
 
     name: str
     group: int
-    """Its row: drones of a row have the same colour."""
+    """The drone's row: drones in the same row have the same colour."""
     home: Point
     place: Point | None = None
     landing: Point | None = None
 
     @property
     def end(self) -> Point:
-        """The last position."""
+        """The final position."""
         return self.place or self.landing or self.home
 
 
 @dataclass(frozen=True)
 class DrawnBlock:
-    """A blocked cell, from second `since_s` on: a block on the ground with the middle of its top at `top`.
+    """A cell that is blocked from second `since_s` on: a block on the ground with the centre of its top at `top`.
 
-    On a three-dimensional map it is a cube around `top`, visible from `sides`, as in `Volume.sides`.
+    On a three-dimensional map, it is a cube around `top` with visible `sides`, as in `Volume.sides`.
     """
 
     top: Point
@@ -69,7 +69,7 @@ class Scene:
     blocks: tuple[DrawnBlock, ...] = ()
     walls: DrawnWalls | None = None
     faces: Faces | None = None
-    """The walls of a map in three dimensions; None: its blocked cells are drawn."""
+    """The walls of a three-dimensional map; None: the map's blocked cells are drawn."""
 
     @property
     def ground(self) -> float:
@@ -91,11 +91,11 @@ def scene_of(
     Args:
         outcome: The outcome of a run.
         mission: The mission of the outcome.
-        flown: The log of its flight.
+        flown: The log of the mission's flight.
         flown_mission: The flown mission, if it is `mission` with cells of another size. Distances are then not to
-            scale, and the scene omits them.
+            scale, and are omitted in the scene.
         why_not: The reason why nothing was flown, for the caption.
-        weighted: Whether robots differ in weight, if that is known.
+        weighted: Whether robots differ in weight; None: unknown.
     """
     flown_mission = flown_mission or mission
     drones = tuple(_drones(flown_mission))
@@ -110,7 +110,7 @@ def scene_of(
 
 
 def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:
-    """Return the headline, with numbers of robots; or of drones, if robots have several, or are not known."""
+    """Return the headline, with numbers of robots, or of drones if robots have several drones or are unknown."""
     robots = {drone.robot for drone in mission.drones if drone.robot}
     if len(robots) == len(drones):
         return describe_outcome(outcome, len(robots), weighted=weighted)
@@ -134,7 +134,7 @@ def _drones(mission: Mission) -> Iterator[DrawnDrone]:
 
 
 def _blocks(mission: Mission, flown: FlightLog | None) -> Iterator[DrawnBlock]:
-    """Yield each block. A block of a later leg appears when that leg begins, or never, if the leg is not flown."""
+    """Yield each block. A block in a later leg appears when this leg begins, or never if the leg is not flown."""
     for block in mission.blocks:
         if flown is None or not block.leg:
             yield DrawnBlock(_cell(mission, block.at), is_cube=block.is_cube, sides=block.sides)
@@ -148,7 +148,7 @@ def _cell(mission: Mission, metres: Point) -> Point:
 
 
 def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -> Iterator[tuple[str, str]]:
-    """Yield facts about the flight, distances only if they are to scale; or the reason why there was none."""
+    """Yield facts about the flight, with distances only if they are to scale, or the reason why there was no flight."""
     if flown is None:
         if why_not:
             yield "flight", f"none: {why_not}"

@@ -1,8 +1,9 @@
-"""Walls of a map for the scene: footprints of pixels, faces of voxels, or faces of blocked cells.
+"""The walls of a map for the scene: footprints of pixels, faces of voxels, or faces of blocked cells.
 
-Pixels of a map of the ground are merged into few rectangles. On a three-dimensional map, occupied voxels have faces
-towards free ones; if the voxels are not known, blocked cells have faces towards free cells. Each face is drawn from one
-side only: from outside, the nearer walls and the ceiling are transparent, and the further walls and the floor are seen.
+The pixels of a two-dimensional map are merged into a few rectangles. On a three-dimensional map, occupied voxels have
+faces towards free voxels; if the voxels are unknown, blocked cells have faces towards free cells. Each face is drawn
+from one side only: from outside, the nearer walls and the ceiling are transparent, and the further walls and the floor
+are visible.
 """
 
 from __future__ import annotations
@@ -18,14 +19,14 @@ from robochoc.maps.walls import PixelFrame, VoxelFrame
 from robochoc.view.meshes import TriangleMesh
 
 _MOST_FACES = 20_000
-"""The largest number of faces of a map. If there are more, the size of voxels is doubled until they fit."""
+"""The maximum number of faces for a map. If there are more, the size of voxels is doubled until the limit is met."""
 
 Faces = npt.NDArray[np.float64]
 """The corners of faces (F, 4, 3), counterclockwise as seen from the free side."""
 Flags = npt.NDArray[np.bool_]
 
 _MOST_RECTANGLES = 4_000
-"""The largest number of rectangles of a map. If there are more, the size of pixels is doubled until they fit."""
+"""The maximum number of rectangles for a map. If there are more, the size of pixels is doubled until it is met."""
 
 Corners = npt.NDArray[np.float64]
 Numbers = npt.NDArray[np.int64]
@@ -34,14 +35,14 @@ _Cells = npt.NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class DrawnWalls:
-    """The footprints of walls and of unknown parts: for each rectangle its corners (4, 2), counterclockwise."""
+    """The footprints of walls and of unknown parts: the corners (4, 2) of each rectangle, counterclockwise."""
 
     occupied: Corners
     unknown: Corners
 
 
 def wall_footprints(mission: Mission) -> DrawnWalls | None:
-    """Return the footprints of a mission's walls in the cells of its box; None without walls in the plane."""
+    """Return the footprints of a mission's walls, in cells of its box; None without two-dimensional walls."""
     walls = mission.walls
     frame = walls.frame if walls else None
     if walls is None or not isinstance(frame, PixelFrame):
@@ -60,7 +61,7 @@ def wall_footprints(mission: Mission) -> DrawnWalls | None:
 
 
 def few_rectangles(flags: Flags, most: int = _MOST_RECTANGLES) -> tuple[Numbers, int]:
-    """Return at most `most` rectangles that cover the flags, and the width of their unit in pixels."""
+    """Return at most `most` rectangles that cover the set flags, and the length of their unit in pixels."""
     factor = 1
     while len(found := rectangles(flags)) > most:
         factor *= 2
@@ -73,7 +74,7 @@ def few_rectangles(flags: Flags, most: int = _MOST_RECTANGLES) -> tuple[Numbers,
 def rectangles(flags: Flags) -> Numbers:
     """Return rectangles (K, 4) that cover exactly the set flags: the least x and y, and the first x and y beyond.
 
-    Consecutive pixels of a row are merged, and then equal runs of consecutive rows.
+    Consecutive pixels in a row are merged, and then equal runs in consecutive rows.
     """
     steps = np.diff(np.pad(flags, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, begin = np.nonzero(steps == 1)
@@ -92,8 +93,8 @@ def wall_faces(mission: Mission, most: int = _MOST_FACES) -> Faces | None:
 
     Args:
         mission: The mission.
-        most: The maximum number of faces. A larger voxel is occupied if any part of it is, and free if any part is and
-            no part is occupied.
+        most: The maximum number of faces. An enlarged voxel is occupied if any part is occupied, else free if any part
+            is free.
     """
     walls = mission.walls
     frame = walls.frame if walls else None
@@ -108,7 +109,7 @@ def wall_faces(mission: Mission, most: int = _MOST_FACES) -> Faces | None:
 
 
 def faces(occupied: Flags, free: Flags) -> Faces:
-    """Return the faces of all occupied voxels towards free ones, in voxels. Flags are by z, y and x."""
+    """Return the faces of all occupied voxels towards free voxels, in voxels. Flags are sorted by z, y and x."""
     found = []
     for axis, side in product(range(3), (-1, 1)):
         along = 2 - axis
@@ -122,7 +123,7 @@ def faces(occupied: Flags, free: Flags) -> Faces:
 
 
 def _halved(flags: Flags) -> Flags:
-    """Return flags of voxels of twice the size, which are set if one of the eight parts is."""
+    """Return flags for voxels of twice the size, which are set if a flag of one of the eight parts is set."""
     even = np.pad(flags, [(0, size % 2) for size in flags.shape])
     for axis in range(3):
         lines = np.moveaxis(even, axis, 0)
@@ -134,11 +135,11 @@ def blocked_cell_faces(blocked: _Cells, sides: _Cells, low: _Cells, high: _Cells
     """Return the faces of blocked cells, in cells; None: there are none.
 
     Args:
-        blocked: The cells: x, y and z of each in a row.
+        blocked: The cells, a row of x, y and z each.
         sides: The visible sides of each cell, as in `Volume.sides`. Sides towards blocked cells are not visible.
         low: The x, y and z of the first cell of the map.
         high: The x, y and z of the last cell.
-        width: The width of a face: with less than 1, neighbouring faces are distinguishable.
+        width: The width of a face; if below 1, neighbouring faces are distinguishable.
     """
     taken = {*map(tuple, blocked.tolist())}
     corners = []
@@ -159,7 +160,7 @@ def blocked_cell_faces(blocked: _Cells, sides: _Cells, low: _Cells, high: _Cells
 
 
 def mesh_of_faces(vertices: npt.NDArray[np.float64]) -> TriangleMesh | None:
-    """Return the mesh of quadrilateral faces, given by four vertices each (4 F, 3); None without faces."""
+    """Return a mesh of quadrilaterals, given by four vertices each (4 F, 3); None without faces."""
     if not vertices.size:
         return None
     first = np.arange(0, len(vertices), 4)
