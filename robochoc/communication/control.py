@@ -1,8 +1,8 @@
-"""The control messages between the parent and a robot's process, over their control pipe.
+"""The control messages between a parent and a robot's process, sent through their control pipe.
 
 The parent is the paper's master: it waits for the confirmation of all robots before it orders the start, opens
-queues between robots that request them, detects quiescence, and ends each epoch. It carries no protocol message. When
-it closes the pipe, the robot ends.
+queues between robots that request them, detects quiescence, and ends each epoch. It does not transport protocol
+messages. When the parent closes the pipe, the robot ends.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import Invalidated
 
 QUEUES_AT_ONCE = 16
-"""The most queues that a robot requests at once: the parent needs this many more descriptors meanwhile."""
+"""The maximum number of queues that a robot requests at once. Meanwhile the parent needs this many more descriptors."""
 
 
 class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -26,7 +26,7 @@ class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
 
 
 class EpochMessage(_Control, frozen=True):
-    """A message that is outdated once its epoch is over."""
+    """A message that is outdated when its epoch is over."""
 
     epoch: int
 
@@ -45,7 +45,7 @@ class OpenQueues(EpochMessage, frozen=True):
 
 
 class Counters(EpochMessage, frozen=True):
-    """The counts of the robot's protocol messages in this epoch: the answer to `wave`, or (0) because it is idle."""
+    """The robot's counts of protocol messages in this epoch: the answer to `wave`, or (0) unasked, from an idle robot."""
 
     wave: int
     sent: int
@@ -53,7 +53,7 @@ class Counters(EpochMessage, frozen=True):
 
 
 class Conclusion(EpochMessage, frozen=True):
-    """A verdict that the robot found alone. Before `Ready`: a verdict that holds in spite of the changes."""
+    """A verdict that the robot found alone. If sent before `Ready`, the verdict holds in spite of the changes."""
 
     verdict: str
 
@@ -65,7 +65,7 @@ class WentOn(EpochMessage, frozen=True):
 
 
 class RobotSnapshot(EpochMessage, frozen=True, tag="Snapshot"):
-    """The answer to `TakeSnapshot`: the robot's values and findings, and the messages it has dropped; it continues."""
+    """The answer to `TakeSnapshot`: the robot's values, findings and number of dropped messages. The robot continues."""
 
     number: int
     assignment: dict[str, int]
@@ -74,7 +74,7 @@ class RobotSnapshot(EpochMessage, frozen=True, tag="Snapshot"):
 
 
 class Events(_Control, frozen=True):
-    """Events for the observer, oldest first."""
+    """Events for the observer, in chronological order."""
 
     events: list[AnyEvent]
 
@@ -88,9 +88,9 @@ class EpochReport(EpochMessage, frozen=True):
 
 
 class RobotFailed(_Control, frozen=True, tag="Failed"):
-    """The robot cannot continue; `unsupported`: because of its problem, not because of a failure.
+    """The robot cannot continue. `unsupported`: the cause is the robot's problem, not a failure.
 
-    `elsewhere`: another protocol may be able to solve it (`TooLargeError`).
+    `elsewhere`: another protocol may be able to solve the problem (`TooLargeError`).
     """
 
     why: str
@@ -102,7 +102,7 @@ class RobotFailed(_Control, frozen=True, tag="Failed"):
 
 
 class Begin(_Control, frozen=True):
-    """The order to search, once all robots are ready. `began` is the run's start, on the monotonic clock.
+    """The order to search, sent when all robots are ready. `began` is the start of the run, on the monotonic clock.
 
     `lossless`: no message of the previous epoch was lost.
     """
@@ -112,13 +112,13 @@ class Begin(_Control, frozen=True):
 
 
 class Pause(_Control, frozen=True):
-    """The order to stop and report, as this epoch's search is over."""
+    """The order to stop and report, because this epoch's search is over."""
 
 
 class EpochChange(_Control, frozen=True):
     """A new epoch. `change` contains the robot's `AgentProblem` and the `Invalidated` results (see `pack_change`).
 
-    Robots in `gone` have left; if new robots have their names, queues to and from these are opened again.
+    Robots in `gone` have left. If new robots have the same names, queues to and from these robots are opened again.
     """
 
     epoch: int
@@ -127,13 +127,13 @@ class EpochChange(_Control, frozen=True):
 
 
 class QueuesTo(_Control, frozen=True):
-    """The write ends of the queues to `robots` are attached, in this order."""
+    """The write ends of the queues to `robots` are attached to this message, in this order."""
 
     robots: list[str]
 
 
 class QueueFrom(_Control, frozen=True):
-    """The read end of the queue from `robot` is attached."""
+    """The read end of the queue from `robot` is attached to this message."""
 
     robot: str
 
@@ -145,30 +145,30 @@ class CounterWave(_Control, frozen=True, tag="Wave"):
 
 
 class TakeSnapshot(_Control, frozen=True):
-    """The order to report a snapshot, and to continue the search. The answer has the same `number`."""
+    """The order to report a snapshot and to continue the search. The answer has the same `number`."""
 
     number: int
 
 
 class GoOn(_Control, frozen=True):
-    """The order to continue without the messages that a robot waits for: no message is in transit any more."""
+    """The order to continue without the messages that a robot waits for, since no message is in transit any more."""
 
 
 def pack_change(part: AgentProblem, invalidated: Invalidated) -> bytes:
-    """Return the content of a `EpochChange`."""
+    """Return the content of an `EpochChange`."""
     return pickle.dumps((part, invalidated))
 
 
 def unpack_change(change: bytes) -> tuple[AgentProblem, Invalidated]:
-    """Return the arguments of `pack_change`. Only for bytes from this process's parent, over their private socket.
+    """Return the arguments of `pack_change`. The bytes must come from this process's parent.
 
-    Processes are started by the same means (`multiprocessing`); no message of a protocol is unpickled.
+    Processes are started by the same means (`multiprocessing`). Protocol messages are never unpickled.
     """
     part, invalidated = pickle.loads(change)  # noqa: S301 - written by our parent process
     return part, invalidated
 
 
 RobotMessage = Ready | Counters | Conclusion | WentOn | RobotSnapshot | Events
-"""A robot's message to the master during a search, in every runtime. Runtimes differ in the final report."""
+"""A robot's message to the master during a search, in every runtime. The final report differs between runtimes."""
 FromRobot = RobotMessage | OpenQueues | EpochReport | RobotFailed
 FromParent = Begin | Pause | EpochChange | QueuesTo | QueueFrom | CounterWave | TakeSnapshot | GoOn

@@ -1,8 +1,8 @@
 """Channel filters transform the content of a message between its sender and its receiver.
 
-Like protocols, filters are registered by installed packages, in the entry point group `robochoc.filters`. Several can
-be stacked: they seal in their order, and open in the reverse order. robochoc contains two: `signed` and `sealed`. Their
-protection, and how to write a filter: docs/guides/security.md.
+Like protocols, filters are registered by installed packages, in the entry point group `robochoc.filters`. Filters can
+be stacked: they seal in their order, and open in the reverse order. robochoc contains two filters: `signed` and
+`sealed`. docs/guides/security.md describes their protection, and how to write a filter.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ GROUP = "robochoc.filters"
 
 
 class NotGenuineError(RobochocError):
-    """The data was not sealed by the sender for this robot in this context. No part of it may be used."""
+    """Raised if the sender did not seal the data for this robot in this context. No part of the data may be used."""
 
 
 class UnknownFilterError(RobochocError, LookupError):
-    """No installed package has a filter of that name, or the filter cannot be used."""
+    """Raised if no installed package has a filter of that name, or the filter cannot be used."""
 
 
 class ChannelFilter(ABC):
-    """A filter for all messages of the robot whose keys are in `ring`.
+    """A filter for all messages of a robot, whose keys are in `ring`.
 
     `context` encodes facts that both sides know without the message: run, sender, receiver and sequence number. It is
-    not sent; a message that is moved into another context cannot be opened.
+    not sent. A message that is moved to another context cannot be opened.
     """
 
     def __init__(self, ring: KeyRing) -> None:
@@ -39,15 +39,15 @@ class ChannelFilter(ABC):
 
     @abstractmethod
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """Return the bytes to send for `content`; they may differ in each call. Raises `UnknownPeerError`."""
+        """Return the bytes to send for `content`. They may differ in each call. Raises `UnknownPeerError`."""
 
     @abstractmethod
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """Return the content that `sender` has sealed; the argument may be any bytes. Raises `NotGenuineError`."""
+        """Return the content sealed by `sender`. The argument may be any bytes. Raises `NotGenuineError`."""
 
 
 class FilterStack(ChannelFilter):
-    """A stack of filters as one filter. An empty stack does not change messages."""
+    """Applies a stack of filters as one filter. An empty stack does not change messages."""
 
     def __init__(self, ring: KeyRing, filters: Sequence[type[ChannelFilter]]) -> None:
         super().__init__(ring)
@@ -60,7 +60,7 @@ class FilterStack(ChannelFilter):
         return content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """Return the opened content. Any failure of a filter becomes a `NotGenuineError`."""
+        """Return the opened content. Any failure in a filter is raised as `NotGenuineError`."""
         for each in reversed(self._filters):
             try:
                 content = each.open(sender, content, context)
@@ -84,7 +84,7 @@ def filter_named(name: str) -> type[ChannelFilter]:
 
 
 def _fault(loaded: object) -> str:
-    """Return the reason why `loaded` cannot be used as a filter. Empty if it can."""
+    """Return the reason why `loaded` cannot be used as a filter; empty if it can be used."""
     if not (isinstance(loaded, type) and issubclass(loaded, ChannelFilter)):
         return "is not a subclass of ChannelFilter"
     if loaded.__abstractmethods__:

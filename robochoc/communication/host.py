@@ -1,9 +1,9 @@
-"""The host connects a protocol, which is pure, with a runtime, which moves envelopes.
+"""The host connects a protocol, which is pure, to a runtime, which transports envelopes.
 
-It decodes and encodes messages, stamps envelopes with the clock of non-concurrent constraint checks (NCCC; Meisels et
-al. 2002: c = max(c, c of the message), plus one for each check; a message carries the value of c at which it was
-written), counts messages and checks, and reports events to an observer. Every runtime uses the host, so the same run
-has the same counts everywhere.
+The host decodes and encodes messages, stamps envelopes with the clock of non-concurrent constraint checks (NCCC;
+Meisels et al. 2002: c = max(c, c of the message), plus one for each check; each message has a timestamp, the value of c
+when the message was written), counts messages and checks, and reports events to an observer. Every runtime uses the
+host, so the same run has the same counts in every runtime.
 """
 
 from __future__ import annotations
@@ -32,23 +32,23 @@ from robochoc.system.compiling import mypyc_attr
 from robochoc.system.errors import RobochocError
 
 _MOST_SHARED = 1 << 22
-"""Largest size of a message cache, in bytes."""
+"""The maximum size of a message cache, in bytes."""
 _SIZE_OF_A_MESSAGE = 256
-"""Approximate bytes of a message besides its content."""
+"""The approximate size of a message without its content, in bytes."""
 
 
 _UNUSABLE = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
-"""Errors of a protocol that cannot use a message: its own refusals, and failed computations."""
+"""Errors raised by a protocol that cannot use a message: explicit refusals and failed computations."""
 
 
 class BadMessageError(RobochocError, ValueError):
-    """The content of an envelope is not a message of the protocol, or the robot cannot use it."""
+    """Raised if the content of an envelope is not a message of the protocol, or the robot cannot use the message."""
 
 
 class MessageCache:
-    """The latest messages of this process whose receivers may share them (`Message.shareable`), by content.
+    """The most recent messages in this process that receivers may share (`Message.shareable`), by content.
 
-    Messages that are no longer in the cache are decoded again, with the same result.
+    Messages that are no longer in the cache are decoded again. The result is the same.
     """
 
     def __init__(self) -> None:
@@ -56,11 +56,11 @@ class MessageCache:
         self._size = 0
 
     def get(self, content: bytes) -> Message | None:
-        """Return the message with this content; None if it is not in the cache."""
+        """Return the message with this content, or None if it is not in the cache."""
         return self._messages.get(content)
 
     def keep(self, content: bytes, message: Message) -> None:
-        """Add `message`, and remove the oldest ones while the cache is too large."""
+        """Add `message`, and remove the oldest messages while the cache is too large."""
         messages = self._messages
         if content in messages:
             return
@@ -74,14 +74,14 @@ class MessageCache:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Host:
-    """Drives one robot's protocol object."""
+    """Drives the protocol object of one robot."""
 
     @classmethod
     def create(cls, protocol: type[Protocol], part: AgentProblem, order: PriorityOrder | None = None) -> Self:
-        """Return a host for the robot whose part of the problem is `part`.
+        """Return a host for the robot with the problem `part`.
 
-        `order`: the priority order of `part`, if the robots of one process share it. Raises `UnsupportedError` (see
-        `LocalProblem`).
+        `order`: the priority order in `part`, if the robots in one process share one object. Raises `UnsupportedError`
+        (see `LocalProblem`).
         """
         return cls(protocol(LocalProblem(part), order or order_of(part)), part.parameters)
 
@@ -90,20 +90,20 @@ class Host:
         self.name = protocol.problem.agent
         self._equip(parameters)
         self.dropper = self._dropper(parameters)
-        """Decides which messages to this robot are lost, and counts them; None if no message is."""
+        """Decides which messages to this robot are lost, and counts these messages; None if no messages are lost."""
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0
         self.checks_at_send: list[int] = []
-        """The value of `checks` at each message of the last step."""
+        """The value of `checks` for each message in the last step, when the message was written."""
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
         self._begun = False
         self.message_cache: MessageCache | None = None
-        """The messages that the robots of a simulation share; None: each robot decodes its own."""
+        """The messages shared by the robots in a simulation; None: each robot decodes its own messages."""
         self._decode: Callable[[bytes], Message] = message_decoder(protocol.messages).decode
         self.counted = 0
-        """Constraint checks that the clock includes: all of them, except within a step."""
+        """The number of constraint checks included in the clock: all checks, except during a step."""
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
         self._bounded: int | float = 0
@@ -120,10 +120,10 @@ class Host:
         *,
         bounds: bool = False,
     ) -> None:
-        """Report each event to `observer` from now on, stamped with `now()`.
+        """Report each event to `observer` from now on, with the timestamp `now()`.
 
-        Where time is counted in checks, `then(n)` is the time at which the robot had done n of them: the time of its
-        received and sent messages. `bounds`: report lower bounds, too.
+        If time is counted in checks, `then(n)` returns the time at which the robot had done n checks. It is used as the
+        time of received and sent messages. `bounds`: report lower bounds, too.
         """
         self._bounds = bounds
         self._observer = observer
@@ -136,7 +136,7 @@ class Host:
         return self.protocol.problem.checks
 
     def start(self, *, lossless: bool = True) -> list[Envelope]:
-        """Start the search, or resume it after a change; return the robot's first messages.
+        """Start the search, or resume it after a change, and return the robot's first messages.
 
         `lossless`: no message of the previous epoch was lost.
         """
@@ -149,14 +149,14 @@ class Host:
         return self._said()
 
     def change(self, part: AgentProblem, invalidated: Invalidated, order: PriorityOrder | None = None) -> None:
-        """Enter a new epoch with the changed problem `part`, and reset all counts.
+        """Start a new epoch with the changed problem `part`, and reset all counts.
 
-        A dynamic protocol that was started continues with its knowledge; any other protocol is started again. `order`
-        is as in `create`. Raises `UnsupportedError`.
+        A running dynamic protocol continues with its knowledge; any other protocol is restarted. For `order` see
+        `create`. Raises `UnsupportedError`.
         """
         problem, order = LocalProblem(part), order or order_of(part)
         if self._begun and isinstance(self.protocol, DynamicProtocol):
-            problem.allow_undeclared()  # until other robots know that a value was removed
+            problem.allow_undeclared()  # until the other robots know that a value was removed
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
         else:
@@ -173,16 +173,16 @@ class Host:
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
         """Receive all waiting messages, let the protocol settle, and return its messages.
 
-        Raises `BadMessageError` if the protocol cannot decode or use the content of an envelope.
+        Raises `BadMessageError` if the protocol cannot decode or use the content in an envelope.
         """
         for envelope in packet:
             self.receive(envelope)
         return self.settle()
 
     def receive(self, envelope: Envelope) -> None:
-        """Receive one message of a packet, which may contain more. Raises `BadMessageError`.
+        """Receive one message of a packet, which may contain more messages. Raises `BadMessageError`.
 
-        Immediate answers do not carry the clocks of the messages that follow.
+        Immediate answers are not stamped with the clocks of the messages that follow in the packet.
         """
         try:
             message = None if self.message_cache is None else self.message_cache.get(envelope.content)
@@ -210,7 +210,7 @@ class Host:
             )
 
     def catch_up(self, clock: int) -> None:
-        """Advance to `clock`, and move the stamps of the answers to the last message by the same amount."""
+        """Advance the clock to `clock`, and shift the stamps of the answers to the last message by the same amount."""
         late = clock - self.clock
         self.clock = clock
         for place in range(self._answers, len(self._stamps)):
@@ -227,22 +227,22 @@ class Host:
     def handle_lossy(
         self, packet: Sequence[Envelope], missing: Callable[[Envelope], int | None], *, lost: bool
     ) -> list[Envelope] | None:
-        """Handle a packet, as `handle` does, in a search in which messages get lost; return the robot's messages.
+        """Handle a packet like `handle`, in a search that may lose messages, and return the robot's messages.
 
-        Only a protocol that bears loss is informed of missing messages. Any other protocol may raise any error once a
-        message is lost, and then cannot continue.
+        Only a protocol that tolerates loss is notified of missing messages. Any other protocol may raise any error
+        after a message is lost, and cannot continue then.
 
         Args:
             packet: The messages that have arrived.
-            missing: Returns the number of messages of the same sender that were lost right before a message; None if
-                the message is lost as well.
-            lost: Whether a message of the search is or may be lost, to this robot or to others.
+            missing: Returns the number of messages from the same sender that were lost right before a message; None if
+                the message itself is lost.
+            lost: Whether a message in this search is or may be lost, to this robot or to others.
 
         Returns:
-            The robot's messages; None if the protocol cannot continue.
+            The robot's messages, or None if the protocol cannot continue.
 
         Raises:
-            BadMessageError: as `handle`, if no loss explains the error.
+            BadMessageError: as in `handle`, if no loss explains the error.
         """
         bears = self.protocol.traits.bears_loss
         try:
@@ -260,11 +260,11 @@ class Host:
             return None
 
     def go_on(self) -> list[Envelope] | None:
-        """Let the protocol continue without the missing messages; return its messages, or None if it cannot."""
+        """Let the protocol continue without the missing messages. Return its messages, or None if it cannot."""
         return self._said() if self.protocol.go_on() else None
 
     def metrics(self) -> Metrics:
-        """Return this robot's counts so far; `ncccs` is this robot's clock."""
+        """Return this robot's counts so far. `ncccs` is the value of this robot's clock."""
         lost = 0 if self.dropper is None else self.dropper.count
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest, lost_messages=lost)
 
@@ -273,14 +273,14 @@ class Host:
         return MessageDropper(loss, parameters.seed, self.name) if loss else None
 
     def _equip(self, parameters: RunParameters) -> None:
-        """Give the protocol its settings and its random generator."""
+        """Pass the settings and a random generator to the protocol."""
         protocol = self.protocol
         equip(protocol, parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
         protocol.secret = KeyStream(parameters.seed, self.name)
 
     def _said(self) -> list[Envelope]:
-        """Count the checks of a finished step, and return its messages in envelopes."""
+        """Count the checks in a finished step, and return the protocol's messages in envelopes."""
         self._tick()
         protocol = self.protocol
         self.checks_at_send = protocol.checks_at_send
@@ -292,7 +292,7 @@ class Host:
         return envelopes
 
     def _envelopes(self) -> list[Envelope]:
-        """Encode and count all messages in the outbox; encode a message to several robots in a row once."""
+        """Encode and count all messages in the outbox. A message sent to several robots in a row is encoded once."""
         found = []
         last: Message | None = None
         content, kind = b"", ""
@@ -338,7 +338,7 @@ class Host:
             self.counted = checks
 
     def _time(self, checks: int) -> float:
-        """Return the time at which this number of checks was done."""
+        """Return the time at which the robot had done this number of checks."""
         return self._now() if self._then is None else self._then(checks)
 
     def _forget_said(self) -> None:
@@ -348,7 +348,7 @@ class Host:
 
     def _report_state(self, observer: Observer) -> None:
         """Report a value, a verdict or a best assignment that is new since the last report."""
-        best: Any = self.protocol.incumbent  # as an `Incumbent`, mypyc would make a float of its cost
+        best: Any = self.protocol.incumbent  # with the type `Incumbent`, mypyc would convert its cost to a float
         if best is not None and best.cost < self._heard:
             self._heard = best.cost
             observer(Heard(t=self._now(), robot=self.name, cost=best.cost, values=best.values))
@@ -374,25 +374,25 @@ class Host:
 def _refusal(what: str, error: Exception) -> BadMessageError:
     """Return the error for an unusable message, described by `what`, with the traceback of the protocol's `error`.
 
-    Protocols check a message where they use it, so no check is made twice. A mistake in the protocol causes the same
-    error; the traceback shows the difference.
+    Protocols check a message where they use it, so that no check is made twice. A bug in the protocol causes the same
+    error as an unusable message; the traceback shows the difference.
     """
     text = f"{what} that cannot be used: {type(error).__name__}: {error}"
     return BadMessageError(text).with_traceback(error.__traceback__)
 
 
 def may_be_shared(messages: object) -> bool:
-    """Return whether any of a protocol's `messages` may be shared by its receivers."""
+    """Return whether receivers may share any of the messages of a protocol."""
     return any(kind.shareable for kind in get_args(messages) or (messages,))
 
 
 @cache
 def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
-    """Return the decoder of a protocol's `messages`, cached as its construction is slow."""
+    """Return the decoder for a protocol's `messages`. Decoders are cached because their construction is slow."""
     return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
 def order_of(part: AgentProblem) -> PriorityOrder:
-    """Return the priority order of the team's robots, with its pseudo-tree if they know it."""
+    """Return the priority order of the team's robots, with its pseudo-tree if the robots know it."""
     known = part.known
     return PriorityOrder(known.order, known.links, known.rank)

@@ -1,4 +1,4 @@
-"""A check for `if __name__ == "__main__":`, as processes that are not forked import, and so run, the program's file."""
+"""A check for `if __name__ == "__main__":`. Processes that are not forked import (execute) the program's file."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from robochoc.solver.errors import UnsupportedError
 
 
 def require_main_guard() -> None:
-    """Raise `UnsupportedError` if an import of the program's file would run its present line, too.
+    """Raise `UnsupportedError` if importing the program's file would execute its current line, too.
 
-    The line is allowed below `if __name__ == "__main__":`, if processes do not import the file (there is none, or it
-    is the `__main__` of a package: see `multiprocessing.spawn`), and if its source cannot be read.
+    The line is allowed below `if __name__ == "__main__":`, if processes do not import the file (it does not exist, or
+    it is the `__main__` of a package: see `multiprocessing.spawn`), or if its source cannot be read.
     """
     main = sys.modules["__main__"]
     file = getattr(main, "__file__", None)
@@ -29,7 +29,7 @@ def require_main_guard() -> None:
 
 
 def _line_of(names: dict[str, object], file: str) -> int | None:
-    """Return the present line of the module with these `names`; None if another thread runs it."""
+    """Return the line being executed in the module with these `names`, or None if another thread executes it."""
     frame: FrameType | None = sys._getframe(1)  # noqa: SLF001 - `inspect.stack` reads the files of all frames
     while frame is not None:
         code = frame.f_code
@@ -40,7 +40,7 @@ def _line_of(names: dict[str, object], file: str) -> int | None:
 
 
 def _is_guarded(file: Path, line: int) -> bool:
-    """Return whether `line` is run in the program itself only, judged by the syntax tree."""
+    """Return whether `line` is executed only in the program itself, according to the syntax tree."""
     try:
         before = [one for one in ast.parse(file.read_bytes()).body if one.lineno <= line]
     except (OSError, SyntaxError, ValueError, RecursionError):

@@ -1,7 +1,7 @@
-"""The master's loop of one search, for every transport: processes' pipes, or the network.
+"""The master's loop during a search, for every transport: pipes between processes, or the network.
 
-The master waits until all robots are ready, orders the start, asks for counters until they show quiescence, and ends
-the search. Its decisions are in `SearchState`; each runtime implements the transport of control messages.
+The master waits until all robots are ready, orders the start, requests counters until they prove quiescence, and ends
+the search. `SearchState` makes its decisions; each runtime implements the transport of control messages.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from robochoc.communication.session import is_past
 from robochoc.system.stopping import stop_requested
 
 TICK_S = 0.2
-"""Seconds between two reports of progress."""
+"""The interval between two progress reports, in seconds."""
 
 
 class MasterLoop(ABC):
-    """The loop of a master with the search `state`. `progress` receives the count of messages every `TICK_S` seconds.
+    """The loop of a master for the search `state`. `progress` receives the message count every `TICK_S` seconds.
 
-    `watch` receives snapshots during the search (None: no snapshots are made).
+    `watch` receives snapshots during the search (None: no snapshots).
     """
 
     state: SearchState
     watch: SearchWatch | None = None
     check_s: float = TICK_S
-    """Seconds between two checks for lost robots."""
+    """The interval between two checks for lost robots, in seconds."""
 
     def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
         self._progress = progress
@@ -42,16 +42,16 @@ class MasterLoop(ABC):
 
     @abstractmethod
     def _serve(self, patience_s: float, deadline: float | None) -> None:
-        """Handle arrived messages, after a wait of at most `patience_s` seconds.
+        """Handle all messages that have arrived. Wait at most `patience_s` seconds for the first one.
 
         Raises:
             RobotsLostError: when a robot is lost whose loss ends the run.
-            UnsupportedError: when a robot cannot take part.
+            UnsupportedError: when a robot cannot participate.
         """
 
     @abstractmethod
     def _check_robots(self, now: float) -> None:
-        """Find lost robots. Raises as `_serve`."""
+        """Find lost robots. Raises the same errors as `_serve`."""
 
     @abstractmethod
     def _order_start(self) -> None:
@@ -62,14 +62,14 @@ class MasterLoop(ABC):
         """Send a control message to all robots."""
 
     def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
-        """Call `kill` with the name of each robot at its time in `kills`."""
+        """Call `kill` with the name of each robot in `kills` at its scheduled time."""
         self._kills = kills
         self._kill = kill
 
     def _search_until(self, deadline: float | None) -> None:
-        """Search until a verdict, an abort, the deadline, or a request to stop.
+        """Search until a verdict, an abort, the deadline, or a stop request.
 
-        Raises as `_serve`.
+        Raises the same errors as `_serve`.
         """
         state = self.state
         self._serve_until(lambda: state.ready or state.broken_off or stop_requested(), deadline)
@@ -88,7 +88,7 @@ class MasterLoop(ABC):
         return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
     def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
-        """Serve the robots until `done()`, or until the deadline on the monotonic clock. Raises as `_serve`."""
+        """Serve the robots until `done()` or the deadline, on the monotonic clock. Raises the errors of `_serve`."""
         while not done():
             now = time.monotonic()
             if is_past(deadline):
@@ -107,7 +107,7 @@ class MasterLoop(ABC):
                 self._take_snapshots(watch)
 
     def _take_snapshots(self, watch: SearchWatch) -> None:
-        """Give `watch` a complete snapshot, and request the next one when it is due."""
+        """Pass a complete snapshot to `watch`, and request the next snapshot when it is due."""
         snapshot = self._snapshot()
         if snapshot is not None:
             watch.receive(snapshot)
@@ -117,11 +117,11 @@ class MasterLoop(ABC):
                 self._ask_for_snapshot(number)
 
     def _ask_for_snapshot(self, number: int) -> None:
-        """Request the snapshot `number` from all robots."""
+        """Request snapshot number `number` from all robots."""
         self._send_all(TakeSnapshot(number))
 
     def _snapshot(self) -> SearchResult | None:
-        """Return the requested snapshot once, when it is complete; otherwise None."""
+        """Return the requested snapshot, once, when it is complete; otherwise None."""
         return self.state.completed_snapshot()
 
     def _kill_due(self) -> None:
@@ -130,7 +130,7 @@ class MasterLoop(ABC):
                 self._kill(name)
 
     def _detect_end(self, now: float) -> None:
-        """Start a wave if it could show quiescence, or if the count of messages is needed for the progress."""
+        """Start a wave if it could prove quiescence, or if the progress report needs the message count."""
         wanted = self._progress is not None and now - self._shown >= TICK_S
         if self._progress and wanted:
             self._shown = now

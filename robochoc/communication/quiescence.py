@@ -1,12 +1,12 @@
-"""Termination detection by four counters (Mattern, "Algorithms for distributed termination detection", 1987).
+"""Termination detection by the four-counter method (Mattern, "Algorithms for distributed termination detection", 1987).
 
-Every robot counts the protocol messages it has sent and those it has received (and handled). If the sums that a first
-wave collects equal those of a second one, started after the end of the first, and as many messages were received as
-were sent, then no message was in transit when the second wave started, and none ever will be. No timer is part of the
-argument: slow messages only delay the detection.
+Every robot counts the protocol messages that it has sent, and those that it has received and handled. The first wave
+collects these counts, and a second wave, started after the end of the first, collects them again. If both waves have
+equal sums, and as many messages were received as sent, then no message was in transit when the second wave started,
+and no message will ever be sent again. The argument needs no timer: slow messages only delay the detection.
 
-Pure: the runtime carries the waves. The first wave is the latest counters of each robot, whether it reported them
-unasked or in answer to an earlier wave.
+Pure: the runtime transports the waves. The first wave consists of the latest counters of each robot, whether the robot
+reported them unasked or in answer to an earlier wave.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 
 class MessageCounts(NamedTuple):
-    """Numbers of protocol messages that a robot has sent and received so far."""
+    """The numbers of protocol messages that a robot has sent and received so far."""
 
     sent: int
     received: int
@@ -36,7 +36,7 @@ class FourCounters:
 
     @property
     def sent(self) -> int:
-        """The number of messages sent, as far as reported."""
+        """The number of messages sent, according to the latest reports."""
         return self._total.sent
 
     def update(self, robot: str, counts: MessageCounts) -> None:
@@ -52,16 +52,16 @@ class FourCounters:
 
     @property
     def total(self) -> MessageCounts | None:
-        """Messages sent and received by all robots; None while the counters of a robot are unknown."""
+        """The numbers of messages sent and received by all robots; None while any robot's counters are unknown."""
         return None if self._unreported else self._total
 
     def latest(self, robot: str) -> MessageCounts | None:
-        """Return the latest counters of `robot`; None if it has reported none."""
+        """Return the latest counters of `robot`, or None if it has not reported any."""
         return self._latest.get(robot)
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """The robots whose counters are unknown; if there are none, those that have not answered the open wave."""
+        """The robots whose counters are unknown. If all are known: the robots that have not answered the open wave."""
         unreported = [robot for robot, counts in self._latest.items() if counts is None]
         return tuple(sorted(unreported or self._unanswered))
 
@@ -71,7 +71,7 @@ class FourCounters:
         return not self._unanswered and not self._unreported and self._total.sent == self._total.received
 
     def start_wave(self) -> int:
-        """Open a wave and return its number, to be sent to every robot. Only if no wave is open."""
+        """Open a wave and return its number, which must be sent to every robot. Call only if no wave is open."""
         self._wave += 1
         self._unanswered = set(self._latest)
         self._before = None if self._unreported else self._total
@@ -79,11 +79,11 @@ class FourCounters:
 
     @property
     def is_wave_open(self) -> bool:
-        """Whether robots have not answered the latest wave yet."""
+        """Whether some robots have not yet answered the latest wave."""
         return bool(self._unanswered)
 
     def answer(self, robot: str, wave: int, counts: MessageCounts) -> None:
-        """Record `robot`'s answer to `wave`; the last answer decides whether the search is quiescent."""
+        """Record `robot`'s answer to `wave`. After the last answer it is known whether the search is quiescent."""
         self.update(robot, counts)
         if wave != self._wave:
             return

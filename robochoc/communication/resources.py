@@ -1,4 +1,4 @@
-"""Resources of the operating system for a run: file descriptors and memory."""
+"""Operating system resources for a run: file descriptors and memory."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from pathlib import Path
 from robochoc.solver.errors import UnsupportedError
 
 _MOST_TOLD = 1 << 16
-"""More bytes than the system reports of one process."""
+"""An upper bound of the number of bytes that the system reports about a process."""
 
 
 def allow_descriptors(needed: int) -> None:
-    """Raise the soft limit of open files to `needed`, or as far as the hard limit allows."""
+    """Raise the soft limit of open files to `needed`, or to the hard limit if that is lower."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft != resource.RLIM_INFINITY and soft < needed:
         limit = needed if hard == resource.RLIM_INFINITY else min(needed, hard)
@@ -21,13 +21,13 @@ def allow_descriptors(needed: int) -> None:
 
 
 def require_descriptors(free: int) -> None:
-    """Raise `UnsupportedError` unless `free` more files can be opened, once the soft limit is raised as far as needed.
+    """Raise `UnsupportedError` unless `free` more files can be opened. The soft limit is raised first if necessary.
 
     Without enough descriptors zenoh aborts the process.
     """
     try:
         in_use = sum(1 for _ in Path("/dev/fd").iterdir())
-    except OSError:  # no descriptor is left, even for the folder
+    except OSError:  # no descriptor is left, not even for this folder
         in_use = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
     allow_descriptors(in_use + free)
     limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
@@ -45,14 +45,14 @@ def own_memory() -> int:
 
 
 def read_text(path: str) -> str:
-    """Return the text of a small system file; empty if it cannot be read. A `Path` takes four times as long."""
+    """Return the text in a small system file; empty if it cannot be read. Using a `Path` takes four times as long."""
     try:
         fd = os.open(path, os.O_RDONLY)
     except OSError:
         return ""
     try:
         return os.read(fd, _MOST_TOLD).decode()
-    except OSError:  # the process has ended meanwhile
+    except OSError:  # the process has ended in the meantime
         return ""
     finally:
         os.close(fd)

@@ -1,7 +1,7 @@
-"""A robot's part in a search, for every transport: queues between processes, or the network.
+"""A robot's loop during a search, for every transport: queues between processes, or the network.
 
-The loop connects the host, which drives the protocol, with a runtime, which moves bytes. It confirms that the robot is
-ready, passes packets of messages to the host, counts messages, reports to the master, and stops at the end.
+The loop connects the host, which drives the protocol, to a runtime, which transports bytes. It confirms that the robot
+is ready, passes packets of messages to the host, counts messages, reports to the master, and stops at the end.
 """
 
 from __future__ import annotations
@@ -18,24 +18,24 @@ from robochoc.protocols.findings import Findings
 from robochoc.protocols.message import Envelope
 
 IDLE_S = 0.002
-"""Seconds without a message after which a robot reports its counters.
+"""The time without messages after which a robot reports its counters, in seconds.
 
 The detection of quiescence is correct for any value.
 """
 EVENTS_AT_ONCE = 500
-"""The most events in one bundle to the master."""
+"""The maximum number of events in a bundle sent to the master."""
 
 
 class RobotLoop(ABC):
-    """One robot in the search `epoch`; `observed`: it reports events; `bounds`: these include lower bounds.
+    """The loop of one robot in the search `epoch`. `observed`: it reports events; `bounds`: they include lower bounds.
 
     A runtime calls `confirm` when the robot's host exists, `start` when the master orders the start, `admit` for each
-    message and `receive` for each packet of messages, `report_idle` when no message arrives, `go_on` when the master
-    reports that none will, and `pause` at the end.
+    message and `receive` for each packet of messages, `report_idle` when no messages arrive, `go_on` when the master
+    reports that no more messages will arrive, and `pause` at the end.
     """
 
     bundle_bytes: int
-    """The size at which a bundle of events is sent: bytes of all its messages."""
+    """The size at which a bundle of events is sent, in bytes of all messages."""
 
     def __init__(self, epoch: int, *, observed: bool, bounds: bool = False) -> None:
         self.epoch = epoch
@@ -60,28 +60,28 @@ class RobotLoop(ABC):
 
     @abstractmethod
     def _transmit(self, envelopes: Sequence[Envelope]) -> None:
-        """Send messages of the protocol to other robots."""
+        """Send protocol messages to other robots."""
 
     @abstractmethod
     def _report_end(self) -> None:
-        """Send the master the final report of the search."""
+        """Send the final report of the search to the master."""
 
-    # The course of a search
+    # The stages of a search
 
     def confirm(self, host: Host) -> None:
         """Report to the master that the robot is ready to search with `host`."""
         if self._host is not host and self._observed:
             host.observe(self._events.append, self._now, bounds=self._bounds)
         self._host = host
-        self._conclude(host)  # a verdict can hold in spite of a change
+        self._conclude(host)  # a verdict may hold in spite of a change
         self._send_to_master(Ready(self.epoch))
 
     def start(self, began: float, *, lossless: bool = True) -> None:
-        """Start the search, or resume it after a change. Does nothing before `confirm`.
+        """Start the search, or resume it after a change. Has no effect before `confirm`.
 
         Args:
-            began: The time of the run's start, on the monotonic clock.
-            lossless: No message of the previous epoch was lost.
+            began: The start of the run, on the monotonic clock.
+            lossless: Whether no message of the previous epoch was lost.
         """
         if self._host is None:
             return
@@ -93,9 +93,9 @@ class RobotLoop(ABC):
         self.receive(early)
 
     def admit(self, envelope: Envelope) -> bool:
-        """Return whether `envelope` belongs to the present packet.
+        """Return whether `envelope` belongs to the current packet.
 
-        Before the start it is stored for later, after the end it is dropped.
+        A message that arrives before the start is stored for later; a message that arrives after the end is dropped.
         """
         if not (self._searching or self._paused):
             self._early.append(envelope)
@@ -113,10 +113,10 @@ class RobotLoop(ABC):
             self.report_events()
 
     def _handle_lossy(self, packet: Sequence[Envelope], dropper: MessageDropper) -> list[Envelope]:
-        """Handle the messages of a packet that are not dropped; return the robot's messages.
+        """Handle the messages in a packet that are not dropped, and return the robot's messages.
 
-        If the protocol cannot continue without a message that was dropped here or at another robot, the robot sends
-        nothing more.
+        If the protocol cannot continue because a message was dropped, here or at another robot, the robot stops
+        sending.
         """
         if self._host is None or self._mute:
             return []
@@ -128,7 +128,7 @@ class RobotLoop(ABC):
         return replies
 
     def go_on(self) -> None:
-        """Continue without the messages that the protocol waits for, and report to the master whether it does."""
+        """Continue without the messages that the protocol waits for, and report to the master whether it can."""
         host = self._host
         replies = host.go_on() if host is not None and self._searching else None
         if host is not None and replies is not None:
@@ -148,7 +148,7 @@ class RobotLoop(ABC):
         self._conclude(host)
 
     def _conclude(self, host: Host) -> None:
-        """Report the protocol's verdict to the master, once."""
+        """Report the protocol's verdict to the master, only once."""
         verdict = host.protocol.verdict
         if verdict is not None and not self._concluded:
             self._concluded = True
@@ -162,12 +162,12 @@ class RobotLoop(ABC):
         return self._searching and self._reported != (self._sent, self._received)
 
     def report_counters(self, wave: int) -> None:
-        """Send the master the counts of sent and received messages: in answer to `wave`, or (0) unasked."""
+        """Send the counts of sent and received messages to the master, in answer to `wave` or unasked (0)."""
         self._reported = (self._sent, self._received)
         self._send_to_master(Counters(self.epoch, wave, *self._reported))
 
     def report_snapshot(self, number: int) -> None:
-        """Send the master the answer to `TakeSnapshot`. The search continues."""
+        """Send the answer to `TakeSnapshot` to the master. The search continues."""
         host = self._host
         if host is not None:
             assignment, findings = self._known_to_master(host)
@@ -175,16 +175,16 @@ class RobotLoop(ABC):
             self._send_to_master(RobotSnapshot(self.epoch, number, assignment, lost, findings))
 
     def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
-        """Return the values and findings that the master may know."""
+        """Return the values and findings that the master is allowed to know."""
         return host.protocol.assignment, host.protocol.findings
 
     def report_idle(self) -> None:
-        """Send the master all due reports, as the robot is idle."""
+        """Send all due reports to the master, since the robot is idle."""
         self.report_events()
         self.report_counters(0)
 
     def report_events(self) -> None:
-        """Send the events since the last report, in bundles of at most about `bundle_bytes`."""
+        """Send the events recorded since the last report, in bundles of about `bundle_bytes` at most."""
         events, self._events[:] = list(self._events), []
         size = start = 0
         for end, event in enumerate(events, 1):

@@ -1,8 +1,8 @@
 """The channel filter `sealed`: only the receiver can read a message, and only sender or receiver can have written it.
 
-ChaCha20-Poly1305 (RFC 8439) under a key that sender and receiver have agreed on for this run and this direction
-(`KeyRing.shared_secret`), with the context as associated data. The nonce is a number that the sender's key ring uses
-only once, so a message that is changed and sealed again has another nonce. 24 more bytes a message.
+Messages are encrypted by ChaCha20-Poly1305 (RFC 8439) with a key that sender and receiver have agreed on for this run
+and this direction (`KeyRing.shared_secret`). The context is the associated data. The sender's key ring uses each nonce
+only once, so a message that is changed and sealed again has another nonce. A message grows by 24 bytes.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from robochoc.communication.filters import ChannelFilter, NotGenuineError
 _PURPOSE = b"robochoc sealed 1"
 _NUMBER_BYTES = 8
 _PADDING = bytes(4)
-"""A nonce has 12 bytes."""
+"""Pads the number to a nonce of 12 bytes."""
 
 
 class Sealed(ChannelFilter):
-    """Encrypts the content, and puts the nonce before it."""
+    """Encrypts the content, and prepends the nonce."""
 
     def __init__(self, ring: KeyRing) -> None:
         super().__init__(ring)
@@ -46,7 +46,7 @@ class Sealed(ChannelFilter):
             raise NotGenuineError(text) from error
 
     def _cipher(self, sender: str, receiver: str) -> ChaCha20Poly1305:
-        """Return the cipher of this direction, made from the peer's present key card."""
+        """Return the cipher for this direction, derived from the peer's current key card."""
         card = self.ring.card_of(receiver if sender == self.ring.name else sender)
         known = self._ciphers.get((sender, receiver))
         if known is None or known[0] is not card:

@@ -1,4 +1,4 @@
-"""The reports of a runtime: its progress, and the result of its search."""
+"""The reports of a runtime: the progress and the result of a search."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _MOST_NAMED = 5
 
 
 class RobotsLostError(RobochocError):
-    """Robots were lost whose loss ends the run. `robots` maps their names to the reasons."""
+    """Raised if robots were lost whose loss ends the run. `robots` maps their names to the reasons."""
 
     def __init__(self, robots: Mapping[str, str]) -> None:
         losses = [f"{name} was lost: {why}" for name, why in itertools.islice(robots.items(), _MOST_NAMED)]
@@ -28,7 +28,7 @@ class RobotsLostError(RobochocError):
 
 
 class Progress(NamedTuple):
-    """The progress of a run: messages sent so far, and seconds since its start.
+    """The progress of a run: the number of messages sent so far, and the seconds since the start.
 
     `stage` names the current work if it is not a search.
     """
@@ -40,10 +40,11 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The result of a search by robots. `assignments` maps each robot to its variables' values (empty: it has none).
+    """The result of a search by robots. `assignments` maps robots to the values of their variables (empty: no values).
 
-    `witness` is the robot that concluded the verdict alone; None when it follows from quiescence or a limit. `lost`
-    says why, by name, robots were lost whose loss broke the search off. `findings` is what robots know of the whole.
+    `witness` is the robot that concluded the verdict alone, or None if the verdict follows from quiescence or a limit.
+    `lost` maps the robots whose loss stopped the search to the reasons. `findings` is the robots' knowledge about the
+    team.
     """
 
     verdict: Verdict
@@ -62,7 +63,7 @@ class SearchResult:
         parts: Iterable[Metrics],
         wall_s: float,
     ) -> Self:
-        """Join the robots' metrics: sums, and for NCCCs the largest of their clocks."""
+        """Combine the metrics of the robots: the sums, but for NCCCs the maximum of the robots' clocks."""
         parts = list(parts)
         total = reduce(add, parts, Metrics())
         ncccs = max((part.ncccs for part in parts), default=0)

@@ -1,7 +1,7 @@
-"""The state of one search as its master sees it, independent of the transport. Pure.
+"""The state of a search as seen by its master, independent of the transport. Pure.
 
-It contains the ready robots, the counters, the lost robots, the verdict of the search, and the robots' reports. The
-runtimes of processes and of the network use the same state; the network's also audits the robots' messages
+The state contains the ready robots, the counters, the lost robots, the verdict of the search, and the robots' reports.
+The process and network runtimes use the same state; the network runtime also audits the robots' messages
 (`network/audited_state.py`).
 """
 
@@ -25,13 +25,14 @@ class SearchState:
 
     Attributes:
         counters: The robots' message counters, and the open wave.
-        lost: The reasons of losses in this search, by robot.
-        verdict: The verdict of the search; None until it has ended.
-        witness: The robot that concluded the verdict; None when quiescence or a limit ended the search.
+        lost: The reasons for losses in this search, by robot.
+        verdict: The verdict of the search; None until the search has ended.
+        witness: The robot that concluded the verdict; None if the search ended by quiescence or a limit.
         max_messages: The limit on messages, if there is one.
-        ordered: The robots were ordered to start.
-        searching: The robots search now.
-        lossy: Messages are lost, and the protocol bears that: waiting robots continue without them, until none does.
+        ordered: Whether the robots were ordered to start.
+        searching: Whether the robots are searching now.
+        lossy: Whether messages are lost and the protocol tolerates this: waiting robots continue without the lost
+            messages, until no robot can continue.
     """
 
     def __init__(
@@ -55,9 +56,9 @@ class SearchState:
         self._snapshots = SnapshotRound()
 
     def handle(self, name: str, message: EpochMessage) -> str:
-        """Handle a control message of the robot `name`; return the reason why it is invalid, or an empty text.
+        """Handle a control message from the robot `name`. Return why the message is invalid, or an empty text.
 
-        Late messages of another search, and messages of lost robots, are ignored.
+        Late messages from another search, and messages from lost robots, are ignored.
         """
         fault = ""
         if message.epoch != self.epoch or name not in self._present:
@@ -84,14 +85,14 @@ class SearchState:
         return ""
 
     def _conclude(self, name: str, verdict: str) -> str:
-        """Record a verdict that the robot `name` concluded alone. The first verdict counts."""
+        """Record a verdict that the robot `name` concluded alone. Only the first verdict counts."""
         fault = self._traits.conclusion_error(verdict)
         if not fault and self.verdict is None:
             self.verdict, self.witness = Verdict(verdict), name
         return fault
 
     def _note_went_on(self, name: str, *, went: bool) -> str:
-        """Record whether a robot has continued; if all have answered and none has, the search is over."""
+        """Record whether a robot has continued. If all have answered and none has continued, the search ends."""
         if name not in self._undecided:
             return "it answered whether it continues, without having been asked"
         self._undecided.discard(name)
@@ -105,15 +106,15 @@ class SearchState:
         return self._snapshots.add(name, snapshot)
 
     def start_snapshot(self) -> int | None:
-        """Return the number of a snapshot to request from all robots; None while another one is pending."""
+        """Return the number of a snapshot to request from all robots, or None while another snapshot is pending."""
         return self._snapshots.open()
 
     def completed_snapshot(self) -> SearchResult | None:
-        """Return the requested snapshot once, when all robots have answered; otherwise None."""
+        """Return the requested snapshot, once, when all robots have answered; otherwise None."""
         return self._snapshots.close(self._present)
 
     def start_continuation(self) -> bool:
-        """Return whether to order all robots to continue: no message is in transit, and some may wait for lost ones."""
+        """Return whether to order all robots to continue: no message is in transit, and robots may wait for lost ones."""
         if not self.lossy or not self.counters.quiescent or self.ended:
             return False
         self.counters.quiescent = False
@@ -125,7 +126,7 @@ class SearchState:
         return ""
 
     def lose(self, name: str, why: str) -> None:
-        """Mark the robot as lost, and discard its report."""
+        """Mark the robot `name` as lost, and discard its report."""
         self.lost.setdefault(name, why)
         self._present.discard(name)
         self._unready.discard(name)
@@ -149,16 +150,16 @@ class SearchState:
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave could show quiescence, or that the message limit is reached."""
+        """Whether a wave could prove quiescence, or show that the message limit is reached."""
         return self.counters.due or (self.max_messages is not None and not self.counters.is_wave_open)
 
     def next_wave(self, *, wanted: bool = False) -> int | None:
         """Return the number of a wave to start now, or None.
 
-        If the last wave has shown quiescence, the verdict is a solution (unless a robot has concluded another one).
+        If the last wave has proven quiescence, the verdict is a solution, unless a robot has concluded another verdict.
 
         Args:
-            wanted: Start a wave unless one is open, as the count of messages is needed.
+            wanted: Start a wave unless one is open, because the message count is needed.
         """
         if self._undecided:
             return None

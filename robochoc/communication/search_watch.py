@@ -1,4 +1,4 @@
-"""Watching a search: the watcher receives snapshots of the robots' values while they continue."""
+"""Watching a search: the watcher receives snapshots of the robots' values while the robots continue."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from robochoc.system.compiling import mypyc_attr
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class SearchWatch(ABC):
-    """Watches a search. Runtimes call `wants_snapshot` now and then, and `receive` with each snapshot."""
+    """Watches a search. Runtimes call `wants_snapshot` from time to time, and `receive` with each snapshot."""
 
     @property
     @abstractmethod
@@ -31,11 +31,11 @@ class SearchWatch(ABC):
 
     @abstractmethod
     def receive(self, snapshot: SearchResult) -> None:
-        """Receive a snapshot. Its verdict is `unknown`, as the search continues."""
+        """Receive a snapshot. Its verdict is `unknown`, because the search continues."""
 
 
 class SnapshotRound:
-    """The robots' answers to `TakeSnapshot`, for one number at a time."""
+    """Collects the robots' answers to `TakeSnapshot`, for one snapshot number at a time."""
 
     def __init__(self) -> None:
         self.number = 0
@@ -43,7 +43,7 @@ class SnapshotRound:
         self._answers: dict[str, RobotSnapshot] = {}
 
     def open(self) -> int | None:
-        """Open a round and return its number; None if another one is open."""
+        """Open a round and return its number, or None if another round is open."""
         if self._open:
             return None
         self._open, self._answers = True, {}
@@ -51,14 +51,14 @@ class SnapshotRound:
         return self.number
 
     def add(self, name: str, answer: RobotSnapshot) -> str:
-        """Add the answer of the robot `name`; return the reason why it is invalid, or an empty text."""
+        """Add the answer from the robot `name`. Return the reason why the answer is invalid, or an empty text."""
         if not self._open or answer.number != self.number or name in self._answers:
             return "it sent a snapshot that was not requested"
         self._answers[name] = answer
         return ""
 
     def close(self, present: Iterable[str]) -> SearchResult | None:
-        """Close the round and return its snapshot if all robots in `present` have answered; otherwise None."""
+        """Close the round and return its snapshot if all robots in `present` have answered; otherwise return None."""
         if not self._open or not self._answers.keys() >= set(present):
             return None
         self._open = False
@@ -73,6 +73,6 @@ class SnapshotRound:
 def snapshot_of(
     assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings], lost_messages: int = 0
 ) -> SearchResult:
-    """Return robots' values and findings at one moment, by name, as the result of a search without a verdict."""
+    """Return the robots' values and findings at one moment as the result of a search without a verdict."""
     metrics = Metrics(lost_messages=lost_messages)
     return SearchResult(Verdict.UNKNOWN, None, dict(assignments), metrics, findings=dict(findings))

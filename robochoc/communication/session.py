@@ -18,12 +18,12 @@ from robochoc.system.compiling import mypyc_attr
 
 
 class Epoch(NamedTuple):
-    """One problem that the team solves, between two changes.
+    """A problem that the team solves between two changes.
 
     Attributes:
         compiled: The team, with compiled domains.
-        invalidated: The results of the previous epoch that no longer hold.
-        restarted: Robots that start without knowledge, even if robots of the same names existed before.
+        invalidated: The results from the previous epoch that no longer hold.
+        restarted: Robots that start without knowledge, even if robots with the same names existed before.
         parameters: The robots' parameters besides the problem.
     """
 
@@ -47,9 +47,9 @@ class Epoch(NamedTuple):
 class Session(ABC):
     """One team and one protocol in one runtime. A context manager.
 
-    `compiled` is the team on which its robots work: first the given `team` (compiled without a solver unless it already
-    is), and after each `change` the team of that epoch. `starts_fresh`: robots keep no knowledge of the previous epoch,
-    even if their protocol could. `watch` receives snapshots during a search (None: no snapshots are made).
+    `compiled` is the team that the robots use: first the given `team` (compiled without a solver unless it is already
+    compiled), and after each `change` the team of that epoch. `starts_fresh`: robots keep no knowledge of the previous
+    epoch, even if their protocol could. `watch` receives snapshots during a search (None: no snapshots).
     """
 
     starts_fresh: bool = False
@@ -59,25 +59,26 @@ class Session(ABC):
         self.compiled = ensure_compiled(team)
 
     def usable_team(self, team: Team) -> Team:
-        """Return the part of `team`, a changed version of the present team, with which the robots can continue."""
+        """Return the part of `team`, a changed version of the current team, with which the robots can continue."""
         return team
 
     @property
     @abstractmethod
     def lossless(self) -> bool:
-        """Whether no message of the previous search was lost: it became quiescent, or there was none."""
+        """Whether no message was lost in the previous search: it became quiescent, or there was no previous search."""
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
-        """Search until there is a verdict, for at most `timeout` seconds or (about) `messages` messages.
+        """Search until there is a verdict, for at most `timeout` seconds or about `messages` messages.
 
-        If a limit is reached first, the verdict is `unknown`. The metrics are those of this search. Robots start only
-        when all are ready, as the paper's master orders the start. Raises `RobotsLostError` where robots can be lost.
+        If a limit is reached first, the verdict is `unknown`. The metrics cover this search only. Robots start only
+        when all robots are ready, like in the paper, where the master orders the start. Raises `RobotsLostError` if the
+        runtime can lose robots.
         """
 
     @abstractmethod
     def change(self, epoch: Epoch) -> None:
-        """Give every robot its part of the changed problem, for the next `search`. Raises as `search`."""
+        """Pass to every robot its part of the changed problem, for the next `search`. Raises the errors of `search`."""
 
     @abstractmethod
     def close(self) -> None:

@@ -1,6 +1,6 @@
 """The channel filter `signed`: everybody can read a message, but only its sender can have written it.
 
-Ed25519 (RFC 8032) over sender, receiver, context and content. 64 more bytes a message.
+Each message contains an Ed25519 signature (RFC 8032) of sender, receiver, context and content. It adds 64 bytes.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ _SIGNATURE_BYTES = 64
 
 
 class Signed(ChannelFilter):
-    """Puts a signature before the content."""
+    """Signs the content, and prepends the signature."""
 
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
         """See `ChannelFilter.seal`."""
