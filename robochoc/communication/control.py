@@ -45,7 +45,7 @@ class OpenQueues(EpochMessage, frozen=True):
 
 
 class Counters(EpochMessage, frozen=True):
-    """The robot's counts of protocol messages in this epoch: the answer to `wave`, or (0) unasked, from an idle robot."""
+    """The robot's counts of protocol messages in this epoch: the answer to `wave`, or (0) sent when it is idle."""
 
     wave: int
     sent: int
@@ -65,7 +65,7 @@ class WentOn(EpochMessage, frozen=True):
 
 
 class RobotSnapshot(EpochMessage, frozen=True, tag="Snapshot"):
-    """The answer to `TakeSnapshot`: the robot's values, findings and number of dropped messages. The robot continues."""
+    """The answer to `TakeSnapshot`: values, findings and the number of dropped messages. The robot continues."""
 
     number: int
     assignment: dict[str, int]

@@ -114,7 +114,7 @@ class SearchState:
         return self._snapshots.close(self._present)
 
     def start_continuation(self) -> bool:
-        """Return whether to order all robots to continue: no message is in transit, and robots may wait for lost ones."""
+        """Return whether to order all robots to continue: no message is in transit, and some may be lost."""
         if not self.lossy or not self.counters.quiescent or self.ended:
             return False
         self.counters.quiescent = False

@@ -1,1 +1,1 @@
-"""The simulator: a whole team in one thread, deterministic from a seed; its schedules and channel models."""
+"""The simulator: a whole team in one thread, deterministic for a given seed, with its schedules and channel models."""

@@ -1,9 +1,9 @@
-"""Channel models: the time that a message takes by radio.
+"""Channel models: the time that a message needs by radio.
 
-A message is cut into frames. Each frame needs time on the air according to its size, and may be lost and sent again;
-the rest is latency: queues, access to the medium, relays. The loss of a frame only delays a message: every message
-arrives, and none overtakes another one of the same channel, as protocols require. Whole messages are lost only by
-`message_loss` and the models in `loss_models.py`. Sources of the figures: docs/guides/channels.md.
+A message is divided into frames. Each frame needs time on the air according to its size, and may be lost and sent
+again. The remaining time is latency: queues, access to the medium, relays. The loss of a frame only delays a message:
+every message arrives, and no message overtakes another one in the same channel, as protocols require. Whole messages
+are lost only by `message_loss` and the models in `loss_models.py`. Sources of the numbers: docs/guides/channels.md.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeE
 from robochoc.formats.toml import convert, toml_tables
 
 LARGEST_FILE = 2**16
-"""The largest size of a channel's file, in bytes."""
+"""The largest size of a channel file, in bytes."""
 NS_PER_MS, NS_PER_US, NS_PER_S = 10**6, 10**3, 10**9
 
 _MOST_MS = 60_000
@@ -53,15 +53,15 @@ _RANGES = {
     "check_ns": (0, NS_PER_S),
     "unit_m": (0.001, 10**6),
 }
-"""The accepted range of each value. Other values are certainly mistakes, and might prevent the end of a run."""
+"""The accepted range of each value. Values outside are certainly mistakes, and might prevent the run from ending."""
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
 
 class Crossing(NamedTuple):
-    """The time that one message takes, in nanoseconds.
+    """The times that a message needs, in nanoseconds.
 
-    `air`: time on the air of all its frames, retransmissions included; `waiting`: time until losses of frames were
-    detected; `latency`: the rest.
+    `air`: the time on the air of all its frames, including retransmissions; `waiting`: the time until losses of frames
+    were detected; `latency`: the remaining time.
     """
 
     air: int
@@ -70,21 +70,21 @@ class Crossing(NamedTuple):
 
 
 class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A model of the channel between any two robots. All random draws come from the caller's generator.
+    """A model of the channel between any two robots. All random numbers come from the caller's generator.
 
     `latency_ms` is the median of a log-normal distribution that begins at `minimum_ms` and has the shape `sigma` (the
-    jitter): never negative, skewed, with a long tail, and two percentiles of a measurement are enough to fit it. A
-    frame carries up to `payload_bytes` of the message and `overhead_bytes` of headers, at `bandwidth_bps` bits a
-    second (None: bytes take no time), and `frame_us` besides (preamble, spaces between frames, acknowledgement). Each
-    transmission of a frame is lost with the probability `loss`; it is sent again after `timeout_ms`, which is
-    multiplied by `backoff` each time up to `longest_timeout_ms`. If the medium is `shared`, one robot is on the air at
-    a time; if not, each robot sends one message at a time, independently of the others. `check_ns` is the time of one
-    constraint check in nanoseconds.
+    jitter). It is never negative, skewed, with a long tail, and two percentiles of a measurement are enough to fit it.
+    A frame carries up to `payload_bytes` of the message and `overhead_bytes` of headers, at `bandwidth_bps` bits a
+    second (None: bytes take no time), and needs `frame_us` in addition (preamble, spaces between frames,
+    acknowledgement). Each transmission of a frame is lost with the probability `loss`. The frame is sent again after
+    `timeout_ms`, which is multiplied by `backoff` each time up to `longest_timeout_ms`. If the medium is `shared`, only
+    one robot is on the air at a time; otherwise each robot sends one message at a time, independently of the others.
+    `check_ns` is the time for one constraint check, in nanoseconds.
 
-    With the probability `message_loss` a message is lost for good: it is not sent again. In addition, messages are
-    lost by the distance of sender and receiver, in units of `unit_m` metres: by `path_loss`, or by `distance_loss`,
-    pairs of a distance in metres and a probability. `positions` are the places of robots. Messages are also lost in
-    `bursts`. `links` are links with their own probabilities. Raises `ValueError` for invalid values.
+    With the probability `message_loss` a message is permanently lost: it is not sent again. In addition, messages are
+    lost depending on the distance between sender and receiver, in units of `unit_m` metres: by `path_loss`, or by
+    `distance_loss`, pairs of a distance in metres and a probability. `positions` are the positions of robots. Messages
+    are also lost in `bursts`. `links` are links with their own probabilities. Raises `ValueError` for invalid values.
     """
 
     name: str
@@ -130,24 +130,24 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     @property
     def by_distance(self) -> bool:
-        """Whether the loss of messages depends on the distance of sender and receiver."""
+        """Whether message loss depends on the distance between sender and receiver."""
         return self.path_loss is not None or bool(self.distance_loss)
 
     def loss_at(self, distance: float) -> float:
-        """Return the probability that a message is lost because of this distance, in units of coordinates."""
+        """Return the probability that a message is lost because of this distance, which is in units of coordinates."""
         if self.path_loss is not None:
             return self.path_loss.loss_at(distance * self.unit_m)
         return loss_by_table(self.distance_loss, distance * self.unit_m) if self.distance_loss else 0.0
 
     @property
     def most_loss(self) -> float:
-        """The largest long-run probability, over all links, that a message is lost for good."""
+        """The largest long-run probability in any link that a message is permanently lost."""
         far = 1.0 if self.path_loss else max([loss for _, loss in self.distance_loss], default=0.0)
         usual = either(either(self.message_loss, far), self.bursts.mean if self.bursts else 0.0)
         return max([usual, *[link.loss for link in self.links]])
 
     def crossing(self, size: int, chance: Random) -> Crossing:
-        """Draw the times of a message of `size` bytes; an empty message has one frame, too."""
+        """Draw the times of a message of `size` bytes. Even an empty message has one frame."""
         whole, rest = divmod(size, self.payload_bytes)
         full, last = self._air(self.payload_bytes), self._air(rest)
         frames = whole + 1 if rest or not whole else whole
@@ -167,7 +167,7 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         return bytes_ns + round(self.frame_us * NS_PER_US)
 
     def _latency(self, chance: Random) -> int:
-        """Return one draw from the log-normal distribution (always one, so other fields do not shift later draws)."""
+        """Draw from the log-normal distribution, exactly once, so that other fields do not shift later draws."""
         minimum = round(self.minimum_ms * NS_PER_MS)
         median = round(self.latency_ms * NS_PER_MS) - minimum
         return minimum + round(median * chance.lognormvariate(0, self.sigma))
@@ -198,21 +198,21 @@ _SHIPPED = (
     ),
 )  # fmt: skip
 CHANNELS = MappingProxyType({model.name: model for model in _SHIPPED})
-"""The models that are shipped, by name."""
+"""The channel models included in robochoc, by name."""
 
 
 _HINT = "the page Channels of the documentation shows all fields"
 
 
 def read_channel(path: Path) -> ChannelModel:
-    """Return the model in the TOML file at `path`; its default name is the stem of the path.
+    """Return the model in the TOML file at `path`. Its default name is the stem of the path.
 
     Raises `InvalidInputError`.
     """
     text = _text(path)
     try:
         fields = toml_tables(text)
-    except ValueError as wrong:  # also numbers of too many digits
+    except ValueError as wrong:  # including numbers with too many digits
         raise _invalid(path, f"is not a valid TOML file: {shortened(str(wrong))}") from None
     fields.setdefault("name", path.stem)
     if fields["name"] in (*CHANNELS,):

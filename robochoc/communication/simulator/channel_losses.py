@@ -1,4 +1,4 @@
-"""Draws which messages are lost for good under a channel model: by distance, in bursts, and on named links."""
+"""Draws the messages that are permanently lost under a channel model: by distance, in bursts, and on named links."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.model.problem import Team
 
 
 class ChannelLosses(Losses):
-    """Draws which messages are lost by the loss models of `channel`."""
+    """Draws lost messages by the loss models in `channel`."""
 
     def __init__(self, channel: ChannelModel, seed: int) -> None:
         super().__init__(channel.message_loss, seed)
@@ -31,21 +31,21 @@ class ChannelLosses(Losses):
         self._places.clear()
 
     def _loss_of(self, link: Link) -> float:
-        """See `Losses._loss_of`: all causes of a loss are independent of each other."""
+        """See `Losses._loss_of`. All causes of loss are independent."""
         if link in self._named:
             return self._named[link]
         usual = either(self._probability, self._loss_by_distance(link))
         return usual if self._channel.bursts is None else either(usual, self._burst_of(link).next())
 
     def _loss_by_distance(self, link: Link) -> float:
-        """Return the loss by distance; 0 if a robot has no position."""
+        """Return the probability of a loss by distance; 0 if a robot has no position."""
         if not self._channel.by_distance:
             return 0.0
         sender, receiver = map(self._place_of, link)
         return 0.0 if sender is None or receiver is None else self._channel.loss_at(distance(sender, receiver))
 
     def _place_of(self, name: str) -> Point | None:
-        """Return the position of a robot: the channel's, or the one that follows from its present values."""
+        """Return the position of a robot: from the channel model, or else from the robot's current values."""
         place = self._channel.positions.get(name)
         if place is not None or self._team is None or name not in self._team:
             return place
@@ -62,7 +62,7 @@ class ChannelLosses(Losses):
 
 
 class _Burst:
-    """The state of one link: in a burst, or not."""
+    """The burst state of one link."""
 
     def __init__(self, channel: ChannelModel, seed: str) -> None:
         self._bursts = channel.bursts
@@ -70,7 +70,7 @@ class _Burst:
         self._is_on = False
 
     def next(self) -> float:
-        """Advance to the next message; return the probability that a burst loses it."""
+        """Advance to the next message, and return the probability that it is lost in a burst."""
         if self._bursts is None:
             return 0.0
         drawn = self._chance.random()

@@ -1,6 +1,6 @@
-"""Loss models of links: by the distance of two robots, in bursts, and on named links.
+"""Loss models for links: by the distance between two robots, in bursts, and on named links.
 
-They are the fields of a channel model's file (docs/guides/channels.md); `channel_losses.py` draws losses by them.
+They are the fields in a channel model's file (docs/guides/channels.md). `channel_losses.py` uses them to draw losses.
 """
 
 from __future__ import annotations
@@ -17,9 +17,9 @@ from robochoc.model.problem import Robot
 
 Point = tuple[float, ...]
 SPEED_OF_LIGHT = 299_792_458.0
-"""Metres a second."""
+"""The speed of light in vacuum, in metres a second."""
 FARTHEST = 10**9
-"""The largest accepted coordinate or distance: larger ones are certainly mistakes."""
+"""The largest accepted coordinate or distance. Larger values are certainly mistakes."""
 
 _PATH_LOSS = {
     "power_dbm": (-100, 100),
@@ -33,11 +33,12 @@ _MOST_PAIRS = 1000
 
 
 class PathLoss(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Log-distance path loss with log-normal shadowing, and a receiver with a threshold (Rappaport 2002, section 4.9).
+    """Log-distance path loss with log-normal shadowing, and a receiver threshold (Rappaport 2002, section 4.9).
 
-    The sender radiates `power_dbm` towards the receiver, the gains of both antennas included. The loss is that of free
-    space up to `reference_m` at `frequency_hz` (Friis), and beyond it 10 `exponent` dB for each factor of 10; an
-    `exponent` of 2 is free space. Obstacles add a normally distributed number of dB with the standard deviation
+    The sender radiates `power_dbm` towards the receiver, including the gains of both antennas. Up to `reference_m` the
+    loss is the free-space loss at `frequency_hz` (Friis); beyond `reference_m` it grows by 10 `exponent` dB for each
+    factor of 10. In free space the `exponent` is 2. Obstacles add a normally distributed number of dB with the standard
+    deviation
     `shadowing_db`, drawn for each message. A message that arrives with less than `sensitivity_dbm` is lost. Raises
     `ValueError` for invalid values.
     """
@@ -69,10 +70,10 @@ class PathLoss(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
 
 
 class Bursts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Losses in bursts: a channel with two states (Gilbert 1960; Elliott 1963), of which each link has its own.
+    """Losses in bursts: a channel with two states (Gilbert 1960; Elliott 1963). Each link has its own state.
 
-    Before each message of a link a burst begins with the probability `begin`, or ends with the probability `end`. In a
-    burst a message is lost with the probability `loss`, in addition to other losses. All links begin without a burst.
+    Before each message on a link, a burst begins with the probability `begin`, or ends with the probability `end`. In a
+    burst a message is lost with the probability `loss`, in addition to other losses. Initially no link is in a burst.
     Raises `ValueError` for invalid values.
     """
 
@@ -81,21 +82,21 @@ class Bursts(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     loss: float
 
     def __post_init__(self) -> None:
-        """Refuse values out of range; every burst must end at some time."""
+        """Refuse values out of range. Every burst must be able to end."""
         refuse_beyond("begin", self.begin, 0, 1)
         refuse_beyond("end", self.end, 0.001, 1)
         refuse_beyond("loss", self.loss, 0, 1)
 
     @property
     def mean(self) -> float:
-        """The long-run share of messages that are lost in bursts."""
+        """The long-run share of messages lost in bursts."""
         return self.loss * self.begin / (self.begin + self.end)
 
 
 class NamedLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A link with its own loss, which replaces all others: `between` two robots, in both directions.
+    """A link with its own loss, which replaces all other losses: `between` two robots, in both directions.
 
-    `one_way`: only from the first to the second. Raises `ValueError` for invalid values.
+    `one_way`: only from the first robot to the second. Raises `ValueError` for invalid values.
     """
 
     between: tuple[str, str]
@@ -103,24 +104,24 @@ class NamedLink(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     one_way: bool = False
 
     def __post_init__(self) -> None:
-        """Refuse a link of a robot with itself, and an invalid probability."""
+        """Refuse a link from a robot to itself, and an invalid probability."""
         if self.between[0] == self.between[1]:
             raise ValueError(f"between: expected two robots, got {shortened(self.between[0])} twice")
         refuse_beyond("loss", self.loss, 0, 1)
 
     @property
     def directions(self) -> tuple[tuple[str, str], ...]:
-        """The pairs of sender and receiver."""
+        """The pairs of sender and receiver on this link."""
         return (self.between,) if self.one_way else (self.between, self.between[::-1])
 
 
 def either(one: float, other: float) -> float:
-    """Return the probability that at least one of two independent events happens."""
+    """Return the probability that at least one of two independent events occurs."""
     return one + other - one * other
 
 
 def refuse_beyond(field: str, value: float, least: float, most: float) -> None:
-    """Raise `ValueError` for a number that is not from `least` to `most`."""
+    """Raise `ValueError` for a number outside the range from `least` to `most`."""
     if not least <= value <= most:
         raise ValueError(f"{field}: expected a number from {least:,} to {most:,}, got {value:g}")
 
@@ -145,7 +146,7 @@ def refuse_positions(positions: Mapping[str, Point]) -> None:
 
 
 def loss_by_table(pairs: Sequence[tuple[float, float]], distance: float) -> float:
-    """Return the loss at a distance: linear between the `pairs`, constant before and after them."""
+    """Return the loss at a distance. It is interpolated linearly between the `pairs`, and constant outside them."""
     before, loss_before = pairs[0]
     for after, loss in pairs[1:]:
         if distance <= after:
@@ -156,9 +157,9 @@ def loss_by_table(pairs: Sequence[tuple[float, float]], distance: float) -> floa
 
 
 def place_of(robot: Robot, values: Mapping[str, int]) -> Point | None:
-    """Return the position of `robot` under `values`, from its first topic with x and y; None if it has no position.
+    """Return the position of `robot` under `values`, from its first topic with x and y, or None if it has no position.
 
-    A variable without a value counts as having the first value of its domain.
+    A variable without a value is treated as if it had the first value in its domain.
     """
     first = {variable.name: next(iter(variable.domain), 0) for variable in robot.variables}
     values = {**first, **values}
@@ -170,17 +171,17 @@ def place_of(robot: Robot, values: Mapping[str, int]) -> Point | None:
 
 
 def has_place(robot: Robot) -> bool:
-    """Return whether a topic of `robot` has x and y."""
+    """Return whether a topic of `robot` has x and y coordinates."""
     return any(topic.x is not None and topic.y is not None for topic in robot.topics)
 
 
 def _evaluated(axes: Sequence[Expression], values: Mapping[str, int]) -> Point | None:
     try:
         return tuple([float(evaluate(axis, values)) for axis in axes])
-    except UndefinedValueError:  # a division by zero, or the like
+    except UndefinedValueError:  # for example a division by zero
         return None
 
 
 def distance(one: Point, other: Point) -> float:
-    """Return the distance of two points; a missing third coordinate is 0."""
+    """Return the distance between two points. A missing third coordinate counts as 0."""
     return math.dist((*one, 0.0)[:3], (*other, 0.0)[:3])

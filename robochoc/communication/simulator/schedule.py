@@ -1,7 +1,7 @@
-"""Schedules: the messages in transit in a simulator, and the order of their arrival.
+"""Schedules: store the messages in transit in a simulator, and decide the order in which they arrive.
 
-Channels are FIFO: between two robots no message overtakes another. Messages that reach a robot together are one packet.
-Every schedule is deterministic from its seed.
+Channels are FIFO: no message between two robots overtakes another one. Messages that reach a robot together form one
+packet. Every schedule is deterministic for a given seed.
 """
 
 from __future__ import annotations
@@ -17,69 +17,69 @@ from robochoc.protocols.message import Envelope
 from robochoc.system.compiling import mypyc_attr
 
 NEVER: Final = -1
-"""Stands for no turn."""
+"""Means that no turn is scheduled."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Schedule(ABC):
-    """The messages in transit. `now` is the time, in the schedule's unit."""
+    """Stores the messages in transit. `now` is the time, in the schedule's unit."""
 
     now: int = 0
 
     @abstractmethod
     def put(self, envelope: Envelope, checks: int = 0) -> None:
-        """Send `envelope`, written `checks` constraint checks after its sender had started to handle its packet."""
+        """Send `envelope`, written `checks` constraint checks after its sender started to handle its packet."""
 
     @abstractmethod
     def get(self) -> Sequence[Envelope]:
-        """Return the next packet, all for one robot, in the order of each channel; empty if none is in transit."""
+        """Return the next packet for one robot, in the order of each channel; empty if no message is in transit."""
 
     @abstractmethod
     def clear(self) -> None:
         """Drop all messages in transit, and reset all clocks."""
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: B027 - not every schedule has to know
-        """Note that `robot` has handled its packet (or its start), and that all its messages are put.
+        """Record that `robot` has handled its packet (or its start), and that all its messages were put.
 
-        `clock` is its NCCC clock, `checks` the number of constraint checks that this step took.
+        `clock` is its NCCC clock, `checks` the number of constraint checks in this step.
         """
 
     def lose(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: B027 - not every schedule has to know
-        """Send `envelope`, as `put` does, but lose it in transit."""
+        """Send `envelope` like `put`, but lose it in transit."""
 
     def wait(self) -> None:  # noqa: B027 - not every schedule has to know
         """Advance the time until robots notice that no more messages arrive."""
 
     def time(self, checks: int) -> float:  # noqa: ARG002 - not every schedule has to know
-        """Return the time of an event, this number of checks after a robot started to handle its packet."""
+        """Return the time of an event `checks` constraint checks after a robot started to handle its packet."""
         return float(self.now)
 
     @property
     def elapsed_s(self) -> float:
-        """Simulated seconds until the last robot had finished; 0 if time is not counted in seconds."""
+        """The simulated seconds until the last robot finished; 0 if time is not counted in seconds."""
         return 0.0
 
     @property
     def cycles(self) -> int:
-        """The number of started cycles; 0 if time is not counted in cycles."""
+        """The number of cycles started; 0 if time is not counted in cycles."""
         return 0
 
     @property
     def next_cycle(self) -> int:
-        """The cycle in which the next packet arrives; 0 if there is none, or time is not counted in cycles."""
+        """The cycle in which the next packet arrives; 0 if there is no packet, or time is not counted in cycles."""
         return 0
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Concurrent(Schedule):
-    """All robots compute at the same time, and time is counted in constraint checks. The default.
+    """All robots compute at the same time, and time is counted in constraint checks. This is the default schedule.
 
-    The asynchronous message-delaying simulator of Zivan and Meisels (2006): a robot is busy for as long as its
-    checks take, then receives all messages that have arrived meanwhile. A message leaves at the check at which it was
-    written (its clock), so it may arrive before its sender is free again. Its delay is a number of checks drawn from
-    0..`longest`, which also advances the receiver's NCCC clock. Ties are broken by the seed.
+    This is the asynchronous message-delaying simulator of Zivan and Meisels (2006): a robot is busy for as long as its
+    checks take, and then receives all messages that have arrived meanwhile. A message leaves at the check at which it
+    was written (its clock), so it may arrive before its sender is free again. Its delay, in checks, is drawn from
+    0..`longest` and also advances the receiver's NCCC clock. Ties are broken by the seed.
 
-    With `one_by_one` a robot receives one message at a time, and settles after each.
+    With `one_by_one` a robot receives one message at a time, and settles after each message.
     """
 
     def __init__(self, seed: int, longest: int = 0, *, one_by_one: bool = False) -> None:
@@ -89,12 +89,12 @@ class Concurrent(Schedule):
         self._said = 0
         self._readers: dict[str, _Reader] = {}
         self._times: list[int] = []
-        """The times of turns, as a heap without duplicates."""
+        """The times of turns, in a heap without duplicates."""
         self._turns: dict[int, list[tuple[float, str]]] = {}
-        """For each time, a heap of the robots with a turn, by lot: many small heaps are faster than a large one."""
+        """For each time, a heap of the robots with a turn, in random order. Many small heaps are faster than a large one."""
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
-        """Send `envelope` with a random delay, to arrive not earlier than its predecessor in the same channel."""
+        """Send `envelope` with a random delay. It arrives no earlier than its predecessor in the same channel."""
         sender, receiver, _, sent_at = envelope
         reader = self._readers.get(receiver)
         if reader is None:
@@ -122,7 +122,7 @@ class Concurrent(Schedule):
             if not turns:
                 heapq.heappop(self._times)
                 del self._turns[due]
-            if reader.due != due:  # it has had its turn, or has been given another
+            if reader.due != due:  # the robot has had this turn, or its turn was moved
                 continue
             reader.due = NEVER
             inbox = reader.inbox
@@ -141,7 +141,7 @@ class Concurrent(Schedule):
         self.now = 0
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - they are in the clock
-        """Note that the robot is busy until `clock`."""
+        """Record that the robot is busy until `clock`."""
         reader = self._readers.get(robot)
         if reader is None:
             reader = self._readers[robot] = _Reader(robot)
@@ -150,7 +150,7 @@ class Concurrent(Schedule):
             self._note(reader, reader.inbox[0][0])
 
     def _note(self, reader: _Reader, arrival: int) -> None:
-        """Schedule the robot's turn: once its first message has arrived and it is not busy. It has at most one turn."""
+        """Schedule the robot's turn, once its first message has arrived and it is not busy. A robot has at most one turn."""
         due, free = arrival, reader.busy_until
         if free > due:  # noqa: PLR1730 - faster
             due = free
@@ -167,7 +167,7 @@ class Concurrent(Schedule):
 
 
 class _Reader:
-    """The state of a robot in `Concurrent`: its inbox, until when it is busy, and the time of its turn."""
+    """The state of a robot in `Concurrent`: its inbox, the end of its busy time, and the time of its turn."""
 
     __slots__ = ("busy_until", "due", "inbox", "last_arrival", "name")
 
@@ -181,11 +181,11 @@ class _Reader:
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Cycles(Schedule):
-    """All robots work in step: in each cycle, each receives all messages sent to it in the previous cycle.
+    """All robots work in lockstep: in each cycle, each robot receives all messages sent to it in the previous cycle.
 
-    The synchronous simulator by which Yokoo, Durfee, Ishida and Kuwabara (1998, section 6) and Modi, Shen, Tambe and
-    Yokoo (2005, section 6) count cycles. The start is not a cycle. The order of robots within a cycle is drawn from the
-    seed; it does not influence any protocol.
+    This is the synchronous simulator with which Yokoo, Durfee, Ishida and Kuwabara (1998, section 6) and Modi, Shen,
+    Tambe and Yokoo (2005, section 6) count cycles. The start is not a cycle. The order of robots within a cycle is
+    drawn from the seed; it does not influence any protocol.
     """
 
     def __init__(self, seed: int) -> None:
@@ -195,12 +195,12 @@ class Cycles(Schedule):
 
     @property
     def cycles(self) -> int:
-        """The number of started cycles."""
+        """The number of cycles started."""
         return self.now
 
     @property
     def next_cycle(self) -> int:
-        """The cycle in which the next packet arrives; 0 if there is none."""
+        """The cycle in which the next packet arrives; 0 if there is no packet."""
         return self.now if self._packets else self.now + 1 if self._sent else 0
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - a cycle has no length
@@ -208,7 +208,7 @@ class Cycles(Schedule):
         self._sent.setdefault(envelope.receiver, []).append(envelope)
 
     def get(self) -> Sequence[Envelope]:
-        """Return the messages to a robot that has not had its turn in this cycle."""
+        """Return the messages to a robot that has not yet had its turn in this cycle."""
         if not self._packets and self._sent:
             self.now += 1
             self._packets = list(self._sent.values())
@@ -217,7 +217,7 @@ class Cycles(Schedule):
         return self._packets.pop() if self._packets else ()
 
     def clear(self) -> None:
-        """Drop all messages in transit, and count cycles from 0 again."""
+        """Drop all messages in transit, and restart the count of cycles at 0."""
         self._packets.clear()
         self._sent.clear()
         self.now = 0
@@ -225,9 +225,9 @@ class Cycles(Schedule):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class RandomChannels(Schedule):
-    """Any channel may be next, so any message may be delayed for any time: a hard test, not a model. A packet a step.
+    """Any channel may be next, so any message may be delayed for any time: a hard test, not a model.
 
-    A packet is the head of a channel drawn from all, and, repeatedly with probability one half, the head of another
+    In each step one packet arrives: the head of a random channel, and, repeatedly with probability 1/2, the head of another
     channel to the same robot.
     """
 
@@ -237,7 +237,7 @@ class RandomChannels(Schedule):
         self._waiting: list[tuple[str, str]] = []
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - there is no time
-        """Append to the channel from sender to receiver."""
+        """Append `envelope` to the channel from its sender to its receiver."""
         edge = (envelope.sender, envelope.receiver)
         channel = self._channels.setdefault(edge, deque())
         if not channel:
@@ -245,7 +245,7 @@ class RandomChannels(Schedule):
         channel.append(envelope)
 
     def get(self) -> Sequence[Envelope]:
-        """Draw a channel, and perhaps more channels to the same robot."""
+        """Draw a channel, and possibly more channels to the same robot."""
         if not self._waiting:
             return ()
         self.now += 1
@@ -263,7 +263,7 @@ class RandomChannels(Schedule):
         self._waiting.clear()
 
     def _take(self, place: int) -> Envelope:
-        """Remove and return the head of the waiting channel at `place`; an empty channel is removed from the list."""
+        """Remove and return the head of the channel at index `place`. An empty channel is removed from the list."""
         edge = self._waiting[place]
         channel = self._channels[edge]
         head = channel.popleft()

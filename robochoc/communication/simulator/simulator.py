@@ -1,7 +1,7 @@
-"""The simulator: the whole team in one thread, deterministic from a seed.
+"""The simulator: runs the whole team in one thread, deterministically for a given seed.
 
 A schedule decides which messages arrive next (`communication/simulator/schedule.py`). The search is over when no
-message is in transit and no robot sends one.
+message is in transit and no robot sends another one.
 """
 
 from __future__ import annotations
@@ -32,20 +32,20 @@ from robochoc.system.stopping import stop_requested
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 PROGRESS_EVERY = 256
-"""Packets between two reports of progress."""
+"""The number of packets between two progress reports."""
 PROGRESS_S = 0.25
-"""Seconds after which the progress is reported in any case, as some packets take long."""
+"""The longest time between two progress reports, in seconds, since some packets take long."""
 LONGEST_STEP_S = 0.3
-"""Seconds after the time limit at which a step is interrupted."""
+"""The time after the time limit at which a step is interrupted, in seconds."""
 
 
 @dataclass(frozen=True)
 class EffortLimits:
-    """Limits on the total effort of all searches of a simulation. None: no limit.
+    """Limits on the total effort in all searches of a simulation. None: no limit.
 
     Attributes:
         ncccs: Non-concurrent constraint checks.
-        cycles: Cycles, where the schedule counts them.
+        cycles: Cycles, if the schedule counts them.
     """
 
     ncccs: int | None = None
@@ -57,22 +57,22 @@ NO_LIMITS = EffortLimits()
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Simulation(Session):
-    """One team in this thread.
+    """Simulates one team in the calling thread.
 
     Args:
-        team: The team, compiled or not.
-        protocol: The protocol that its robots run.
+        team: The team, whether compiled or not.
+        protocol: The protocol of the robots.
         schedule: Decides which messages arrive next.
         observer: Receives all events, with the schedule's time.
-        progress: Receives the count of messages now and then.
+        progress: Receives the message count from time to time.
         parameters: The robots' parameters besides the problem.
-        limits: The limits of the searches' effort, checked after each packet.
+        limits: The limits on the effort of the searches, checked after each packet.
         deadline: The end of the run's time, on the monotonic clock.
         bounds: Whether the observer receives lower bounds, too.
-        losses: Draws which messages are lost; None if no message is.
+        losses: Draws the messages that are lost; None if no messages are lost.
 
     Raises:
-        TeamCompileTimeoutError: if the deadline comes before all robots are set up; `change` raises it as well.
+        TeamCompileTimeoutError: if the deadline passes before all robots are set up. `change` raises it as well.
     """
 
     def __init__(  # noqa: PLR0913 - keyword options
@@ -121,11 +121,11 @@ class Simulation(Session):
         return self._lossless
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
-        """See `Session.search`; a limit on messages is checked after each packet."""
+        """See `Session.search`. The limit on messages is checked after each packet."""
         began = time.monotonic()
         if self._verdict is None:
             end = None if timeout is None else began + timeout + LONGEST_STEP_S
-            # Robots' problems are most of all objects, and are not garbage.
+            # Most objects belong to the robots' problems, and are not garbage.
             with garbage_frozen(), collection_seldom(), suppress(TimeLimitError):
                 computed_by(end, self._play, began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
@@ -165,7 +165,7 @@ class Simulation(Session):
         """Do nothing: a simulation has no resources to release."""
 
     def _check_time(self, name: str) -> None:
-        """Raise `TeamCompileTimeoutError` if the time was over before the robot `name` could be set up."""
+        """Raise `TeamCompileTimeoutError` if the deadline passed before the robot `name` was set up."""
         if is_past(self._deadline):
             raise TeamCompileTimeoutError(f"the time was over before {name} knew its problem")
 
@@ -183,13 +183,13 @@ class Simulation(Session):
         return host
 
     def _order_of(self, part: AgentProblem) -> PriorityOrder:
-        """Return the order of an epoch's robots: one shared object, as its tree is as large as the team."""
+        """Return the order of an epoch's robots. They share one object, because its tree is as large as the team."""
         if self._order is None or self._order.rank is not part.known.rank:
             self._order = order_of(part)
         return self._order
 
     def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
-        """Start every robot, then deliver packet by packet."""
+        """Start every robot, then deliver one packet after the other."""
         lossless, self._lossless = self._lossless, False
         for host in self._hosts.values():
             self._checks = host.checks
@@ -225,9 +225,9 @@ class Simulation(Session):
                 self._verdict, self._lossless = Verdict.SOLUTION, self._losses is None or not self._losses.lost
 
     def _handle(self, host: Host, packet: Sequence[Envelope], losses: Losses) -> list[Envelope]:
-        """Let `host` handle a packet after possibly lost messages; return its messages.
+        """Let `host` handle a packet, before which messages may have been lost, and return its messages.
 
-        If its protocol cannot continue without the lost messages, the search is over.
+        If the protocol cannot continue without the lost messages, the search is over.
         """
         replies = host.handle_lossy(packet, losses.missing_before, lost=losses.lost > 0)
         if replies is None:
@@ -236,7 +236,7 @@ class Simulation(Session):
         return replies
 
     def _go_on(self) -> bool:
-        """Let all robots continue without the messages they wait for; return whether one does."""
+        """Let all robots continue without the messages that they wait for. Return whether any robot continues."""
         if self._losses is None or not self._protocol.traits.bears_loss:
             return False
         self._schedule.wait()
@@ -256,7 +256,7 @@ class Simulation(Session):
         return stop_requested()
 
     def _watched(self, watch: SearchWatch) -> bool:
-        """Give `watch` a snapshot if it is due; return whether the search may stop."""
+        """Pass a snapshot to `watch` if it is due, and return whether the search may stop."""
         if watch.wants_snapshot(time.monotonic()):
             hosts, losses = self._hosts, self._losses
             watch.receive(
@@ -269,7 +269,7 @@ class Simulation(Session):
         return watch.satisfied
 
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
-        """Pass the messages of `host`'s step to the schedule."""
+        """Pass the messages from the last step of `host` to the schedule."""
         schedule, before, clock = self._schedule, self._checks, host.clock
         if envelopes:
             self._sent += len(envelopes)
@@ -285,7 +285,7 @@ class Simulation(Session):
         self._note_verdict(host)
 
     def _values_of(self, name: str) -> dict[str, int]:
-        """Return a robot's present values; empty until it has decided."""
+        """Return a robot's current values; empty until the robot has decided."""
         return self._hosts[name].protocol.assignment
 
     def _time(self, checks: int) -> float:
@@ -299,7 +299,7 @@ class Simulation(Session):
 
 
 def _left(limits: EffortLimits, spent: Metrics) -> EffortLimits:
-    """Return the rest of `limits` after a search."""
+    """Return the part of `limits` that remains after a search."""
     ncccs = None if limits.ncccs is None else max(0, limits.ncccs - spent.ncccs)
     cycles = None if limits.cycles is None else max(0, limits.cycles - spent.cycles)
     return EffortLimits(ncccs, cycles)

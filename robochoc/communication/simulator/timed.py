@@ -1,9 +1,9 @@
-"""The schedule of a channel model: simulated time, in seconds, in which robots compute and messages travel by radio.
+"""The schedule for a channel model: robots compute, and messages travel by radio, in simulated seconds.
 
-Discrete events, in whole nanoseconds, so that sums are exact and a seed determines a run. Time is counted as by
-Sultanik, Lass and Regli (2007, DCOPolis), who add up computation and communication; but computation is counted in
-constraint checks of a fixed duration, as processor time is not reproducible. NCCCs are the same as without delays: the
-clocks in envelopes are not changed.
+Events are discrete, with times in whole nanoseconds, so that sums are exact and a seed determines a run. Time is
+counted as by Sultanik, Lass and Regli (2007, DCOPolis), who add computation and communication. But computation is
+counted in constraint checks of a fixed duration, because processor time is not reproducible. NCCCs are the same as
+without delays: the clocks in envelopes are not changed.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ class Timed(Schedule):
     `now` is in nanoseconds. Ties are broken by the seed.
 
     A robot receives all messages that have arrived, and is busy for as long as its checks take. It passes each message
-    to its radio at the check at which the message is written, and computes on. Messages get the medium in the order in
-    which they are ready.
+    to its radio at the check at which the message is written, and continues to compute. Messages get the medium in the
+    order in which they are ready.
     """
 
     def __init__(self, seed: int, channel: ChannelModel) -> None:
@@ -50,19 +50,19 @@ class Timed(Schedule):
         return self._end_ns / NS_PER_S
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:
-        """Store `envelope`, with its time of sending, until all messages of its sender are known."""
+        """Store `envelope`, with its sending time, until all messages of its sender are known."""
         self._said.append((self.now + checks * self._channel.check_ns, envelope))
 
     def lose(self, envelope: Envelope, checks: int = 0) -> None:
-        """Store `envelope` as `put` does: it needs time on the air, but does not arrive."""
+        """Store `envelope` like `put`. It needs time on the air, but does not arrive."""
         self.put(envelope._replace(receiver=""), checks)
 
     def wait(self) -> None:
-        """Advance to the first timeout of the channel after the last robot had finished."""
+        """Advance to the first timeout in the channel after the last robot finished."""
         self.now = self._end_ns + round(self._channel.timeout_ms * NS_PER_MS)
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
-        """Note that the robot is free again, `checks` constraint checks after the start of its step."""
+        """Record that the robot is free again, `checks` constraint checks after the start of its step."""
         free = self.now + checks * self._channel.check_ns
         self._end_ns = max(self._end_ns, free)
         self._busy_until[robot] = free
@@ -80,7 +80,7 @@ class Timed(Schedule):
             if isinstance(what, Envelope):
                 self._transmit(due, what)
                 continue
-            if self._turns.get(what) != due:  # it has had its turn, or has been given another
+            if self._turns.get(what) != due:  # the robot has had this turn, or its turn was moved
                 continue
             del self._turns[what]
             inbox = self._inboxes[what]
@@ -101,11 +101,11 @@ class Timed(Schedule):
         self.now = self._end_ns = 0
 
     def time(self, checks: int) -> float:
-        """Return the simulated time in seconds, this number of checks after the start of the present step."""
+        """Return the simulated time in seconds, `checks` constraint checks after the start of the current step."""
         return (self.now + checks * self._channel.check_ns) / NS_PER_S
 
     def _transmit(self, ready: int, envelope: Envelope) -> None:
-        """Send `envelope` once the medium is free; it arrives not earlier than its predecessor in the same channel."""
+        """Send `envelope` when the medium is free. It arrives no earlier than its predecessor in the same channel."""
         edge = (envelope.sender, envelope.receiver)
         medium = "" if self._channel.shared else envelope.sender
         crossing = self._channel.crossing(len(envelope.content), self._chance)
@@ -122,12 +122,12 @@ class Timed(Schedule):
             self._wake(envelope.receiver)
 
     def _wake(self, robot: str) -> None:
-        """Schedule the turn of `robot`: once a message has arrived and it is not busy. It has at most one turn."""
+        """Schedule the turn of `robot`, once a message has arrived and it is not busy. A robot has at most one turn."""
         due = max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
         if self._turns.get(robot) != due:
             self._turns[robot] = due
             self._note(due, _WAKE, self._chance.random(), robot)
 
     def _note(self, due: int, kind: int, lot: float, what: Envelope | str) -> None:
-        """Add an event to the agenda. At equal times, lots decide between robots; messages of a robot stay in order."""
+        """Add an event to the agenda. Ties between robots are broken at random; a robot's messages stay in order."""
         heapq.heappush(self._agenda, (due, kind, lot, next(self._count), what))
