@@ -1,11 +1,11 @@
-"""Access control for writing and reading: zenoh's rules, default deny, bound to the name in a certificate.
+"""Access control for writing and reading, by zenoh's rules: deny by default, bound to the name in a certificate.
 
 The key of a frame is `rc/msg/RECEIVER/SENDER`. A robot may write only to keys that end with its name, and read only
-those that begin with it, so that nobody writes in another's name or reads another's frames. Of the keys that end with
-its name it may use those to the master, and after the team is closed those to its receivers. Recovery (zenoh's advanced
-publishers) requests missed frames under `@adv` below the same keys, and has the same rules.
+keys that begin with it, so that nobody can write in another's name or read another's frames. Among the keys that end
+with its name, it may use the key of the master, and after the team is closed also the keys of its receivers. Recovery
+(zenoh's advanced publishers) requests missed frames under `@adv` below the same keys, and follows the same rules.
 
-The journal is requested on `rc/journal/NAME`: only by NAME, if it may sniff; the master answers.
+The journal is requested on `rc/journal/NAME`, and only by NAME, if it has the right to sniff. The master answers.
 """
 
 from __future__ import annotations
@@ -36,15 +36,15 @@ def journal_key(name: str) -> str:
 
 
 def name_in(key: str) -> str:
-    """Return the name in the key of a frame (its sender), of a liveliness token, or of a request for the journal."""
+    """Return the name in the key of a frame (its sender), in a liveliness token, or in a request for the journal."""
     return key.rpartition("/")[2]
 
 
 def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> dict[str, Any]:
-    """Return zenoh's `access_control`: each name in `reach` may write to the master and its receivers.
+    """Return zenoh's `access_control`: each participant in `reach` may write to the master and its own receivers.
 
-    The `sniffers` among them may request the journal from the master (None: nobody may).
-    Raises `ValueError` for names with a special meaning in keys: `*` would write in everybody's name.
+    The `sniffers` among them may request the journal from the master (None: no one may).
+    Raises `ValueError` for names with a special meaning in keys: `*` could write in everyone's name.
     """
     strange = next((name for name in reach if not is_name(name) or name == MASTER), None)
     if strange is not None:
@@ -73,9 +73,9 @@ def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str]
 
 
 def journal_qos() -> dict[str, Any]:
-    """Return zenoh's `qos` for the journal: lower priority than frames, and pieces are dropped if a sniffer is slow.
+    """Return zenoh's `qos` for the journal: its priority is lower than that of frames, and slow sniffers lose pieces.
 
-    Answers have the priority of the question, and a sniffer might request a blocking answer and stop to read.
+    Answers have the priority of the request, and a sniffer might request a blocking answer and then stop reading.
     """
     return {
         "id": "the journal yields",
@@ -103,7 +103,7 @@ def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
 
 
 def _sniffing(name: str, key: str, *, asks: str, answers: str) -> list[dict[str, Any]]:
-    """Return the rules for questions on `key` in one direction, and their answers in the other."""
+    """Return the rules for requests on `key` in the direction `asks`, and for answers in the direction `answers`."""
     return [
         _rule(f"{name} sniffs: questions", asks, ["query"], [key]),
         _rule(f"{name} sniffs: answers", answers, ["reply", "declare_queryable"], [key]),

@@ -1,4 +1,4 @@
-"""The search state of a master that does not trust its robots: it compares their messages. Pure."""
+"""The search state of a master that does not trust its robots: their messages are compared. Pure."""
 
 from __future__ import annotations
 
@@ -30,16 +30,15 @@ from robochoc.model.outcome import CheckCounts
 
 _ASKED_ENOUGH = 2
 _MOST_NAMED = 3
-"""The largest number of doubts that are described."""
+"""The maximum number of doubts described in a text."""
 
 
 class AuditedSearchState(SearchState):
     """The state of a search whose robots are not trusted: their messages are checked for plausibility.
 
-    Attributes:
-        stuck: The reason why the search can never end; empty if it can.
-        drops: Whether robots are to drop messages.
-        duration_s: The duration of the search, after the call of `note_end`.
+    stuck: The reason why the search can never end; empty if it can end.
+    drops: Whether robots are told to drop messages.
+    duration_s: The duration of the search in seconds, after `note_end` was called.
     """
 
     def __init__(
@@ -72,7 +71,7 @@ class AuditedSearchState(SearchState):
         return super().handle(name, message)
 
     def _count(self, name: str, wave: int, counts: MessageCounts) -> str:
-        """Record counters. The messages received in one wave cannot exceed those sent by the next wave."""
+        """Record counters. A wave cannot report more messages received than the next wave reports sent."""
         if fault := fault_of_counters(counts, self.counters.latest(name)):
             return fault
         was_waving = self.counters.is_wave_open
@@ -87,7 +86,7 @@ class AuditedSearchState(SearchState):
         return ""
 
     def _conclude(self, name: str, verdict: str) -> str:
-        """Record a verdict that the robot `name` concluded alone. Only the first one counts."""
+        """Record a verdict that the robot `name` concluded alone. Only the first verdict counts."""
         if not self.ordered:
             return "it has concluded a verdict before the start of the search"
         if fault := super()._conclude(name, verdict):
@@ -124,12 +123,12 @@ class AuditedSearchState(SearchState):
         return fault
 
     def start_check(self, number: int) -> None:
-        """Expect the robots' checks of the snapshot `number`."""
+        """Start waiting for the robots' checks of the snapshot `number`."""
         self._snapshot_checked, self._snapshot_checks = number, {}
 
     @property
     def snapshot_checks(self) -> Mapping[str, CheckResult] | None:
-        """All robots' checks of the present snapshot; None while some have not answered."""
+        """All robots' checks of the current snapshot; None until all robots have answered."""
         return None if self._present - self._snapshot_checks.keys() else self._snapshot_checks
 
     def lose(self, name: str, why: str) -> None:
@@ -140,7 +139,7 @@ class AuditedSearchState(SearchState):
         self._snapshot_checks.pop(name, None)
 
     def note_end(self, duration_s: float, *, in_time: bool) -> None:
-        """Note the end of the search after `duration_s` seconds: `in_time`, or at the time limit."""
+        """Record the end of the search after `duration_s` seconds. `in_time`: the time limit was not reached."""
         self.duration_s = duration_s
         if not in_time:
             self._late = tuple(sorted(self._unready)) or self.counters.silent
@@ -152,15 +151,15 @@ class AuditedSearchState(SearchState):
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave is useful: see `SearchState.wave_due`, or messages are missing."""
+        """Whether a wave is useful: for the reasons in `SearchState.wave_due`, or because messages are missing."""
         return super().wave_due or (bool(self._asked) and not self.counters.is_wave_open)
 
     def missing(self, now: float, patience_s: float) -> int:
-        """Return the number of messages that are lost for good; 0 as long as that is not certain.
+        """Return the number of messages that are certainly lost; 0 until this is certain.
 
-        It is certain if no message was sent or received for `patience_s` seconds, and all robots report the same counts
-        in two later waves: then no message is in transit either. While a robot has not answered whether it continues,
-        there are no waves.
+        The loss is certain if no message was sent or received for `patience_s` seconds, and all robots report the same
+        counts in two later waves, since then no message is in transit either. While a robot has not answered whether it
+        continues, no waves are started.
 
         Args:
             now: The time on the monotonic clock.
@@ -177,43 +176,43 @@ class AuditedSearchState(SearchState):
 
     @property
     def by_quiescence(self) -> bool:
-        """Whether the search ended by quiescence, and not by one robot's conclusion."""
+        """Whether the search ended by quiescence, not by the conclusion of a single robot."""
         return self.counters.quiescent and self.witness is None
 
     @property
     def unchecked(self) -> bool:
-        """Whether a robot has not checked its constraints against the decision yet."""
+        """Whether a robot has not yet checked its constraints against the decision."""
         return bool(self._present - self._checks.keys())
 
     @property
     def held(self) -> bool:
-        """Whether all robots have checked their constraints, and none is violated."""
+        """Whether all robots have checked their constraints, and no constraint is violated."""
         return not self.unchecked and all(check.allowed for check in self._checks.values())
 
     @property
     def objections(self) -> tuple[str, ...]:
-        """Descriptions of broken constraints, by the robots that hold them."""
+        """Descriptions of violated constraints, reported by the robots that hold them."""
         return tuple(islice(objections(self._checks), _MOST_NAMED))
 
     @property
     def thoroughness(self) -> CheckCounts:
-        """The numbers of constraints that several robots have checked, and that only one has."""
+        """The number of constraints checked by several robots, and the number checked by only one robot."""
         return thoroughness(self._checks)
 
     # Contradictions between robots
 
     @property
     def doubts_about_counts(self) -> tuple[Doubt, ...]:
-        """Pairs of robots whose counts of messages do not agree, once all have reported."""
+        """Pairs of robots whose message counts do not agree, after all robots have reported."""
         stirred = any(total_of(one) != self.counters.latest(name) for name, one in self._accounts.items())
         still = (self.by_quiescence and not stirred) or bool(self.stuck)
         return tuple(islice(doubts_about_messages(self._accounts, quiet=still), _MOST_NAMED))
 
     @property
     def doubts_about_verdict(self) -> tuple[Doubt, ...]:
-        """Pairs of robots that contradict each other on the verdict, the values, or a constraint that both know.
+        """Pairs of robots that contradict each other about the verdict, the values, or a constraint that both know.
 
-        After quiescence the counters decide the verdict; only the proof that a cost is optimal depends on them.
+        After quiescence the counters decide the verdict, but matter only for the proof that a cost is optimal.
         """
         proven = self._declared.traits.costs and self.by_quiescence
         values = {name: account.assignment for name, account in self._accounts.items()}
@@ -223,7 +222,7 @@ class AuditedSearchState(SearchState):
 
     @property
     def unfinished(self) -> str:
-        """A text on the robots that had not finished at the time limit; empty if they are unknown."""
+        """A text on the robots that had not finished at the time limit; empty if no such robot is known."""
         names = ", ".join(self._late[:_MOST_NAMED]) + ", ..." * (len(self._late) > _MOST_NAMED)
         waited = f"{names} {'has' if len(self._late) == 1 else 'have'} not answered the master"
         doubts = [doubt.why for doubt in self.doubts_about_counts]

@@ -1,8 +1,8 @@
-"""Snapshots of a search whose constraints only the robots know: all robots check each snapshot before it counts.
+"""Snapshots of a search whose constraints are known only to the robots: all robots check a snapshot before it counts.
 
-A round: the robots report their values. If their findings contain a better assignment (the cheapest one that a robot
-knows; a cycle that all have completed), each robot is asked for its values in it. Then all robots check the reported
-values. The search continues meanwhile.
+A round has these steps. The robots report their values. If their findings contain a better assignment (the cheapest
+one known to a robot, or a cycle that all robots have completed), each robot is asked for its values in that assignment.
+Then all robots check the reported values. The search continues meanwhile.
 """
 
 from __future__ import annotations
@@ -20,18 +20,18 @@ from robochoc.protocols.message import Value
 
 
 class _Part(NamedTuple):
-    """The requested values of a robot: the present ones, those of a `cycle`, or those behind a `value`."""
+    """The requested values of a robot: its current ones, those in a `cycle`, or those behind a `value`."""
 
     cycle: int | None = None
     value: Value | None = None
 
 
 class CheckedSnapshots:
-    """The snapshots of the search of `state`, by the robots of `members`. `send` sends a message to a robot.
+    """The snapshots in the search of `state`, by the robots in `members`. `send` sends a message to a robot.
 
     Attributes:
         number: The number of the latest checked snapshot.
-        checks: The robots' checks of it, by name.
+        checks: The robots' checks of that snapshot, by name.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class CheckedSnapshots:
         self._send = send
         self._asked = 0
         self._first: SearchResult | None = None
-        """The robots' first values, while better ones are requested."""
+        """The robots' first values, while better values are requested."""
         self._unchecked: SearchResult | None = None
         self._checked: SearchResult | None = None
         self._tried: set[tuple[float, frozenset[tuple[str, Value]]]] = set()
@@ -54,7 +54,7 @@ class CheckedSnapshots:
         self._ask(number, dict.fromkeys(self._state.order, _Part()))
 
     def advance(self) -> SearchResult | None:
-        """Do the next step of the round. Return its snapshot once all robots have checked it; None before."""
+        """Do the next step of the round. Return the snapshot when all robots have checked it; until then None."""
         snapshot = self._state.completed_snapshot() if self._unchecked is None else None
         if snapshot is not None:
             self._continue_round(snapshot)
@@ -77,15 +77,15 @@ class CheckedSnapshots:
         if number is not None:
             self._first = snapshot
             self._ask(number, parts)
-        elif bests and self._checked is not None:  # nothing new; the robots' present trials are no answer
+        elif bests and self._checked is not None:  # nothing new; the robots' current trial values are not an answer
             self._have_checked(replace(snapshot, assignments=self._checked.assignments))
         else:
             self._have_checked(snapshot)
 
     def _parts_of_best(self, bests: list[Incumbent]) -> dict[str, _Part]:
-        """Return each robot's value in the cheapest assignment that was not tried before; empty if there is none.
+        """Return each robot's value in the cheapest assignment not tried before; empty if there is no such assignment.
 
-        An assignment that violates a constraint is not tried again, so that the next one is.
+        An assignment that violates a constraint is not tried again; the next one is tried instead.
         """
         order = self._state.order
         for best in sorted((one for one in bests if one.values.keys() == set(order)), key=lambda one: one.cost):
@@ -96,14 +96,14 @@ class CheckedSnapshots:
         return {}
 
     def _parts_of_cycle(self, snapshot: SearchResult) -> dict[str, _Part]:
-        """Return the requests for the last cycle that all robots have completed; empty if there is none."""
+        """Return the requests for the last cycle that all robots have completed; empty if there is no such cycle."""
         order = self._state.order
         cycles = [found.trail.cycle for found in snapshot.findings.values() if found.trail is not None]
         known = len(cycles) == len(order) and min(cycles, default=-1) >= 0
         return dict.fromkeys(order, _Part(cycle=min(cycles))) if known else {}
 
     def _have_checked(self, snapshot: SearchResult) -> None:
-        """Have all robots check the values in `snapshot`, unless they were checked before."""
+        """Let all robots check the values in `snapshot`, unless they have been checked before."""
         self._unchecked = snapshot
         if self._checked is not None and snapshot.assignments == self._checked.assignments:
             self._asked = self.number

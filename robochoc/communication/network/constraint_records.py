@@ -1,6 +1,6 @@
-"""Constraints on the wire, for protocols in which every robot of a constraint's scope knows it, not only the lowest.
+"""Constraints on the wire, for protocols in which every robot in a scope knows the constraint, not only the lowest one.
 
-They are sent as data, with predicates as functional expressions, and are parsed and type-checked like files.
+Constraints are sent as data, with predicates as functional expressions, and are parsed and type-checked like files.
 """
 
 from __future__ import annotations
@@ -30,11 +30,11 @@ from robochoc.solver.explanation import KeyedConstraint
 from robochoc.system.errors import RobochocError
 
 MOST_TERMS = 1000
-"""The most terms of a scope or a list of parameters."""
+"""The maximum number of terms in a scope or a parameter list."""
 
 
 class SharedConstraintError(RobochocError, ValueError):
-    """A constraint from another robot is invalid."""
+    """Raised if a constraint from another robot is invalid."""
 
 
 class RelationRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -82,14 +82,14 @@ class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
 
 
 def record_of(known: KeyedConstraint) -> SharedRecord:
-    """Return the record of `known` for the wire."""
+    """Return the record for sending `known`."""
     one = known.constraint
     defined = _defined(one.definition)
     return SharedRecord(known.key, one.name, defined, one.scope, one.parameters, one.model, one.cost, one.when_absent)
 
 
 def known_of(record: SharedRecord) -> KeyedConstraint:
-    """Return the constraint in `record`. Raises `SharedConstraintError`."""
+    """Return the constraint described by `record`. Raises `SharedConstraintError`."""
     if max(len(record.scope), len(record.parameters)) > MOST_TERMS:
         raise SharedConstraintError(f"{shortened(record.name)!r} has more than {MOST_TERMS} terms")
     variables = [term for term in record.scope if isinstance(term, str)]

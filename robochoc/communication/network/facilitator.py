@@ -1,4 +1,4 @@
-"""The master's Directory Facilitator: robots are added when they register, and all participants may query it."""
+"""The master's Directory Facilitator. Robots are added when they register, and all participants may query it."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from robochoc.services.sl import df_on
 from robochoc.system.errors import RobochocError
 
 MAX_REQUESTS_PER_S = 20
-"""The most requests of a participant in a second."""
+"""The maximum number of requests by a participant in one second."""
 
 
 class TooManyRequestsError(RobochocError, ValueError):
-    """A participant sends too many requests."""
+    """Raised if a participant sends too many requests."""
 
 
 class DirectoryFacilitator:
@@ -39,12 +39,12 @@ class DirectoryFacilitator:
         self._df = df_on(f"{endpoint}/robochoc")
         self._asked: dict[str, list[float]] = {}
         self._numbers: dict[str, int] = {}
-        """The number of each subscriber's last request."""
+        """The number of the last request by each subscriber."""
 
     def enter(self, profile: Profile) -> str:
-        """Add the robot of `profile` to the directory, with its protocol, variables and topics as far as they fit.
+        """Add the robot of `profile` to the directory, with its protocol and as many topics and variables as fit.
 
-        Return why it cannot be added, or an empty text; it takes part in any case.
+        Return the reason why the robot cannot be added, or an empty text. The robot participates in any case.
         """
         services = (
             *(ServiceDescription(name=topic, type="topic") for topic in profile.topics),
@@ -71,7 +71,7 @@ class DirectoryFacilitator:
         self._directory.expire(time.time())
 
     def count(self, requester: str) -> None:
-        """Count a request of `requester` to the directory or the master. Raises `TooManyRequestsError`."""
+        """Count a request by `requester` to the directory or the master. Raises `TooManyRequestsError`."""
         now = time.time()
         recent = [t for t in self._asked.get(requester, []) if now - t < 1]
         if len(recent) >= MAX_REQUESTS_PER_S:
@@ -79,7 +79,7 @@ class DirectoryFacilitator:
         self._asked[requester] = [*recent, now]
 
     def answer(self, requester: str, ask: DirectoryRequest) -> DirectoryAnswer:
-        """Return the answer to a request of `requester` in SL0; `notices` yields the results of subscriptions."""
+        """Return the answer in SL0 to a request by `requester`. The results of subscriptions come from `notices`."""
         now = time.time()
         aid = self._aid(requester)
         if not ask.subscribe:
@@ -88,7 +88,7 @@ class DirectoryFacilitator:
         return _answer_to(ask.number, subscribe(self._directory, aid, ask.content, now))
 
     def notices(self) -> Iterator[tuple[str, DirectoryAnswer]]:
-        """Yield answers for subscribers, each with the subscriber's name."""
+        """Yield the answers to subscribers, each with the subscriber's name."""
         for notice in self._directory.notices():
             number = self._numbers.get(notice.subscriber, 0)
             yield (
@@ -97,12 +97,12 @@ class DirectoryFacilitator:
             )
 
     def _aid(self, name: str) -> str:
-        """Return the name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
+        """Return the name in a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
         return f"{name}@{self._endpoint}/robochoc"
 
 
 class RequestHandler:
-    """Answers requests up to a rate for each member. `send` sends answers, and `refuse` reports refusals."""
+    """Answers requests, at a limited rate for each member. `send` sends answers, `refuse` reports refusals."""
 
     def __init__(
         self,
@@ -117,7 +117,7 @@ class RequestHandler:
         self._refuse = refuse
 
     def answer(self, sender: str, request: DirectoryRequest | JournalRequest) -> None:
-        """Answer `sender`, unless it asks too often."""
+        """Answer `sender`, unless it sends requests too often."""
         try:
             self._facilitator.count(sender)
         except TooManyRequestsError as often:

@@ -1,8 +1,8 @@
-"""Clean-up in the fork server when its parent has ended: removes the parent's temporary folder, and ends silently.
+"""Cleans up in the fork server when its parent has ended: removes the parent's temporary folder, and ends silently.
 
-A module of its own, as its import has these effects, and only in the fork server. A killed parent cannot remove the
-folder. The router removes it too, but not every run has a router. A parent that is killed during a request leaves an
-incomplete request, which `multiprocessing` does not expect.
+This is a separate module because importing it has these effects, which are wanted only in the fork server. A killed
+parent cannot remove the folder. The router removes it too, but not every run has a router. A parent that is killed
+during a request leaves an incomplete request, which `multiprocessing` does not expect.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ SCRATCH = "ROBOCHOC_SCRATCH"
 
 
 def _without_a_parent(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Ignore the error of an incomplete request, in the fork server and in the process that it has forked.
+    """Ignore the error caused by an incomplete request, in the fork server and in the process that it has forked.
 
-    Errors of a robot are printed by its process (`Process._bootstrap`), and do not reach this hook.
+    Errors in a robot are printed by the robot's process (`Process._bootstrap`), and do not reach this hook.
     """
     truncated = kind.__name__ == "UnpicklingError" and "truncated" in str(error)
     if not (truncated or issubclass(kind, EOFError)):

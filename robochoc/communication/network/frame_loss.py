@@ -1,8 +1,8 @@
-"""Frames that are lost for good. Their sender then counts as lost, never another robot.
+"""Frames that are permanently lost. The sender of a lost frame then counts as lost, but never another robot.
 
 A robot whose frames to the master are lost counts as lost. An observer only loses its request. The loss of frames
-between two robots is reported by one of them, and may be caused by wrong frame numbers of the other. So it counts only
-when messages are missing according to the counters of all robots.
+between two robots is reported by one of them, but may be caused by wrong frame numbers from the other. So the loss
+counts only if messages are missing according to the counters of all robots.
 """
 
 from __future__ import annotations
@@ -22,26 +22,26 @@ class _Lose(Protocol):
 
 
 class LossTracker:
-    """Lost frames in a run of `members`. `refuse` reports each (who, what, why); `lose` removes a robot."""
+    """Tracks lost frames in a run of `members`. `refuse` reports each loss (who, what, why); `lose` removes a robot."""
 
     def __init__(self, members: NetworkMembers, refuse: Callable[[str, str, str], None], lose: _Lose) -> None:
         self._members = members
         self._refuse = refuse
         self._lose = lose
         self._said: dict[str, str] = {}
-        """The reported losses of this search: the reason, by sender."""
+        """The losses reported in this search: the reason, by sender."""
 
     def start_search(self) -> None:
-        """Start a search: discard the reports of previous searches."""
+        """Start a search, and discard the reports from previous searches."""
         self._said.clear()
 
     @property
     def is_reported(self) -> bool:
-        """Whether a robot has reported lost frames of another robot in this search."""
+        """Whether a robot has reported a loss of frames from another robot in this search."""
         return bool(self._said)
 
     def note_at_master(self, missed: FramesLost) -> None:
-        """Report lost frames to the master, and mark their sender as lost if it takes part.
+        """Report the loss of frames to the master, and mark their sender as lost if it participates.
 
         Raises `RobotsLostError`.
         """
@@ -53,14 +53,14 @@ class LossTracker:
             self._lose(name, f"{why} on the way to the master", for_good=self._members.closed)
 
     def note_between(self, name: str, gap: LostFrames) -> None:
-        """Note that the robot `name` reports the loss of frames to it."""
+        """Record a report by the robot `name` that frames to it were lost."""
         why = f"{gap.frames:,} frames of it to {name} were lost for good (reported by {name})"
         self._refuse(gap.who, f"a frame to {name}", why)
         if gap.who in self._members.robots:
             self._said.setdefault(gap.who, why)
 
     def explain_missing(self) -> bool:
-        """Mark the senders of lost frames as lost, as protocol messages are missing; return whether there are any.
+        """Mark the senders of lost frames as lost, since protocol messages are missing. Return whether there are any.
 
         Raises `RobotsLostError`.
         """

@@ -1,8 +1,8 @@
-"""Frames around messages, so that no message is accepted twice, out of order, or from another run. Pure.
+"""Frames around messages, which ensure that no message is accepted twice, out of order, or from another run. Pure.
 
-The router proves the sender of a frame (`access.py`); its run and its number identify it. Within a run the frames of an
-ordered pair are numbered from 1, and arrive in that order or not at all. Messages before a run (from `Register` to
-`Joined`, and requests of observers) have no run and no number: their repetition has no effect.
+The router verifies the sender of a frame (`access.py`); the run and the number identify the frame. Within a run the
+frames from one participant to another are numbered from 1, and arrive in that order or not at all. Messages before a
+run (from `Register` to `Joined`, and requests by observers) have no run and no number: repeating them has no effect.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import RobochocError
 
 MASTER = "MASTER"
-"""The master's name, as in Figure 3. No robot can have it."""
+"""The master's name, as in Figure 3. No robot may have this name."""
 LARGEST_FRAME = 8 * 2**20
-"""Bytes. zenoh drops larger content without an error, so larger frames are refused with a message."""
+"""In bytes. zenoh drops larger content without an error, so larger frames are refused with an error message."""
 
 _OUTSIDE = (
     Register
@@ -46,15 +46,15 @@ _OUTSIDE = (
 
 
 class MessageTooLargeError(UnsupportedError):
-    """A message needs more bytes than a frame may have."""
+    """Raised if a message needs more bytes than a frame may have."""
 
 
 class FrameRefusedError(RobochocError, ValueError):
-    """A frame is not accepted, for the reason in the message."""
+    """Raised if a frame is not accepted. The text is the reason."""
 
 
 class Frame(msgspec.Struct, frozen=True, array_like=True):
-    """`message` in the run `run`, as frame `number` from its sender to its receiver."""
+    """Contains `message` in the run `run`, as frame `number` from its sender to its receiver."""
 
     run: str
     number: int
@@ -74,14 +74,14 @@ class _ToPeer(Frame, frozen=True, array_like=True):
 
 
 class Opened(NamedTuple):
-    """The content of a valid frame: its number (0: it has none), and its message."""
+    """The content of a valid frame: its number (0: it has no number) and its message."""
 
     number: int
     message: ControlMessage
 
 
 class Framing:
-    """The frames that `name` writes and reads; `run` is empty until there is one."""
+    """Writes and reads the frames of `name`. `run` is empty before the start of a run."""
 
     def __init__(self, name: str, run: str = "") -> None:
         self.name = name
@@ -93,13 +93,13 @@ class Framing:
         self._of_robot = msgspec.msgpack.Decoder(_ToMaster if name == MASTER else _ToPeer)
 
     def start_run(self, run: str) -> None:
-        """Start a run, with numbers from 1."""
+        """Start a run. Frames are numbered from 1."""
         self.run = run
         self._written.clear()
         self._read.clear()
 
     def forget(self, other: str) -> None:
-        """Number frames from and to `other` from 1 again, as the robot was restarted."""
+        """Restart the numbering of frames from and to `other` at 1, because that robot was restarted."""
         self._written.pop(other, None)
         self._read.pop(other, None)
 
@@ -121,7 +121,7 @@ class Framing:
         return content
 
     def read(self, sender: str, content: bytes) -> Opened:
-        """Return the message in a frame of `sender`; the frame may arrive again until `accept` is called.
+        """Return the message in a frame from `sender`. The same frame may arrive again until `accept` is called.
 
         Raises `FrameRefusedError`.
         """
@@ -144,6 +144,6 @@ class Framing:
         return Opened(frame.number, frame.message)
 
     def accept(self, sender: str, number: int) -> None:
-        """Accept the frame `number` of `sender`, and expect the next one."""
+        """Accept the frame `number` from `sender`, and expect the next number."""
         if number:
             self._read[sender] = max(number, self._read.get(sender, 0))

@@ -1,7 +1,7 @@
-"""The inbox: a queue of arrived items, bounded for each sender, so that no flood fills the memory.
+"""The inbox: a queue of arrived items, with a bound for each sender, so that no flood can fill the memory.
 
-Frames beyond a sender's quota (`quotas.py`) are dropped unread, and counted: `FramesLost` takes the place of the first
-of them in the queue. The loss affects only this sender. Thread-safe.
+Frames beyond a sender's quota (`quotas.py`) are dropped unread and counted: a `FramesLost` replaces the first of these
+frames in the queue. The loss affects only this sender. Thread-safe.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ class FrameArrived(NamedTuple):
 
 
 class FramesLost(NamedTuple):
-    """A number of `frames` of `sender` are lost for good. A hostile sender can fake losses by its frame numbers.
+    """A number of `frames` from `sender` were permanently lost. A hostile sender can fake losses by its frame numbers.
 
-    `dropped`: they exceeded the sender's quota, and were dropped here.
+    `dropped`: the frames exceeded the sender's quota, and were dropped by this inbox.
     """
 
     sender: str
@@ -35,21 +35,21 @@ class FramesLost(NamedTuple):
 
 
 class PresenceChanged(NamedTuple):
-    """The router reports that `name` has become present, or absent."""
+    """A report by the router that `name` has become present or absent."""
 
     name: str
     there: bool
 
 
 class WakeUp(NamedTuple):
-    """A wake-up from this process."""
+    """A wake-up by this process."""
 
 
 Item = FrameArrived | FramesLost | PresenceChanged | WakeUp
 
 
 class Inbox:
-    """A FIFO queue of items. `share_of` returns a sender's quota; it is called once for each sender."""
+    """A FIFO queue of items. `share_of` returns a sender's quota, and is called once for each sender."""
 
     def __init__(
         self,
@@ -63,7 +63,7 @@ class Inbox:
         self._changed = threading.Condition()
 
     def put(self, item: Item) -> None:
-        """Append `item`, or drop a frame or a report of a gap beyond its sender's quota."""
+        """Append `item`. Drop a frame, or a report of a gap, that exceeds its sender's quota."""
         with self._changed:
             if isinstance(item, FrameArrived | FramesLost):
                 usage = self._usage_of(item.sender)
@@ -114,5 +114,5 @@ class Inbox:
 
 
 def _size(item: FrameArrived | FramesLost) -> int:
-    """Return the size of an item in bytes; a report of lost frames counts as an empty frame, as it can be forged."""
+    """Return the size of an item in bytes. A report of lost frames counts as an empty frame, since it can be forged."""
     return len(item.content) if isinstance(item, FrameArrived) else 0

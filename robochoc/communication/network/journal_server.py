@@ -1,8 +1,8 @@
-"""The run's journal, which the master publishes during the run to participants with the right to sniff.
+"""The journal of the run, published by the master during the run to participants with the right to sniff.
 
-A follower requests the bytes from `start` on, and receives a piece of bounded size; the rest stays in the journal's
-file. So a follower may start late, be slow, or stop: nothing is stored for it, and neither the master nor a robot is
-slowed. The router proves the name of the follower (`access.py`). Thread-safe.
+A follower requests the bytes from `start` on, and receives a piece of bounded size; the remaining bytes stay in the
+journal's file. So a follower may start late, be slow, or stop: nothing is stored for it, and it slows neither the
+master nor the robots. The router verifies the name of the follower (`access.py`). Thread-safe.
 """
 
 from __future__ import annotations
@@ -21,17 +21,18 @@ from robochoc.journal.entries import JournalError
 from robochoc.system.errors import RobochocError
 
 SNIFF = "sniff"
-"""The name of the right."""
+"""The name of the right to read the journal."""
 PIECE_BYTES = 60_000
-"""The largest piece of the journal: with its framing it fits into one batch of zenoh."""
+"""The largest piece of the journal, in bytes. With its framing it fits into one batch of zenoh."""
 MAX_ANSWERS_PER_S = 200
-"""The most answers to one follower in a second. The follower repeats unanswered questions."""
+"""The maximum number of answers to a follower in one second. The follower repeats unanswered requests."""
 PRESENT_S = 5.0
-"""Seconds after its last request for which the end of the run waits for a follower.
+"""How long the end of the run waits for a follower after its last request, in seconds.
 
-More than the time after which a follower repeats a request (`sniffer/remote.py`: 2 s)."""
+It must exceed the time after which a follower repeats a request (`sniffer/remote.py`: 2 s).
+"""
 LARGEST = 2**53
-"""A bound on the bytes of any journal."""
+"""An upper bound on the bytes of any journal."""
 _LARGEST_QUESTION = 200
 
 
@@ -43,7 +44,7 @@ class Question(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Piece(msgspec.Struct, frozen=True, array_like=True):
-    """A piece of the journal of `run`, from byte `start` on. `over`: the journal ends there for good."""
+    """A piece of the journal of `run`, from byte `start` on. `over`: the journal ends after this piece."""
 
     run: str
     start: Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
@@ -52,28 +53,28 @@ class Piece(msgspec.Struct, frozen=True, array_like=True):
 
 
 class NotAnsweredError(RobochocError):
-    """A question has no answer. The message is the reason, for the master's observer. Empty: not reported."""
+    """Raised if a request gets no answer. The text is the reason, for the master's observer. Empty: not reported."""
 
 
 class Publication:
-    """The journal of one run, written to the file `descriptor` (for reading and writing), and published from it.
+    """The journal of one run. It is written to the file `descriptor` (for reading and writing), and published from it.
 
-    It is a sink for blocks (`write`). `fresh` is called when a follower has received the whole file: it may write
-    pending blocks. The opener of the file closes it, after `close`.
+    A publication is a sink for blocks (`write`). `fresh` is called when a follower has received the whole file; it may
+    write pending blocks. The opener of the file closes the file, after `close`.
     """
 
     def __init__(self, descriptor: int, fresh: Callable[[], None] = lambda: None) -> None:
         self.run = ""
-        """The name of the run, as in frames; set by the master."""
+        """The name of the run, as used in frames; set by the master."""
         self.fresh = fresh
         self.trouble = ""
-        """The reason why the journal is no longer written and published. Empty: there is none."""
+        """The reason why the journal is no longer written and published. Empty: no problem."""
         self._descriptor = descriptor
         self._size = 0
         self._over = self._closed = False
         self._asked: dict[str, list[float]] = {}
         self._behind: dict[str, float] = {}
-        """The followers that have not received the end yet, with the times of their last requests."""
+        """The followers that have not yet received the end, with the times of their last requests."""
         self._lock = threading.Lock()
 
     def write(self, block: bytes) -> None:
@@ -88,23 +89,23 @@ class Publication:
             self._size += done
 
     def end(self) -> None:
-        """Note that the journal is complete."""
+        """Record that the journal is complete."""
         self._over = True
 
     def close(self) -> None:
-        """Stop answering questions."""
+        """Stop answering requests."""
         with self._lock:
             self._closed = True
 
     @property
     def lagging(self) -> bool:
-        """Whether a follower of the run has not received its end yet."""
+        """Whether a follower has not yet received the end of the journal."""
         now = time.monotonic()
         with self._lock:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
 
     def answer(self, name: str, content: bytes) -> bytes:
-        """Return the answer to the question `content` of `name`, which has the right to sniff.
+        """Return the answer to the request `content` by `name`, which has the right to sniff.
 
         Raises `NotAnsweredError`.
         """
@@ -112,7 +113,7 @@ class Publication:
         question = _question(content)
         if question.run == self.run and question.start >= self._size and not self._over:
             self.fresh()
-        over = self._over  # read before the size, as nothing is written afterwards
+        over = self._over  # read before the size, because nothing is written after `end`
         size = self._size
         if question.start > size:
             raise NotAnsweredError(f"the journal has {size:,} bytes, but byte {question.start:,} was requested")
@@ -139,7 +140,7 @@ class Publication:
 
 
 def question(run: str, start: int) -> bytes:
-    """Return the question for the journal of `run` from byte `start` on."""
+    """Return the request for the journal of `run` from byte `start` on."""
     return msgspec.msgpack.encode(Question(run, start))
 
 
@@ -161,9 +162,9 @@ def _question(content: bytes) -> Question:
 
 
 class JournalServer:
-    """The master's server for the journal of its `run`: a `JournalRequest` checks the right, then pieces are requested.
+    """Serves the journal of the master's `run`: a `JournalRequest` checks the right, then pieces can be requested.
 
-    `publication` is None if the journal is not published. `may` returns whether a name has the right now.
+    `publication` is None if the journal is not published. `may` returns whether a participant has the right now.
     """
 
     def __init__(self, run: str, may: Callable[[str], bool], events: MasterEvents) -> None:
@@ -175,11 +176,11 @@ class JournalServer:
 
     @property
     def lagging(self) -> bool:
-        """Whether a follower has not received the end of the journal yet."""
+        """Whether a follower has not yet received the end of the journal."""
         return self.publication is not None and self.publication.lagging
 
     def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:
-        """Return the answer to a request of `name` to sniff."""
+        """Return the answer to a request by `name` to sniff."""
         why = self._why_not(name)
         if why:
             self._events.refuse(name, SNIFF, why)
@@ -189,7 +190,7 @@ class JournalServer:
         return JournalAnswer(sniff.number, self._run, why)
 
     def answer(self, name: str, content: bytes) -> bytes | None:
-        """Return the answer to a question of `name`, which the router has proven; None: there is none."""
+        """Return the answer to a request by `name`, verified by the router; None: no answer."""
         why = self._why_not(name)
         if not why and self.publication:
             try:

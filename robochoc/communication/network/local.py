@@ -1,7 +1,7 @@
-"""The network runtime on one machine: `--runtime network`. A process for each robot, a master, a router, mutual TLS.
+"""The network runtime on one machine (`--runtime network`): a process per robot, a master, a router, mutual TLS.
 
-For trials and tests. Robots' processes are started by a fork server, as a forked child of a process that has used zenoh
-hangs. Certificates are created for this run only, and exist only in memory.
+It is meant for trials and tests. Robots' processes are started by a fork server, because a forked child of a process
+that has used zenoh hangs. Certificates are created for this run only, and exist only in memory.
 """
 
 from __future__ import annotations
@@ -45,22 +45,22 @@ from robochoc.system.signals import signals_delayed
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
-"""Seconds for which the end of the run is announced. Stopped robots do not confirm it and are then killed."""
+"""How long the end of the run is announced, in seconds. Stopped robots do not confirm it, and are then killed."""
 GRACE_S = 2.0
-"""Seconds in which robots may end by themselves after they have confirmed the end of the run."""
+"""The time for robots to end by themselves after they have confirmed the end of the run, in seconds."""
 _ATTEMPTS = 5
 _DESCRIPTORS, _DESCRIPTORS_PER_ROBOT = 32, 2
-"""Open files: of the master's session, the router's pipes and the fork server, and of each robot's process."""
+"""The numbers of open files: for the master's session, the router's pipes and the fork server; and for each robot."""
 _PRELOAD = (fork_server.__name__, "__main__", "robochoc.communication.network.robot_process")
-"""The modules that the fork server imports once for all robots, with the program's own file (`__main__`)."""
+"""The modules that the fork server imports once for all robots, including the program's own file (`__main__`)."""
 _OURS = "robochoc."
 """The prefix of modules that the fork server can import."""
 
 
 class LocalNetwork(Session):
-    """One team on this machine, each robot in its own process, connected by zenoh. See `Session`, `ProcessesRun`.
+    """One team on this machine. Each robot has its own process, connected by zenoh. See `Session`, `ProcessesRun`.
 
-    Robots are already compiled, and when others are lost they still disclose the same variables.
+    Robots are already compiled, and disclose the same variables even after other robots are lost.
     """
 
     starts_fresh = True
@@ -112,7 +112,7 @@ class LocalNetwork(Session):
 
     @staticmethod
     def _open_master(make: Callable[[str], Master]) -> Master:
-        """Return the master, open at a free port of loopback; try others if another program takes the port first."""
+        """Return the master, open at a free port of loopback. Try other ports if another program takes the port first."""
         for attempt in range(_ATTEMPTS):
             with socket.create_server((LOOPBACK, 0)) as trial:
                 port = trial.getsockname()[1]
@@ -135,7 +135,7 @@ class LocalNetwork(Session):
 
     @property
     def lossless(self) -> bool:
-        """See `Session.lossless`: every search is independent of the previous one."""
+        """See `Session.lossless`. Every search is independent of the previous one."""
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
@@ -154,11 +154,11 @@ class LocalNetwork(Session):
         return self._master.search(self._protocol.__name__, self._protocol.traits, self._parameters, left, messages)
 
     def usable_team(self, team: Team) -> Team:
-        """Return the robots of the team whose values have kept their meaning. See `Session.usable_team`."""
+        """Return the robots in the team whose values still have the same meaning. See `Session.usable_team`."""
         return keep_interfaces(team, self.compiled.team)
 
     def change(self, epoch: Epoch) -> None:
-        """Continue without the lost robots, the only possible change."""
+        """Continue without the lost robots. No other change is possible."""
         self.compiled = epoch.compiled
         gone = [name for name in self._master.members.robots if name not in epoch.team]
         self._master.members.remove(gone)
@@ -178,7 +178,7 @@ class LocalNetwork(Session):
                 self._master.__exit__(None, None, None)
 
     def kill(self, name: str) -> None:
-        """Kill the robot's process, if it has one."""
+        """Kill the process of the robot `name`, if it has one."""
         if name in self._processes:
             self._processes[name].kill()
 
@@ -193,13 +193,13 @@ class LocalNetwork(Session):
             limits = (self._settings.patience_s, self._settings.lease_ms)
             given = NetworkRobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=network_robot_process, name=name, args=(given,), daemon=True)
-            with signals_delayed():  # a half-started process would wait for ever, and block the end of the program
+            with signals_delayed():  # a half-started process would wait forever, and block the end of the program
                 process.start()
                 self._processes[name] = process
         threading.Thread(target=self._watch, args=[dict(self._processes)], daemon=True).start()
 
     def _watch(self, processes: dict[str, BaseProcess]) -> None:
-        """Report ended processes to the master, which would notice them later by itself."""
+        """Report ended processes to the master, which would notice them itself only later."""
         names = {process.sentinel: name for name, process in processes.items()}
         while names and not self._is_closed:
             for sentinel in wait(list(names), 0.2):
@@ -222,10 +222,10 @@ class LocalNetwork(Session):
 
 
 def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
-    """Start the fork server, if it does not run yet. It imports modules while the router is opened.
+    """Start the fork server unless it is already running. It imports modules while the router is being opened.
 
-    Signals are held during the start, so that no folder is left behind. The fork server inherits this, and ignores
-    signals to the whole group while it imports; it ends with this process.
+    Signals are blocked during the start, so that no folder is left behind. The fork server inherits the blocked
+    signals, and ignores signals to the whole group while it imports; it ends with this process.
     """
     context = multiprocessing.get_context("forkserver")
     own = [protocol.__module__] if protocol.__module__.startswith(_OURS) else []
@@ -237,6 +237,6 @@ def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
                 multiprocessing.forkserver.ensure_running()
             finally:
                 del os.environ[fork_server.SCRATCH]
-    except OSError as error:  # such as a temporary folder whose path is too long for a socket
+    except OSError as error:  # for example a temporary folder whose path is too long for a socket
         raise UnsupportedError(f"robots' processes cannot be started: {error}: check the folder TMPDIR") from error
     return context

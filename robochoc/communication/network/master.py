@@ -1,10 +1,10 @@
-"""The master across machines: Figure 3's, which "launches its communication interface listening on the network".
+"""The master across machines, as in Figure 3: it "launches its communication interface listening on the network".
 
-It runs the router and is a participant like others. It registers robots (without access to their files), closes the
-team when all are present, sends each its task, orders the start, detects quiescence by four counters, collects the
-decision, has every robot check its constraints against it, and ends the run.
+The master runs the router and is a participant like the robots. It registers robots (without access to their files),
+closes the team when all robots are present, sends each robot its task, orders the start, detects quiescence by four
+counters, collects the decision, lets every robot check its constraints against the decision, and ends the run.
 
-A robot whose liveliness token has been gone for longer than the patience is lost.
+A robot counts as lost when its liveliness token has been missing for longer than the patience.
 """
 
 from __future__ import annotations
@@ -62,14 +62,14 @@ from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 
 class Registrar:
-    """Registers robots as `members`: checks profiles, welcomes robots, and adds them to the directory.
+    """Registers robots in `members`: checks profiles, welcomes robots, and adds them to the directory.
 
     Args:
         members: The registered robots.
-        connection: The master's connection; frames of a new incarnation are numbered from 1.
+        connection: The master's connection. Frames from and to a new incarnation are numbered from 1.
         facilitator: The directory of robots.
         events: Receives registrations and refusals.
-        settings: The settings of the run, part of which a welcome contains.
+        settings: The settings of the run. A welcome contains some of them.
         watched: Whether robots are to report their events.
     """
 
@@ -90,7 +90,7 @@ class Registrar:
         self._watched = watched
 
     def register(self, name: str, profile: Profile, incarnation: str) -> bool:
-        """Register a robot and welcome it, or refuse it; return whether it is new."""
+        """Register and welcome a robot, or refuse it. Return whether the robot is new."""
         known = self._members.robots.get(name)
         try:
             member = self._members.register(name, profile, incarnation, admitted=self._connection.policy.is_robot(name))
@@ -107,7 +107,7 @@ class Registrar:
         return member is not known
 
     def welcome_again(self) -> None:
-        """Welcome robots that have not answered a welcome since they registered or returned."""
+        """Welcome again robots that have not answered a welcome since they registered or returned."""
         for name, incarnation in self._members.to_welcome().items():
             self._welcome(name, incarnation)
 
@@ -118,29 +118,29 @@ class Registrar:
 
 
 REGISTRY_S = 0.5
-"""The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
+"""The interval for reading the Authority's registry for new enrolments and revocations, in seconds."""
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
 HELD_S = 15.0
-"""The longest delay of a frame while no link is down, in seconds.
+"""The longest delay of a frame while all links are up, in seconds.
 
-zenoh detects after `transport.HEARTBEAT_S` (5 s) that the last frame of a sender is missing, requests it, waits 10 s
-for a busy machine that does not answer. So the master waits longer for reports after a verdict, and before it decides
-that messages are lost.
+zenoh detects after `transport.HEARTBEAT_S` (5 s) that the last frame from a sender is missing, requests the frame, and
+waits 10 s for a busy machine that does not answer. So the master waits longer than this for reports after a verdict,
+and before it decides that messages are lost.
 """
 
 
 class Master(MasterLoop):
-    """The master at `endpoint` (`HOST:PORT`); a context manager.
+    """The master, listening at `endpoint` (`HOST:PORT`); a context manager.
 
     Args:
-        admission: Which robots are admitted.
-        identity: Its certificate and key.
-        endpoint: The address at which robots reach it.
+        admission: Decides which robots are admitted.
+        identity: The master's certificate and key.
+        endpoint: The address at which robots reach the master.
         members: The expected robots; later also the registered ones.
         settings: The settings of the run.
-        observer: Receives all events, including refusals (these from other threads).
-        watched: Whether the observer receives the robots' events as well.
-        progress: Receives the count of messages now and then.
+        observer: Receives all events, including refusals, which come from other threads.
+        watched: Whether the observer receives the robots' events too.
+        progress: Receives the message count from time to time.
     """
 
     state: AuditedSearchState
@@ -173,7 +173,7 @@ class Master(MasterLoop):
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
         self.snapshots: CheckedSnapshots | None = None
-        """The snapshots of the present search, if robots are to check them."""
+        """The snapshots in the current search, if robots must check them."""
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
 
     def __enter__(self) -> Self:
@@ -190,15 +190,16 @@ class Master(MasterLoop):
         return self._settings.private
 
     def publish(self, publication: Publication) -> None:
-        """Offer `publication`, this run's journal, to authorized sniffers. To be called before the master listens."""
+        """Offer `publication`, this run's journal, to authorized sniffers. Must be called before the master listens."""
         self._connection.publish(publication)
 
     # The course of a run
 
     def gather(self, deadline: float | None = None) -> bool:
-        """Wait until all robots are registered; return False if the deadline (on the monotonic clock) comes first.
+        """Wait until all robots are registered. Return False if the deadline (on the monotonic clock) passes first.
 
-        Raises `UnsupportedError` for a constraint over a variable that no neighbour of its robot has.
+        Raises `UnsupportedError` for a constraint over a variable that belongs to no neighbour of the constraint's
+        robot.
         """
         self._serve_until(lambda: self.members.complete, deadline)
         unseen = self.members.unseen()
@@ -223,14 +224,14 @@ class Master(MasterLoop):
         *,
         checked: bool = False,
     ) -> SearchResult:
-        """Have all registered robots start a search by `protocol`, for at most `timeout` seconds.
+        """Let all registered robots start a search by `protocol`, for at most `timeout` seconds.
 
-        If there is a `watch`, it receives snapshots; if `checked`, only those that all robots have checked
-        (`snapshots`).
+        If there is a `watch`, it receives snapshots. If `checked`, it receives only snapshots that all robots have
+        checked (`snapshots`).
 
         Raises:
-            RobotsLostError: if robots are lost and the run does not survive that, or messages are lost for good.
-            UnsupportedError: if a robot's problem is too large, or not supported by this protocol.
+            RobotsLostError: if robots are lost and the run does not survive that, or messages are permanently lost.
+            UnsupportedError: if a robot's problem is too large, or not supported by the protocol.
         """
         began = time.monotonic()
         self.events.start_search()
@@ -246,7 +247,7 @@ class Master(MasterLoop):
             self._send(name, task)
         self._search_until(deadline)
         if self.snapshots and self.watch and not state.lost:
-            self.watch.wants_snapshot(time.monotonic())  # due work does not wait for the reports
+            self.watch.wants_snapshot(time.monotonic())  # do due work without waiting for the reports
         state.note_end(time.monotonic() - began, in_time=not (is_past(deadline) or self.is_to_stop))
         self._collect()
         return state.result(state.duration_s)
@@ -261,7 +262,7 @@ class Master(MasterLoop):
         return self.snapshots.advance() if self.snapshots else super()._snapshot()
 
     def adopt(self, number: int, why: str = "") -> None:
-        """Order all robots to keep their values of a snapshot, or (with a `why`) to decide on them. See `Adopt`."""
+        """Order all robots to keep their values in a snapshot, or (with a `why`) to decide on them. See `Adopt`."""
         self._send_all(Adopt(self.state.epoch, number, why))
 
     def _order_start(self) -> None:
@@ -281,13 +282,13 @@ class Master(MasterLoop):
             raise RobotsLostError({MASTER: state.stuck + doubts})
 
     def checked(self, assignments: Mapping[str, Mapping[str, int]]) -> tuple[bool, float]:
-        """Have every robot check its constraints against `assignments`. Not for private runs.
+        """Let every robot check its constraints against `assignments`. Not available in private runs.
 
         Returns:
             Whether all constraints are satisfied, and the sum of their costs.
 
         Raises:
-            RobotsLostError: if robots are lost, or do not check in time.
+            RobotsLostError: if robots are lost, or do not finish the check in time.
         """
         state = self.state
         for name in self.members.order:
@@ -299,7 +300,7 @@ class Master(MasterLoop):
         return state.held, state.cost
 
     def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
-        """Announce the end of the run until all robots confirm it, even those that have just joined or returned."""
+        """Announce the end of the run until all robots confirm it, including those that have just joined or returned."""
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):
@@ -312,7 +313,7 @@ class Master(MasterLoop):
             self._serve_until(lambda: not self._journal_server.lagging, time.monotonic() + FAREWELL_S)
 
     def lose(self, name: str, why: str) -> None:
-        """Note that the robot's process has ended. May be called from any thread."""
+        """Record that the process of the robot `name` has ended. May be called from any thread."""
         self._dead[name] = why
         self._connection.wake()
 
@@ -340,7 +341,7 @@ class Master(MasterLoop):
                 pass
 
     def _check_robots(self, now: float) -> None:
-        """Find robots that have been absent for too long, and revoked ones."""
+        """Find revoked robots, and robots that have been absent for too long."""
         if failure := self._policy.failure:
             raise RobotsLostError({MASTER: f"the router's process {failure}"})
         away_s = self._settings.patience_s
@@ -354,12 +355,12 @@ class Master(MasterLoop):
             self._follow_registry()
 
     def _notify_subscribers(self) -> None:
-        """Send the directory's notices about new, removed or changed robots."""
+        """Send the directory's notices on new, removed or changed robots."""
         for subscriber, answer in self._facilitator.notices():
             self._send(subscriber, answer)
 
     def _follow_registry(self) -> None:
-        """Admit newly enrolled robots, and exclude revoked ones. Both require a router with new rules."""
+        """Admit newly enrolled robots, and exclude revoked ones. Both require restarting the router with new rules."""
         for name in self._policy.revoked(self.members.robots):
             if name not in self.state.lost:
                 self.events.refuse(name, "take part", "its certificate was revoked")
@@ -371,7 +372,7 @@ class Master(MasterLoop):
     def _detect_end(self, now: float) -> None:
         """See `MasterLoop._detect_end`. The search also ends if messages are missing without a reported loss.
 
-        Such messages may still be delayed by zenoh, so the master waits longer for them.
+        zenoh may only have delayed such messages, so the master waits longer for them.
         """
         held_s = 0 if self._frame_loss.is_reported else HELD_S
         missing = self.state.missing(now, self._settings.patience_s + held_s)
@@ -425,10 +426,10 @@ class Master(MasterLoop):
             case Bye():
                 member.left = True
             case _:
-                raise AssertionError(message)  # `Framing` decodes nothing else
+                raise AssertionError(message)  # `Framing` decodes no other messages
 
     def _note_failure(self, name: str, why: str, refusal: type[UnsupportedError] | None = None) -> None:
-        """Note that the robot cannot continue, if there is a `why`; a `refusal` ends the run."""
+        """Record that the robot `name` cannot continue, if there is a `why`. A `refusal` ends the run."""
         why = on_one_line(why, LONGEST_REASON)
         if refusal:
             raise refusal(why)
@@ -436,7 +437,7 @@ class Master(MasterLoop):
             self._lose(name, why, for_good=True)
 
     def _lose(self, name: str, why: str, *, for_good: bool = False) -> None:
-        """Note that the robot is lost. Before the search it may return, unless `for_good`; in a search it may not.
+        """Record that the robot is lost. Before a search it may return, unless `for_good`; during a search it may not.
 
         Raises `RobotsLostError` unless the run survives the loss.
         """

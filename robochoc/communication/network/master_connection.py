@@ -27,9 +27,9 @@ Reach = Mapping[str, tuple[str, ...]]
 
 
 class ConnectionPolicy:
-    """The router at `endpoint`, which admits the members of the Authority's `admission`. Its opener closes it.
+    """The router at `endpoint`, which admits the members in the Authority's `admission`. The opener closes it.
 
-    `ways` are the team's receivers, if they are known in advance: then the router need not be restarted for them.
+    `ways` are the team's receivers, if known in advance: then the router need not be restarted to allow them.
     """
 
     def __init__(
@@ -44,17 +44,17 @@ class ConnectionPolicy:
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._admission = admission
-        # Robots give up after their patience: the end of the router must be detected earlier.
+        # Robots give up after their patience, so the end of the router must be detected earlier.
         self._router = Router(endpoint, identity, refused, lease_ms, scratch, patience_s / 2)
         self._ways = ways
         self.admitted: tuple[str, ...] = ()
-        """The names that may connect by the router's present rules."""
+        """The names that may connect under the router's current rules."""
         self.sniffable = False
         """Whether sniffers may receive the journal of this run."""
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
-        """Admit all names that the Authority has certified or invited, to write to the master and their receivers."""
+        """Admit all names that the Authority has certified or invited. They may write to the master and to receivers."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:
@@ -63,10 +63,10 @@ class ConnectionPolicy:
         self.follow()
 
     def follow(self) -> None:
-        """Admit newly enrolled names, and exclude revoked ones. Raises `RouterError`.
+        """Admit newly enrolled names, and exclude revoked names. Raises `RouterError`.
 
-        Invited names have rules, too: nobody has a certificate in their names yet, and the router need not be restarted
-        when they receive one.
+        Invited names have rules, too. No certificate for these names exists yet, and the router need not be restarted
+        when it is issued.
         """
         names = partial(self._admission.names, invited=True)
         there = [*names(Role.ROBOT), *names(Role.OBSERVER)]
@@ -79,7 +79,7 @@ class ConnectionPolicy:
             self._router.open(*rules)
 
     def may_sniff(self, name: str) -> bool:
-        """Return whether this run's journal is public, and `name` has the right to receive it."""
+        """Return whether this run's journal is published, and `name` has the right to receive it."""
         return self.sniffable and name in self._admission.names(right=Right.SNIFF)
 
     def is_revoked(self, name: str) -> bool:
@@ -87,7 +87,7 @@ class ConnectionPolicy:
         return self._admission.is_revoked(name)
 
     def admits(self, name: str) -> bool:
-        """Return whether `name` has a valid certificate, even if the router does not know it yet."""
+        """Return whether `name` has a valid certificate, even if the router does not yet know it."""
         return name in self._admission.names()
 
     def is_robot(self, name: str) -> bool:
@@ -95,11 +95,11 @@ class ConnectionPolicy:
         return name in self._admission.names(Role.ROBOT)
 
     def share_of(self, name: str) -> Share:
-        """Return the quota of `name` at the master."""
+        """Return the quota for messages from `name` at the master."""
         return ROBOT_SHARE if self.is_robot(name) else OBSERVER_SHARE
 
     def revoked(self, names: Collection[str]) -> list[str]:
-        """Return the revoked ones of `names`."""
+        """Return those of `names` whose certificates were revoked."""
         return [name for name in names if self.is_revoked(name)]
 
     @property
@@ -113,7 +113,7 @@ class ConnectionPolicy:
 
 
 class MasterConnection:
-    """The connection of the master of the run `run`.
+    """The master's connection in the run `run`.
 
     Attributes:
         policy: The rights to connect and to write.
@@ -172,7 +172,7 @@ class MasterConnection:
             self.policy.close()
 
     def publish(self, publication: Publication) -> None:
-        """Offer `publication`, this run's journal, to authorized sniffers. To be called before `open`."""
+        """Offer `publication`, this run's journal, to authorized sniffers. Must be called before `open`."""
         publication.run = self.framing.run
         self.journal_server.publication = publication
         self.policy.sniffable = True
@@ -182,14 +182,14 @@ class MasterConnection:
         self._transport.send(name, self.framing.write(name, message))
 
     def receive(self, patience_s: float) -> Item | None:
-        """Return the oldest item of the inbox; None if none arrives within `patience_s` seconds."""
+        """Return the oldest item in the inbox, or None if none arrives within `patience_s` seconds."""
         try:
             return self._transport.inbox.get(timeout=patience_s)
         except Empty:
             return None
 
     def read(self, sender: str, content: bytes) -> Opened | None:
-        """Return the content of a frame; None if it was refused, which is reported."""
+        """Return the content of a frame, or None if the frame was refused. Refusals are reported."""
         try:
             opened = self.framing.read(sender, content)
         except FrameRefusedError as refused:
@@ -208,6 +208,6 @@ class MasterConnection:
         self._transport.subscribe(self.policy.admitted)
 
     def _note_refusal(self, refusal: Refusal) -> None:
-        """Report a refusal by the router, unless the identity has been admitted since and will try again."""
+        """Report a refusal by the router, unless the identity has meanwhile been admitted and will try again."""
         if refusal.what != "connect" or not self.policy.admits(refusal.who):
             self._events.refuse(*refusal)

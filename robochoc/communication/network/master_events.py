@@ -1,4 +1,4 @@
-"""The master's events: registrations, losses, grants, refusals, and the events of robots."""
+"""The master's events: registrations, losses, grants, refusals, and events from robots."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class MasterEvents:
         return self._observer is not None
 
     def start_search(self) -> None:
-        """Start a search: from now on, times are relative to this moment, like those of its robots."""
+        """Start a search. From now on, times are relative to this moment, like those in the robots' events."""
         self._began = time.monotonic()
 
     def registered(self, robot: str) -> None:
@@ -37,7 +37,7 @@ class MasterEvents:
         self._report(Registered(t=self._now, robot=robot))
 
     def dropped_out(self, robot: str, why: str) -> None:
-        """Report that a registered `robot` is gone, and awaited again."""
+        """Report that a registered `robot` has dropped out, and is awaited again."""
         self._report(DroppedOut(t=self._now, robot=robot, why=why))
 
     def lost(self, robot: str, why: str) -> None:
@@ -45,15 +45,15 @@ class MasterEvents:
         self._report(Lost(t=self._now, robot=robot, why=why))
 
     def granted(self, who: str, what: str) -> None:
-        """Report that `who` was granted `what`."""
+        """Report that the participant `who` was granted `what`."""
         self._report(Granted(t=self._now, who=who, what=what))
 
     def relay(self, event: Granted | Refused) -> None:
-        """Report an event of the Authority, with the time of this run."""
+        """Report an event from the Authority, with a time in this run."""
         self._report(msgspec.structs.replace(event, t=self._now))
 
     def relay_from(self, name: str, events: Sequence[AnyEvent]) -> None:
-        """Report a robot's events. Events about other robots are refused."""
+        """Report events from a robot. Events about other robots are refused."""
         if not self._is_within_quota(name, len(events), EVENTS_A_SECOND):
             self.refuse(name, "report events", f"more than {EVENTS_A_SECOND:,} a second")
             return
@@ -64,14 +64,14 @@ class MasterEvents:
                 self.refuse(name, f"report {type(event).__name__}", "it is about another robot")
 
     def may_report_others(self, name: str) -> bool:
-        """Return whether `name` may report a further refusal or loss; report a refusal if it has reported too many."""
+        """Return whether `name` may report another refusal or loss. If it has reported too many, report a refusal."""
         is_allowed = self._is_within_quota(name, 1, REPORTS_A_SECOND)
         if not is_allowed:
             self.refuse(name, "report others", f"more than {REPORTS_A_SECOND} times a second")
         return is_allowed
 
     def doubted(self, doubts: Sequence[Doubt]) -> str:
-        """Report pairs of robots with contradictory reports. Return a text on them, after a semicolon."""
+        """Report pairs of robots that contradict each other. Return a text on them that starts with a semicolon."""
         for doubt in doubts:
             for name in doubt.between:
                 self.refuse(name, "its counts of messages", doubt.why)

@@ -28,7 +28,7 @@ from robochoc.system.errors import RobochocError
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-    """Return the receivers of each robot of a team besides the master. See `NetworkMembers.reach`."""
+    """Return each robot's receivers, besides the master. See `NetworkMembers.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
     met = possible_neighbours(profiles)
@@ -36,7 +36,7 @@ def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) ->
 
 
 class RegistrationRefusedError(RobochocError, ValueError):
-    """A robot cannot be registered, for the reason in the message."""
+    """Raised if a robot cannot be registered. The text is the reason."""
 
 
 @dataclass
@@ -44,15 +44,15 @@ class Member:
     """A registered robot.
 
     Attributes:
-        profile: Its declarations about its file.
-        incarnation: The name of its registered process.
-        shown_later: Variables that it has disclosed later, on request.
-        card: Its key card of this run.
-        joined: It has confirmed the welcome.
+        profile: The robot's declarations about its file.
+        incarnation: The name of the registered process of the robot.
+        shown_later: Variables that the robot has disclosed later, on request.
+        card: The robot's key card in this run.
+        joined: Whether the robot has confirmed the welcome.
         away_since: The start of its absence, on the monotonic clock; None while it is present.
-        unconfirmed: It was absent since its last message, and may have been restarted.
-        asked: Variables that were requested from it.
-        left: It has confirmed that the run is over.
+        unconfirmed: Whether the robot was absent since its last message, and may have been restarted.
+        asked: Variables that were requested from the robot.
+        left: Whether the robot has confirmed that the run is over.
     """
 
     profile: Profile
@@ -67,30 +67,31 @@ class Member:
 
     @property
     def robot(self) -> Robot:
-        """The part of the robot that others see."""
+        """The robot, limited to what others see."""
         return visible_robot(self.profile, self.shown_later)
 
     def join(self, incarnation: str, card: bytes) -> None:
-        """Note that it has received the welcome. Messages of another incarnation are ignored."""
+        """Record that the robot has received the welcome. Messages from another incarnation are ignored."""
         if incarnation == self.incarnation:
             self.card, self.joined, self.unconfirmed = card, True, False
 
     def note_presence(self, *, there: bool) -> None:
-        """Note whether the router reports it as present."""
+        """Record whether the router reports the robot as present."""
         self.away_since = None if there else self.away_since or time.monotonic()
         self.unconfirmed = self.unconfirmed or not there
 
     def is_away(self, for_s: float) -> bool:
-        """Return whether it has been absent for longer than that. All are, for a moment, when the router restarts."""
+        """Return whether the robot has been absent for longer than `for_s`. A router restart looks like a short absence."""
         return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
 class NetworkMembers:
     """All registered robots, by name.
 
-    `expected` are the only allowed robots (None: all that the Authority admits), `number` is the size of the team.
-    Without either, the team is complete when all neighbours that robots name are present. `order` is the priority
-    order, if known in advance; parents come before their children in it. `ways` are its receivers (`reach`), likewise.
+    Only the robots in `expected` are allowed (None: all robots that the Authority admits); `number` is the size of the
+    team. Without either, the team is complete when all neighbours named by robots are present. `order` is the priority
+    order, and `ways` are the robots' receivers (`reach`), if known in advance; in `order` parents precede their
+    children.
     """
 
     def __init__(
@@ -109,7 +110,7 @@ class NetworkMembers:
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._dropped: set[str] = set()
-        """Formerly registered robots that have dropped out and have not returned."""
+        """Robots that were registered, have dropped out, and have not returned."""
         self._over: set[str] = set()
         """Incarnations that have ended. If one of them continues nevertheless, its frames have unexpected numbers."""
 
@@ -119,10 +120,10 @@ class NetworkMembers:
         return {name: member.profile for name, member in self.robots.items()}
 
     def register(self, sender: str, profile: Profile, incarnation: str, *, admitted: bool = True) -> Member:
-        """Register `sender`, or return its registration if it is already registered in the same incarnation.
+        """Register `sender`, or return its registration if the same incarnation is already registered.
 
         Raises:
-            RegistrationRefusedError: if it is not `admitted`, or its profile is invalid.
+            RegistrationRefusedError: if the robot is not `admitted`, or its profile is invalid.
         """
         known = self.robots.get(sender)
         if known and known.incarnation == incarnation:
@@ -141,7 +142,7 @@ class NetworkMembers:
         return self.robots[sender]
 
     def _fault_of_incarnation(self, sender: str, incarnation: str) -> str:
-        """Return why this incarnation of `sender` cannot be registered now; empty if it can."""
+        """Return the reason why this incarnation of `sender` cannot be registered now; empty if it can."""
         known = self.robots.get(sender)
         if incarnation in self._over:
             return "it was absent for too long: restart it"
@@ -152,7 +153,7 @@ class NetworkMembers:
         return "" if self.expected is None or sender in self.expected else "it is not a member of the team"
 
     def _fault_of_profile(self, sender: str, profile: Profile) -> str:
-        """Return why `profile` is not valid for `sender`, or contradicts other profiles; empty if it is valid."""
+        """Return why `profile` is invalid for `sender`, or contradicts other profiles; empty if it is valid."""
         if profile.name != sender:
             return f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s"
         try:
@@ -164,12 +165,12 @@ class NetworkMembers:
 
     @property
     def awaited(self) -> set[str]:
-        """The known names of robots that have not registered yet."""
+        """The names of known robots that have not yet registered."""
         return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
 
     @property
     def waited_for(self) -> list[str]:
-        """Descriptions of the robots for which the team waits: absent ones, and unconfirmed ones."""
+        """Descriptions of the absent or unconfirmed robots that the team is waiting for."""
         absent = sorted((self.awaited | self._dropped) - self.robots.keys())
         unsure = sorted(name for name, m in self.robots.items() if not m.joined or m.unconfirmed)
         more = 0 if self.number is None else self.number - len(self.robots) - len(absent)
@@ -186,7 +187,7 @@ class NetworkMembers:
         return enough and not self.awaited and all(m.joined and not m.unconfirmed for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
-        """Return undisclosed variables in neighbours' constraints, by the robots that may own them.
+        """Return the undisclosed variables in neighbours' constraints, by the robots that may own these variables.
 
         A parent's file need not list the variables that a child must know: the child's constraints name them.
         """
@@ -208,7 +209,7 @@ class NetworkMembers:
         return {name: variables for name, variables in unseen.items() if variables}
 
     def show(self, name: str, variables: Mapping[str, Ranges]) -> str:
-        """Record the robot's answer about its `unseen` variables; return why it is invalid, or an empty text."""
+        """Record a robot's answer about its `unseen` variables. Return why the answer is invalid, or an empty text."""
         member = self.robots[name]
         wanted = self.unseen().get(name, ())
         owners = self._owners()
@@ -227,7 +228,7 @@ class NetworkMembers:
         return ""
 
     def invalid_scopes(self) -> Iterator[str]:
-        """Yield descriptions of constraints over variables that no neighbour has, once no variable is `unseen`."""
+        """Yield descriptions of constraints over variables that no neighbour has. Call it when no variable is `unseen`."""
         owners = self._owners()
         for name, member in self.robots.items():
             looked_at = [one for names in member.profile.looks_at.values() for one in names]
@@ -244,9 +245,9 @@ class NetworkMembers:
         }
 
     def remove(self, names: Collection[str]) -> None:
-        """Remove robots for good, also as neighbours of others.
+        """Remove robots permanently, including as neighbours of other robots.
 
-        After the team is complete, the remaining robots keep their relative order, as in every runtime.
+        After the team is complete, the remaining robots keep their relative order, like in every runtime.
         """
         if self.closed:
             self._order = self.order
@@ -256,14 +257,14 @@ class NetworkMembers:
                 self._over.add(member.incarnation)
 
     def drop_out(self, name: str) -> None:
-        """Remove a robot while the team is open; it may register again."""
+        """Remove a robot while the team is open. The robot may register again."""
         self.remove([name])
         self._dropped.add(name)
 
     def to_welcome(self) -> dict[str, str]:
         """Return the incarnations of present robots that have not answered a welcome, while the team is open.
 
-        Their answer may have been lost; and of two incarnations only the running one answers.
+        Their answer may have been lost. If a robot has two incarnations, only the running one answers.
         """
         waiting = {
             name: m.incarnation
@@ -274,11 +275,11 @@ class NetworkMembers:
 
     @property
     def listening(self) -> list[str]:
-        """The robots that have joined and not left. Others do not know this run yet."""
+        """The robots that have joined and not left. Other robots do not know this run yet."""
         return [name for name, member in self.robots.items() if member.joined and not member.left]
 
     def staying(self, away_s: float, besides: Collection[str]) -> list[str]:
-        """Return robots, except `besides`, that have neither left nor been absent for more than `away_s` seconds."""
+        """Return the robots, except `besides`, that have not left, and not been absent for more than `away_s` seconds."""
         stay = (name for name, member in self.robots.items() if not (member.left or member.is_away(away_s)))
         return [name for name in stay if name not in besides]
 
@@ -290,11 +291,11 @@ class NetworkMembers:
         return tuple(in_priority_order(self.profiles))
 
     def reach(self, *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-        """Return the receivers of each robot: all others, if the protocol writes to non-neighbours."""
+        """Return each robot's receivers: all other robots if the protocol writes to non-neighbours, else its neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
     def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, SearchTask]:
-        """Return the task of each robot for a search, in priority order."""
+        """Return each robot's task in a search, in priority order."""
         order = self.order
         shown = {name: self.robots[name].robot for name in order}
         domains = {
@@ -321,7 +322,7 @@ class NetworkMembers:
         }
 
     def declared(self, traits: Traits) -> Declarations:
-        """Return the declarations against which robots' reports are checked."""
+        """Return the declarations used to check the robots' reports."""
         shown = {
             name: {variable.name: variable.domain for variable in member.robot.variables}
             for name, member in self.robots.items()
@@ -330,7 +331,7 @@ class NetworkMembers:
         return Declarations(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-        """Return the disclosed ones among `values` of the robots with which `name` may share a constraint."""
+        """Return those `values` that were disclosed by robots with which `name` may share a constraint."""
         found: dict[str, int] = {}
         for other in self._met()[name]:
             if other in self.robots:

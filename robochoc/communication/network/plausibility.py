@@ -1,8 +1,8 @@
-"""Plausibility of robots' reports: finds a robot that lies, or two of which one lies. Pure.
+"""Plausibility checks of robots' reports: find a robot that lies, or two robots of which one lies. Pure.
 
-The master has no files. It knows the robots' declarations (profiles), the allowed conclusions of each protocol
+The master has no files. It knows the robots' declarations (profiles), the conclusions that each protocol allows
 (traits), and that the messages that one robot reports as sent to another must match the other's report. So a report is
-compared with earlier reports of the same robot, and with reports of others. Remaining risks: docs/guides/security.md.
+compared with earlier reports by the same robot, and with reports by others. Remaining risks: docs/guides/security.md.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from robochoc.protocols.traits import Traits
 
 LARGEST_COUNT = 2**53
 CHECKS_PER_S = 10**12
-"""More constraint checks a second than any robot can do, even with precomputed tables."""
+"""More constraint checks per second than any robot can do, even with precomputed tables."""
 LARGEST_MEMORY = 2**50
 MOST_KINDS = 100
-"""The most types of messages: a protocol has fewer."""
+"""An upper bound on the number of message types. A protocol has fewer."""
 MOST_CHARGES = 10_000
 NOTICEABLE = 100
-"""The number of messages that may be in transit at the time limit."""
+"""The number of messages that may plausibly be in transit at the time limit."""
 _ROUNDED = 1 + 2**-40
-"""The tolerance for rounded costs, as some are sent as floats."""
+"""The tolerance for rounded costs, since some costs are sent as floats."""
 HEXADECIMAL = re.compile(r"[0-9a-f]+")
 _NOBODY = Exchanged(0, 0, 0)
 
 
 class Doubt(NamedTuple):
-    """A contradiction between the reports of two robots. One of `between` has sent a false report."""
+    """A contradiction between the reports of two robots. One of the robots in `between` has sent a false report."""
 
     between: tuple[str, str]
     why: str
@@ -51,9 +51,9 @@ class Doubt(NamedTuple):
 
 @dataclass(frozen=True)
 class Declarations:
-    """The master's knowledge before a search: the traits of the protocol, and the declarations of profiles.
+    """The master's knowledge before a search: the traits of the protocol, and the declarations in the profiles.
 
-    `shown` are the robots' variables with their domains, `dearest` is the largest total cost of each robot's
+    `shown` contains the robots' variables with their domains, `dearest` the largest total cost of each robot's
     constraints.
     """
 
@@ -66,10 +66,10 @@ NOTHING_DECLARED = Declarations()
 
 
 class FinishedSearch(NamedTuple):
-    """The master's knowledge of a finished search.
+    """The master's knowledge about a finished search.
 
-    `order` names its robots, `counts` are the last counters of one of them, `duration_s` is its duration in seconds.
-    `by_quiescence`: it ended by quiescence. `lossy`: robots were to drop messages.
+    `order` contains its robots, `counts` are the last counters of one of them, `duration_s` is its duration in seconds.
+    `by_quiescence`: the search ended by quiescence. `lossy`: robots were ordered to drop messages.
     """
 
     order: Collection[str]
@@ -79,11 +79,11 @@ class FinishedSearch(NamedTuple):
     lossy: bool = False
 
 
-# Reports of one robot
+# Checks of a single robot's reports
 
 
 def fault_of_counters(counts: MessageCounts, before: MessageCounts | None) -> str:
-    """Return why `counts` are invalid for a robot that had reported `before`; empty if they are valid."""
+    """Return why `counts` are invalid for a robot that had previously reported `before`; empty if they are valid."""
     if min(counts) < 0 or max(counts) > LARGEST_COUNT:
         return f"it has reported {counts.sent:,} messages sent and {counts.received:,} received, which is impossible"
     if before is not None and (counts.sent < before.sent or counts.received < before.received):
@@ -95,7 +95,7 @@ def fault_of_counters(counts: MessageCounts, before: MessageCounts | None) -> st
 
 
 def fault_of_report(name: str, account: DetailedReport, declared: Declarations, course: FinishedSearch) -> str:
-    """Return why the final report `account` of the robot `name` is invalid; empty if it is valid."""
+    """Return why the final report `account` by the robot `name` is invalid; empty if it is valid."""
     return (
         next(_faults_of_values(name, account.assignment, declared, assigned=account.assigned), "")
         or _fault_of_metrics(account, course.duration_s)
@@ -106,7 +106,7 @@ def fault_of_report(name: str, account: DetailedReport, declared: Declarations, 
 
 
 def fault_of_snapshot(name: str, snapshot: RobotSnapshot, declared: Declarations, order: Collection[str]) -> str:
-    """Return why `snapshot` of the robot `name` is invalid; empty if it is valid."""
+    """Return why `snapshot` by the robot `name` is invalid; empty if it is valid."""
     if not 0 <= snapshot.lost <= LARGEST_COUNT:
         return "it has reported counts that cannot be"
     return next(_faults_of_values(name, snapshot.assignment, declared), "") or fault_of_findings(
@@ -149,7 +149,7 @@ def _fault_of_exchange(name: str, account: DetailedReport, course: FinishedSearc
 
 
 def total_of(account: DetailedReport) -> MessageCounts:
-    """Return the total counts of messages that a robot has reported."""
+    """Return the total message counts that a robot has reported."""
     exchanged = account.exchanged.values()
     return MessageCounts(sum(one.sent for one in exchanged), sum(one.received for one in exchanged))
 
@@ -202,7 +202,7 @@ def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
 
 
 def fault_of_check(name: str, check: CheckResult, declared: Declarations, order: Collection[str]) -> str:
-    """Return why `check` of the robot `name` is invalid; empty if it is valid."""
+    """Return why `check` by the robot `name` is invalid; empty if it is valid."""
     judged = (*check.shared, *check.copies)
     if not 0 <= check.cost <= declared.dearest.get(name, LARGEST_COUNT) * _ROUNDED < INFINITE:
         return "its constraints cost more than it has declared"
@@ -221,21 +221,21 @@ def fault_of_check(name: str, check: CheckResult, declared: Declarations, order:
     return ""
 
 
-# Reports of two robots
+# Comparisons of two robots' reports
 
 
 def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool) -> Iterator[Doubt]:
-    """Yield contradictory reports of two robots about the messages between them.
+    """Yield contradictions between two robots' reports about the messages they exchanged.
 
-    No robot sends after its final report, so a received message was sent; and if all were `quiet`, and no robot has
-    sent or received since, each sent message was received.
+    No robot sends messages after its final report, so every received message must have been sent. If all robots were
+    `quiet`, and no robot has sent or received since, every sent message must have been received.
     """
     for name, account in accounts.items():
         for other, mine in account.exchanged.items():
             theirs = accounts[other].exchanged.get(name, _NOBODY) if other in accounts else None
             if theirs is None:
                 continue
-            # Each pair occurs twice if both report messages, and once if only one of them does.
+            # Each pair occurs twice if both robots report messages, and once if only one robot does.
             sent, had = mine.sent, theirs.received
             if had > sent or (quiet and had < sent):
                 yield Doubt((name, other), _gap(name, sent, other, had))
@@ -247,7 +247,7 @@ def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool
 
 
 def widest_gap(accounts: Mapping[str, DetailedReport]) -> str:
-    """Return a text on the two robots with by far too many messages in transit; empty if there are none."""
+    """Return a text on the two robots with far too many messages in transit; empty if there are no such robots."""
     widest, found = 0, ""
     for name, account in accounts.items():
         for other, mine in account.exchanged.items():
@@ -263,7 +263,7 @@ def _gap(name: str, sent: int, other: str, had: int) -> str:
 
 
 def doubts_about_values(assignments: Mapping[str, Mapping[str, int]]) -> Iterator[Doubt]:
-    """Yield variables that two robots have reported as theirs."""
+    """Yield variables that two robots have reported as their own."""
     owners: dict[str, str] = {}
     for name, assignment in assignments.items():
         for variable in assignment:
@@ -273,9 +273,9 @@ def doubts_about_values(assignments: Mapping[str, Mapping[str, int]]) -> Iterato
 
 
 def thoroughness(checks: Mapping[str, CheckResult]) -> CheckCounts:
-    """Return the numbers of constraints that another robot than the holder has checked too, and of all others.
+    """Return the number of constraints that a robot besides the holder has checked, and the number of the others.
 
-    If two robots report different numbers of constraints over the same variables, the smaller number counts.
+    If two robots report different numbers of constraints over the same variables, the smaller number is used.
     """
     held = sum(check.held for check in checks.values())
     seconded: dict[tuple[str, tuple[str, ...]], int] = {}
@@ -286,7 +286,7 @@ def thoroughness(checks: Mapping[str, CheckResult]) -> CheckCounts:
 
 
 def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
-    """Yield constraints with different costs in the reports of their holder and of another robot that knows them."""
+    """Yield constraints whose costs differ between the reports of their holder and another robot that knows them."""
     prices = {_key(one): one.price for check in checks.values() for one in check.shared}
     for name, check in checks.items():
         for one in check.copies:
@@ -300,7 +300,7 @@ def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
 
 
 def objections(checks: Mapping[str, CheckResult]) -> Iterator[str]:
-    """Yield texts on violated constraints, with the robots that report them."""
+    """Yield texts on violated constraints, including the robots that report them."""
     for name, check in checks.items():
         broken = [shortened(" ".join(one.variables)) for one in check.shared if one.price == INFINITE]
         if broken:

@@ -91,7 +91,7 @@ class Concurrent(Schedule):
         self._times: list[int] = []
         """The times of turns, in a heap without duplicates."""
         self._turns: dict[int, list[tuple[float, str]]] = {}
-        """For each time, a heap of the robots with a turn, in random order. Many small heaps are faster than a large one."""
+        """For each time, a heap of the robots with a turn, in random order. Small heaps are faster than a large one."""
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
         """Send `envelope` with a random delay. It arrives no earlier than its predecessor in the same channel."""
@@ -150,7 +150,7 @@ class Concurrent(Schedule):
             self._note(reader, reader.inbox[0][0])
 
     def _note(self, reader: _Reader, arrival: int) -> None:
-        """Schedule the robot's turn, once its first message has arrived and it is not busy. A robot has at most one turn."""
+        """Schedule the robot's turn, once its first message has arrived and it is free. A robot has at most one turn."""
         due, free = arrival, reader.busy_until
         if free > due:  # noqa: PLR1730 - faster
             due = free
@@ -227,7 +227,7 @@ class Cycles(Schedule):
 class RandomChannels(Schedule):
     """Any channel may be next, so any message may be delayed for any time: a hard test, not a model.
 
-    In each step one packet arrives: the head of a random channel, and, repeatedly with probability 1/2, the head of another
+    One packet arrives per step: the head of a random channel, and, repeatedly with probability 1/2, the head of another
     channel to the same robot.
     """
 
