@@ -112,7 +112,7 @@ class LocalNetwork(Session):
 
     @staticmethod
     def _open_master(make: Callable[[str], Master]) -> Master:
-        """Return the master, open at a free port of loopback. Try other ports if another program takes the port first."""
+        """Return the master, open at a free port of loopback. Try other ports if another program is faster."""
         for attempt in range(_ATTEMPTS):
             with socket.create_server((LOOPBACK, 0)) as trial:
                 port = trial.getsockname()[1]

@@ -300,7 +300,7 @@ class Master(MasterLoop):
         return state.held, state.cost
 
     def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
-        """Announce the end of the run until all robots confirm it, including those that have just joined or returned."""
+        """Announce the end of the run until all robots confirm it, even those that have just joined or returned."""
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):

@@ -54,7 +54,7 @@ class ConnectionPolicy:
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
-        """Admit all names that the Authority has certified or invited. They may write to the master and to receivers."""
+        """Admit all names that the Authority has certified or invited, to write to the master and their receivers."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:

@@ -81,7 +81,7 @@ class Member:
         self.unconfirmed = self.unconfirmed or not there
 
     def is_away(self, for_s: float) -> bool:
-        """Return whether the robot has been absent for longer than `for_s`. A router restart looks like a short absence."""
+        """Return whether the robot has been absent for longer than `for_s`. A router restart is a short absence."""
         return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
@@ -228,7 +228,7 @@ class NetworkMembers:
         return ""
 
     def invalid_scopes(self) -> Iterator[str]:
-        """Yield descriptions of constraints over variables that no neighbour has. Call it when no variable is `unseen`."""
+        """Yield descriptions of constraints over variables that no neighbour has, once no variable is `unseen`."""
         owners = self._owners()
         for name, member in self.robots.items():
             looked_at = [one for names in member.profile.looks_at.values() for one in names]
@@ -279,7 +279,7 @@ class NetworkMembers:
         return [name for name, member in self.robots.items() if member.joined and not member.left]
 
     def staying(self, away_s: float, besides: Collection[str]) -> list[str]:
-        """Return the robots, except `besides`, that have not left, and not been absent for more than `away_s` seconds."""
+        """Return the robots, except `besides`, that have not left or been absent for more than `away_s` seconds."""
         stay = (name for name, member in self.robots.items() if not (member.left or member.is_away(away_s)))
         return [name for name in stay if name not in besides]
 
@@ -291,7 +291,7 @@ class NetworkMembers:
         return tuple(in_priority_order(self.profiles))
 
     def reach(self, *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-        """Return each robot's receivers: all other robots if the protocol writes to non-neighbours, else its neighbours."""
+        """Return each robot's receivers: all others if the protocol writes to non-neighbours, else its neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
     def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, SearchTask]:

@@ -150,7 +150,7 @@ class Concurrent(Schedule):
             self._note(reader, reader.inbox[0][0])
 
     def _note(self, reader: _Reader, arrival: int) -> None:
-        """Schedule the robot's turn, once its first message has arrived and it is free. A robot has at most one turn."""
+        """Schedule the robot's turn, once its first message has arrived and it is free. It has at most one turn."""
         due, free = arrival, reader.busy_until
         if free > due:  # noqa: PLR1730 - faster
             due = free
