@@ -1,9 +1,9 @@
 """The meaning of a constraint when a robot is absent: it has withdrawn, was lost, or was removed by an event.
 
-docs/reference/absence.md has the definition, with examples. An aggregate of alike terms that is compared with numbers
-loses the terms of the absent robots and stays in force. Every other constraint that mentions an absent robot is
-dropped. The author of a constraint may choose another meaning (`WhenAbsent`). Searches, checker, central
-solvers and changes of a team all use `restated`.
+The definition, with examples, is in docs/reference/absence.md. An aggregate of similar terms that is compared with
+numbers loses the terms of the absent robots and stays in force. Every other constraint over a variable of an absent
+robot is dropped. The author of a constraint may choose another meaning (`WhenAbsent`). The searches, the checker, the
+central solvers and the changes of a team all use `restated`.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ _COMPARING = AGGREGATES | {"eq", "ne", "lt", "le", "gt", "ge", "in", "not", "sub
 _CONNECTIVES = frozenset({"and", "or"})
 """The operators that join conditions."""
 _NUMBERS = frozenset({"add", "min", "max"})
-"""Aggregates of numbers: the numbers in their terms may differ from robot to robot."""
+"""Aggregates of numbers. The numbers in their terms may differ between robots."""
 _ALL_DIFFERENT, _CUMULATIVE = "global:allDifferent", "global:cumulative"
 _GROUP = re.compile(r"\{[^}]*\}")
 _FALSE = Predicate("absent", (), Apply("eq", (Constant(0), Constant(1))))
@@ -44,11 +44,11 @@ _TWO = 2
 
 @dataclass(frozen=True)
 class DroppedConstraint:
-    """A constraint that is not in force because a robot is absent.
+    """A constraint that is not in force because one of its robots is absent.
 
     Attributes:
-        name: Its name.
-        robots: The robots in its scope, absent ones included, in priority order.
+        name: The name of the constraint.
+        robots: The robots in its scope, including absent ones, in priority order.
     """
 
     name: str
@@ -56,14 +56,14 @@ class DroppedConstraint:
 
 
 class NotAnAggregateError(RobochocError):
-    """An expression is not an aggregate of alike terms that is compared with numbers."""
+    """Raised if an expression is not an aggregate of similar terms that is compared with numbers."""
 
 
 def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | None:
-    """Return `constraint` as restated for the robots that stay; None: it is dropped.
+    """Return `constraint`, restated for the remaining robots, or None if it is dropped.
 
-    A constraint that was restated before is restated from its original form, so the order of departures does not
-    matter.
+    A constraint that has been restated before is restated from its original form, so the order in which robots leave
+    does not matter.
 
     Args:
         constraint: The constraint.
@@ -85,9 +85,9 @@ def restated(constraint: Constraint, absent: Collection[str]) -> Constraint | No
 
 
 def can_be_restated(constraint: Constraint) -> bool:
-    """Return whether `constraint` can stay in force for fewer robots.
+    """Return whether `constraint` can stay in force when one of its robots is absent.
 
-    `x != y` counts as all different over two variables: without one of them it is always satisfied.
+    `x != y` is treated as all different over two variables: without one of them it is always satisfied.
     """
     if constraint.model == ConstraintModel.PKC or isinstance(constraint.definition, Relation):
         return False
@@ -111,7 +111,7 @@ def may_count_when_absent(constraint: Constraint) -> bool:
 
 
 def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | None:
-    """Return a constraint without the variables `gone`; None: it is dropped. Raises `NotAnAggregateError`."""
+    """Return a constraint without the variables `gone`, or None if it is dropped. Raises `NotAnAggregateError`."""
     definition = constraint.definition
     if (
         constraint.when_absent == WhenAbsent.DROP
@@ -132,7 +132,7 @@ def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | No
         symbolic = tuple(name for name in definition.symbolic if name in remaining)
         if body is None:
             return None
-        name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # one definition can have several remainders
+        name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # one definition may have several of them
         left = replace(definition, name=name, parameters=remaining, body=body, symbolic=symbolic)
         terms = [formals[name] for name in remaining]
     if left is None:
@@ -142,10 +142,10 @@ def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | No
 
 
 def without_terms(expression: Expression, lost: Collection[str]) -> Expression | None:
-    """Return an aggregate, compared with numbers, without the terms of the names `lost`.
+    """Return an aggregate, compared with numbers, without the terms that contain the names `lost`.
 
     Returns:
-        The remaining aggregate; None if it has lost all terms.
+        The remaining aggregate, or None if it has lost all terms.
 
     Raises:
         NotAnAggregateError: if `expression` has another form.
@@ -179,7 +179,7 @@ def without_terms(expression: Expression, lost: Collection[str]) -> Expression |
 
 
 def _is_all_different(expression: Apply) -> bool:
-    """Return whether `expression` requires that each pair of some terms and numbers differs."""
+    """Return whether `expression` requires all of some terms and numbers to be pairwise different."""
     if expression.operator != "and" or any(
         not isinstance(one, Apply) or one.operator != "ne" for one in _flat(expression)
     ):
@@ -190,7 +190,7 @@ def _is_all_different(expression: Apply) -> bool:
 
 
 def _is_about_one(expression: Apply, terms: Iterable[Expression]) -> bool:
-    """Return whether `expression` joins conditions on one aggregate: it lies between numbers, or is one of a set."""
+    """Return whether `expression` joins conditions on a single aggregate: it lies between numbers, or is in a set."""
     return expression.operator in _CONNECTIVES and len({_compared(one) for one in terms}) == 1
 
 
@@ -205,10 +205,10 @@ def _compared(expression: Expression) -> Expression:
 
 
 def _term(term: Expression, lost: Collection[str]) -> Expression | None:
-    """Return a term of an aggregate without the names `lost`; None: the term is lost.
+    """Return a term of an aggregate without the names `lost`, or None if the term is lost.
 
-    A term that mentions several robots is restated if it is an aggregate of its own and mentions two that stay, or if
-    the last one that stays is mentioned in each of its parts (the load at the start of one task).
+    A term over several robots is restated if it is an aggregate itself and contains two remaining robots, or if each of
+    its parts contains the last remaining robot (the load at the start of a task).
     """
     if not any(name in lost for name in names(term)):
         return term
@@ -224,7 +224,7 @@ def _term(term: Expression, lost: Collection[str]) -> Expression | None:
 
 
 def _flat(expression: Apply) -> Sequence[Expression]:
-    """Return the arguments of an aggregate, including those of nested aggregates of the same kind."""
+    """Return the arguments of an aggregate, including the arguments of nested aggregates of the same kind."""
     if expression.operator not in AGGREGATES:
         return expression.arguments
     found: list[Expression] = []
@@ -235,12 +235,12 @@ def _flat(expression: Apply) -> Sequence[Expression]:
 
 
 def _alike(operator: str, terms: Iterable[Expression]) -> bool:
-    """Return whether terms are equal up to their names; in an aggregate of numbers, up to numbers too."""
+    """Return whether the terms are equal except for names, and in an aggregate of numbers, also except for numbers."""
     return len({_shape(term, loose=operator in _NUMBERS) for term in terms}) == 1
 
 
 def _shape(expression: Expression, *, loose: bool) -> Hashable:
-    """Return the form of a term without names; with `loose`, also without numbers, except the signs of factors."""
+    """Return the form of a term without names. With `loose`, numbers are removed too, except the signs of factors."""
     if loose and not names(expression):
         return "number"
     sign, part = _without_numbers(expression) if loose else (1, expression)
@@ -259,7 +259,7 @@ def _shape(expression: Expression, *, loose: bool) -> Hashable:
 
 
 def _without_numbers(expression: Expression) -> tuple[int, Expression]:
-    """Return the sign of a term's factor, and the term without the numbers that are added to it or multiply it."""
+    """Return the sign of a term's factor, and the term without the numbers added to it or multiplied by it."""
     sign = 1
     while isinstance(expression, Apply) and expression.operator in {"neg", "add", "sub", "mul"}:
         terms = [one for one in _flat(expression) if names(one)]
@@ -281,14 +281,14 @@ def _sign(value: int) -> int:
 
 
 def _formals(constraint: Constraint) -> dict[str, str | int]:
-    """Return the actual parameter of each formal one."""
+    """Return the actual parameter for each formal parameter."""
     definition = constraint.definition
     parameters = () if isinstance(definition, Relation) else definition.parameters
     return dict(zip(parameters, constraint.parameters, strict=True))
 
 
 def _with_constants(expression: Expression, formals: Mapping[str, str | int]) -> Expression:
-    """Return `expression` with numbers in place of the formal parameters that have one."""
+    """Return `expression` with numbers substituted for the formal parameters whose actual parameters are numbers."""
     match expression:
         case Name(name):
             actual = formals[name]
@@ -300,7 +300,7 @@ def _with_constants(expression: Expression, formals: Mapping[str, str | int]) ->
 
 
 def _is_difference(constraint: Constraint) -> bool:
-    """Return whether `constraint` requires that two variables differ: `all_different` consists of such pairs."""
+    """Return whether `constraint` requires two variables to differ. `all_different` consists of such pairs."""
     definition = constraint.definition
     if not isinstance(definition, Predicate) or not isinstance(definition.body, Apply):
         return False
@@ -309,9 +309,9 @@ def _is_difference(constraint: Constraint) -> bool:
 
 
 def _is_choice(body: Expression) -> bool:
-    """Return whether `body` is one of two numbers, by a condition that mentions all of its names.
+    """Return whether `body` selects one of two numbers by a condition that contains all of its names.
 
-    The cost is then bounded by the two numbers, however many terms the condition has lost.
+    Then the two numbers bound the cost, no matter how many terms the condition has lost.
     """
     while isinstance(body, Apply):
         open_arguments = [one for one in body.arguments if names(one)]
@@ -324,7 +324,7 @@ def _is_choice(body: Expression) -> bool:
 
 
 def broken(constraint: Constraint, scope: tuple[str, ...]) -> Constraint:
-    """Return a hard constraint of the same name over `scope`, one variable or none, that is never satisfied."""
+    """Return a hard constraint with the same name over `scope` (at most one variable) that is never satisfied."""
     never = _NEVER if scope else _FALSE
     return replace(constraint, definition=never, scope=scope, parameters=scope, model=None, cost=INFINITE)
 
@@ -354,20 +354,20 @@ def _remaining_global(definition: GlobalPredicate, lost: Collection[str]) -> Glo
 
 
 def _without_groups(form: str, lost: Collection[str]) -> str:
-    """Return the form of a global constraint without the groups in braces that mention one of `lost`."""
+    """Return the form of a global constraint without the groups in braces that contain one of the names `lost`."""
     left = _GROUP.sub(lambda group: "" if any(word in lost for word in group[0].split()) else group[0], form)
     return " ".join(left.split())
 
 
 def _conjunction(body: Expression, lost: Collection[str]) -> Expression | None:
-    """Return the conjuncts of `body` that mention none of `lost`."""
+    """Return the conjuncts in `body` that contain none of the names `lost`."""
     parts = body.arguments if isinstance(body, Apply) and body.operator == "and" else (body,)
     remaining = tuple(one for one in parts if not any(name in lost for name in names(one)))
     return Apply("and", remaining) if len(remaining) > 1 else remaining[0] if remaining else None
 
 
 def _cumulative(body: Expression, lost: Collection[str], tasks: Sequence[bool]) -> Expression | None:
-    """Return the body of a cumulative constraint without the lost `tasks`; its last conjuncts are one peak a task."""
+    """Return a cumulative constraint's body without the lost `tasks`. Its last conjuncts are one peak per task."""
     if all(tasks):
         return None
     if not isinstance(body, Apply) or body.operator != "and":

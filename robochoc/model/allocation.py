@@ -1,13 +1,13 @@
-"""Task allocation as a problem of costs (Gerkey and Mataric, IJRR 23, 2004).
+"""Task allocation modelled as a problem with costs (Gerkey and Mataric, IJRR 23, 2004).
 
-The profit of a task for a robot is its worth minus the distance to it. The sum of profits is maximised. Two models:
+The profit of a task for a robot is the task's worth minus its distance. The sum of profits is maximised. Two models:
 
-- `assignment`: a robot does at most one task. It has one variable: its task, or 0.
-- `several`: a robot does several tasks, within its capacity. It has a variable for each task that it can do: 1 if it
-  does it, else 0.
+- `assignment`: a robot does at most one task. It has one variable, whose value is its task, or 0.
+- `several`: a robot does several tasks, within its capacity. It has a variable for each task that it can do, with the
+  value 1 if it does the task and 0 otherwise.
 
-In both, a task is done by at most one robot, unless it requires several (only in `several`): then by exactly so many,
-or by none. Profits are private; robots share only the constraints that exclude each other.
+In both models, at most one robot does a task. In `several`, a task may require several robots: then exactly that many
+robots do it, or none. Profits are private; robots share only the mutual exclusion constraints.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from robochoc.model.constraint import Constraint, Domain, Predicate, Relation, S
 from robochoc.model.expression import Apply, Constant, Expression, Name, Type, parse, total
 
 NOT_THE_SAME = Predicate("notSame", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
-"""Two robots do not do the same task; 0 means no task."""
+"""Two robots do not do the same task. 0 means no task."""
 NOT_BOTH = Predicate("notBoth", ("X", "Y"), parse("or(eq(X, 0), eq(Y, 0))", ("X", "Y"), Type.BOOLEAN))
 _DONE = Domain("Done", (range(2),))
 
@@ -33,14 +33,14 @@ Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
 
 
 class TasksModel(StrEnum):
-    """The model of a task allocation: one task for each robot (`assignment`), or `several`."""
+    """The model of a task allocation: one task per robot (`assignment`), or `several`."""
 
     ASSIGNMENT = "assignment"
     SEVERAL = "several"
 
 
 class Distance(StrEnum):
-    """The measure of distances: along streets (Manhattan's), or straight."""
+    """The measure of distances: along streets (Manhattan distance), or straight."""
 
     STREETS = "streets"
     STRAIGHT = "straight"
@@ -48,19 +48,19 @@ class Distance(StrEnum):
 
 @dataclass(frozen=True)
 class Worker:
-    """A robot that tasks are allocated to.
+    """A robot to which tasks are allocated.
 
     Attributes:
         name: Its name.
         label: Its label in the names of constraints.
-        variable: In `assignment` its variable; in `several` the first part of the names of its variables.
-        profit: The profit of each task that it can do.
+        variable: In `assignment` the name of its variable; in `several` the first part of the names of its variables.
+        profit: The profit of each task that the robot can do.
         capacity: Its maximum load. None: unlimited.
-        most: The maximum number of its tasks. None: unlimited.
-        together: The additional profit of pairs of tasks, if it does both.
-        tours: The length of the tour of each set of tasks that it can do together, by their numbers. With tours,
-            `profit` does not include distances; tasks in no tour have no place.
-        has_deadlines: Whether it can do only these sets of tasks, because they have deadlines.
+        most: The maximum number of tasks. None: unlimited.
+        together: The additional profit of pairs of tasks if the robot does both.
+        tours: The length of the tour for each set of tasks that the robot can do together, by task numbers. With tours,
+            `profit` does not include distances; tasks in no tour have no location.
+        has_deadlines: Whether the robot can do only these sets of tasks, because the tasks have deadlines.
     """
 
     name: str
@@ -76,12 +76,12 @@ class Worker:
 
 @dataclass(frozen=True)
 class TaskSpec:
-    """The data of a task that all robots know.
+    """The data of a task, known to all robots.
 
     Attributes:
-        name: The last part of the names of its variables in `several`.
+        name: The last part of the names of the task's variables in `several`.
         load: Its load.
-        robots: The number of robots that it requires.
+        robots: The number of robots that the task requires.
     """
 
     name: str
@@ -94,7 +94,7 @@ def assignment(workers: Sequence[Worker], symbols: tuple[str, ...] = ()) -> Part
 
     Args:
         workers: The robots.
-        symbols: The names for no task and for the tasks from number 1 on. Without them, values are numbers.
+        symbols: The names for no task and for the tasks from number 1 on. None: values are numbers.
     """
     variables = {
         one.name: [
@@ -142,8 +142,8 @@ def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Pa
 def distance_between(
     start: Sequence[int | Fraction], end: Sequence[int | Fraction], distance: Distance, places: int
 ) -> int:
-    """Return the distance between two places in units of 10**-places, rounded, halves up."""
-    # Whole numbers stay integers, which are several times as fast.
+    """Return the distance between two locations in units of 10**-places, rounded half up."""
+    # Whole numbers stay integers, for which the computation is several times as fast.
     parts = cast("list[Fraction]", [abs(one - other) for one, other in zip(start, end, strict=True)])
     unit: int = 10**places
     if distance == Distance.STREETS:
@@ -157,7 +157,7 @@ def _does(one: Worker, job: TaskSpec) -> str:
 
 
 def _limits(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
-    """Yield the constraints on the load, and on the number of tasks, of a robot, if they restrict it."""
+    """Yield the constraints on a robot's load and number of tasks, as far as they restrict the robot."""
     scope = tuple(_does(one, jobs[task]) for task in one.profit)
     if one.capacity is not None:
         loads = [jobs[task].load for task in one.profit]
@@ -167,7 +167,7 @@ def _limits(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
 
 
 def _tours(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
-    """Yield the costs of tours, and the constraint on sets of tasks that a robot has time for."""
+    """Yield the costs of tours, and the constraint on the sets of tasks for which a robot has time."""
     placed = [task for task in one.profit if (task,) in one.tours]
     scope = tuple(_does(one, jobs[task]) for task in placed)
     if not scope:
@@ -189,7 +189,7 @@ def _at_most(name: str, loads: Sequence[int], most: int) -> Predicate:
 
 
 def _crews(able: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
-    """Yield, for each task that requires several robots, the constraint that so many robots do it, or none."""
+    """Yield, for each task that requires several robots, the constraint that exactly so many robots do it, or none."""
     for task, job in jobs.items():
         scope = tuple(_does(one, job) for one in able if task in one.profit)
         if job.robots > 1 and scope:

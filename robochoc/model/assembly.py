@@ -1,7 +1,7 @@
 """Assemble teams from variables, constraints and a priority order.
 
-The lowest robot of a constraint's scope holds the constraint, and all others of the scope are parents of that robot
-(docs/reference/format.md, "One robot"). Importers, generators and `robochoc.Model` create their teams here.
+The lowest robot in a constraint's scope holds the constraint, and all other robots in the scope are its parents
+(docs/reference/format.md, "One robot"). Importers, generators and `robochoc.Model` create their teams in this module.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
 
 @dataclass(frozen=True, kw_only=True)
 class Extras:
-    """Further parts of the robots of a team.
+    """Additional parts of the robots in a team.
 
     Attributes:
-        links: Pairs of robots that are neighbours without a constraint; the robot of higher priority is the parent.
+        links: Pairs of robots that are neighbours without a shared constraint. The higher robot is the parent.
         topics: The topics of robots.
         weights: The weights of robots; the default is 1.
-        parts: The parts of partially known constraints (PKC), by the robot that knows them. Each is over variables of
-            that robot and of one other. If the other robot has no part, it gets one that allows everything.
+        parts: The parts of partially known constraints (PKC), by the robot that knows them. Each part is over variables
+            of that robot and of one other robot. If the other robot has no part, it gets a part that allows everything.
     """
 
     links: Sequence[tuple[str, str]] = ()
@@ -54,7 +54,7 @@ def assemble(
     costs: CostUnits = PLAIN_COSTS,
     extras: Extras = Extras(),
 ) -> Team:
-    """Return the team in which robots own `variables` and share `constraints`.
+    """Return the team whose robots own `variables` and share `constraints`.
 
     The domains determine which parameters of definitions are symbols. The cost of a constraint without variables is
     added to the constant; if such a constraint is hard and violated, the first robot gets a private constraint that no
@@ -63,14 +63,14 @@ def assemble(
     Args:
         name: The team's name.
         variables: The variables of each robot, by its name; the robots are in priority order, the highest first.
-        constraints: Totally known constraints over these variables, with costs in the unit `costs`. Those over
-            variables of one robot are private.
+        constraints: Totally known constraints over these variables, with costs in the unit `costs`. Constraints over
+                variables of a single robot are private.
         kind: The kind of problem.
-        costs: The unit of costs. The constant goes to the first robot alone.
+        costs: The unit of costs. Only the first robot gets its constant.
         extras: Further parts of the robots.
 
     Raises:
-        ValueError: if a constraint has a variable that no robot owns.
+        ValueError: if a constraint contains a variable that no robot owns.
     """
     symbolic = {one.name: one.domain.symbols for own in variables.values() for one in own if one.domain.symbols}
     links = _LinkBuilder(variables)
@@ -105,7 +105,7 @@ def assemble(
 def _without_constants(
     constraints: Iterable[Constraint], variables: Mapping[str, Sequence[Variable]], costs: CostUnits
 ) -> tuple[list[Constraint], CostUnits]:
-    """Return the `constraints` that have variables, and `costs` with the costs of the others in the constant."""
+    """Return the `constraints` over variables, and `costs` with the costs of all other constraints in the constant."""
     found = []
     for constraint in constraints:
         if constraint.variables:
@@ -125,7 +125,7 @@ _NEVER = Predicate("never", ("X",), Apply("ne", (Name("X"), Name("X"))))
 
 
 class _LinkBuilder:
-    """The constraints that robots hold, and the resulting links."""
+    """Collects the constraints that robots hold, and the resulting links."""
 
     def __init__(self, variables: Mapping[str, Sequence[Variable]]) -> None:
         self._variables = variables
@@ -140,7 +140,7 @@ class _LinkBuilder:
         self.private: dict[str, list[Constraint]] = defaultdict(list)
 
     def add(self, constraint: Constraint) -> None:
-        """Assign a totally known constraint to the lowest robot of its scope."""
+        """Assign a totally known constraint to the lowest robot in its scope."""
         robots = self._owners(constraint)
         lowest = max(robots, key=self._rank.__getitem__)
         if len(robots) == 1:
@@ -160,9 +160,9 @@ class _LinkBuilder:
         self._show(part, max(robot, other, key=self._rank.__getitem__))
 
     def missing_parts(self) -> list[tuple[str, Constraint]]:
-        """Return the missing parts of partially known constraints, with their robots; they allow everything.
+        """Return the missing parts of partially known constraints with their robots. These parts allow everything.
 
-        Both robots of such a constraint have a part of it in their files.
+        Both robots in such a constraint have a part of it in their files.
         """
         missing = []
         for (robot, scope), part in self._parts.items():
@@ -179,18 +179,18 @@ class _LinkBuilder:
         self._children[higher].add(lower)
 
     def place(self) -> None:
-        """Put every shared constraint under the lowest of its parents, in the order that readers of files compute."""
+        """Place every shared constraint under the lowest of its parents, in the order that readers of files compute."""
         seen = {robot: place for place, robot in enumerate(priority_order(self._parents))}
         for lowest, others, constraint in self._held:
             self._with[lowest, max(others, key=seen.__getitem__)].append(constraint)
 
     def parents_of(self, robot: str) -> tuple[Parent, ...]:
-        """Return the parents of `robot`, the highest first."""
+        """Return the parents of `robot`, in priority order."""
         names = sorted(self._parents[robot], key=self._rank.__getitem__)
         return tuple(Parent(name, tuple(self._with[robot, name])) for name in names)
 
     def children_of(self, robot: str) -> tuple[Child, ...]:
-        """Return the children of `robot`, the highest first."""
+        """Return the children of `robot`, in priority order."""
         names = sorted(self._children[robot], key=self._rank.__getitem__)
         own = [variable.name for variable in self._variables[robot]]
         return tuple(

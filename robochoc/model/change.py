@@ -1,7 +1,7 @@
-"""Changes of a team: the paper's function delta (Section 3.1), which maps a DisCSP to the next one.
+"""Changes of a team: the paper's function delta (Section 3.1), which maps a DisCSP to its successor.
 
-The functions are pure: they return another team. Changes come from a scenario, from the situation of the robots, or
-from the loss or the return of a robot.
+The functions are pure: they return another team. Changes are caused by a scenario, by the robots' situation, or by the
+loss or return of a robot.
 """
 
 from __future__ import annotations
@@ -44,14 +44,14 @@ from robochoc.model.team_edits import (
 
 
 class ExcessiveChangeError(ChangeError):
-    """A change with numbers that are too large (`model/magnitudes.py`) in any team."""
+    """Raised for a change with numbers that are too large (`model/magnitudes.py`) in any team."""
 
 
 def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
-    """Return `team` after `changes`, one after the other.
+    """Return `team` after applying `changes` one after the other.
 
     Raises:
-        ChangeError: if one of them is impossible.
+        ChangeError: if a change is impossible.
     """
     for change in changes:
         match change:
@@ -74,7 +74,7 @@ def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
 
 
 def _check_magnitudes(team: Team, change: Change) -> None:
-    """Raise `ExcessiveChangeError` if `change`, already applied in `team`, has numbers that are too large."""
+    """Raise `ExcessiveChangeError` if numbers in `change`, which is already applied in `team`, are too large."""
     match change:
         case AddAgent(robot):
             changed = list(team[robot.name].constraints())
@@ -97,7 +97,7 @@ def _check_magnitudes(team: Team, change: Change) -> None:
 def team_after_events(team: Team, events: int) -> Team:
     """Return `team` after the first `events` events of its scenario. The result has no scenario.
 
-    Changes that are impossible because robots are lost are left out.
+    Changes that are impossible because of lost robots are skipped.
     """
     now = replace(team, scenario=()) if team.scenario else team
     for event in team.scenario[:events]:
@@ -106,7 +106,7 @@ def team_after_events(team: Team, events: int) -> Team:
 
 
 def apply_possible_changes(team: Team, changes: Iterable[Change]) -> tuple[Team, list[Change]]:
-    """Return `team` after those of `changes` that are possible, one after the other, and these changes."""
+    """Return `team` after applying those of `changes` that are possible, and these changes."""
     applied = []
     for change in changes:
         with suppress(ChangeError):
@@ -140,7 +140,7 @@ def _label(team: Team, variable: str, value: int) -> int | str:
 
 
 def affected_robots(team: Team, change: Change) -> set[str]:
-    """Return the names of the robots of `team` that `change` concerns."""
+    """Return the names of the robots in `team` that are affected by `change`."""
     match change:
         case RemoveAgent(name):
             return {name}
@@ -171,7 +171,7 @@ def _with_robot(team: Team, robot: Robot) -> Team:
 
 
 def _check_newcomer(team: Team, robot: Robot) -> None:
-    """Raise `ChangeError` for mistakes of a new robot that do not depend on its constraints."""
+    """Raise `ChangeError` for errors in a new robot that do not depend on its constraints."""
     own = quoted(robot.name)
     if robot.name in team:
         raise ChangeError(f"the robot {own} is in the team already", "remove it before it joins again")
@@ -191,7 +191,7 @@ def _check_newcomer(team: Team, robot: Robot) -> None:
 
 
 def _check_parents(team: Team, robot: Robot, constraint: Constraint) -> None:
-    """Raise `ChangeError` unless the other robots of the scope are parents of `robot`, as in any robot's file."""
+    """Raise `ChangeError` unless the other robots in the scope are parents of `robot`, as in any robot's file."""
     parents = {parent.name for parent in robot.parents}
     for name in constraint.variables:
         owner = team.owner.get(name, robot.name)
@@ -206,7 +206,7 @@ def _with_constraint(team: Team, agent: str, parent: str, constraint: Constraint
 
 
 def _without_constraint(team: Team, agent: str, parent: str, name: str) -> Team:
-    """Return `team` without these constraints, and without both parts of partially known ones."""
+    """Return `team` without these constraints, including both parts of partially known ones."""
     holder, above = robot_named(team, agent), robot_named(team, parent)
     sides = [
         *(one.constraints for one in holder.parents if one.name == parent),
@@ -267,13 +267,13 @@ def _with_domain(team: Team, variable: str, domain: Domain) -> Team:
 
 
 def rejoin(team: Team, robot: Robot) -> Team:
-    """Return `team` with `robot`, which was lost and comes back, in place of the robot of the same name.
+    """Return `team` with `robot`, which was lost and returns, in place of the robot with the same name.
 
-    Constraints and links with robots that are not in the team are left out. The links of its neighbours stay. It shows
-    them the variables that their constraints need, also if its file does not list these.
+    Constraints and links with robots outside the team are skipped. The links of its neighbours stay. The robot shows
+    its neighbours the variables that their constraints need, even if its file does not list these variables.
 
     Raises:
-        ChangeError: if its file has other neighbours than before or another kind of problem, lacks a variable that
+        ChangeError: if the robot's file has different neighbours or another kind of problem, lacks a variable that
             others need, or has a partially known constraint.
     """
     _check_returning(team, robot)
@@ -293,7 +293,7 @@ def rejoin(team: Team, robot: Robot) -> Team:
 
 
 def _check_returning(team: Team, robot: Robot) -> None:
-    """Raise `ChangeError` unless `robot` can replace the robot of its name in `team`."""
+    """Raise `ChangeError` unless `robot` can replace the robot with the same name in `team`."""
     before = team[robot.name]
     added = {one.name for one in robot.parents if one.name in team} - {one.name for one in before.parents}
     added |= {one.name for one in robot.children if one.name in team} - {one.name for one in before.children}
@@ -311,7 +311,7 @@ def _check_returning(team: Team, robot: Robot) -> None:
 
 
 def _link_neighbours(team: Team, name: str) -> Team:
-    """Return `team`, in which `name` and its neighbours list each other, with the variables that constraints need."""
+    """Return `team` with `name` and its neighbours listing each other, and the variables that constraints need."""
     own = {variable.name for variable in team[name].variables}
     for parent in team[name].parents:
         for constraint in parent.constraints:

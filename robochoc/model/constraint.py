@@ -1,7 +1,7 @@
 """Variables with their domains, and constraints as data: in extension, and in intension (predicates, functions).
 
 Costs are integers in the unit of their robot's `CostUnits` (`model/costs.py`), or `INFINITE` for violated hard
-constraints, whether costs are minimised or maximised. They may be negative; protocols get normalised costs.
+constraints, whether the sum is minimised or maximised. Costs may be negative; protocols get normalised costs.
 """
 
 from __future__ import annotations
@@ -21,13 +21,13 @@ Term = str | int
 """A term of a scope: a variable's name or an integer constant (Figure 2 writes `V1.1 V3.1 1 3`)."""
 
 INFINITE = math.inf
-"""The cost of breaking a hard constraint."""
+"""The cost of violating a hard constraint."""
 
 
 class ConstraintModel(StrEnum):
-    """The distribution of the knowledge of shared constraints (Brito and Meseguer, CP 2003).
+    """The distribution of knowledge about shared constraints (Brito and Meseguer, CP 2003).
 
-    Totally known (TKC): its holder knows all of it. Partially known (PKC): each robot knows its own part.
+    Totally known (TKC): the holder knows the whole constraint. Partially known (PKC): each robot knows its own part.
     """
 
     TKC = "TKC"
@@ -35,9 +35,9 @@ class ConstraintModel(StrEnum):
 
 
 class WhenAbsent(StrEnum):
-    """The meaning of a constraint when a robot is absent, if its author has chosen one (`model/absence.py`).
+    """The meaning of a constraint when one of its robots is absent, if its author has chosen one (`model/absence.py`).
 
-    It is restated for the robots that stay, dropped, or counted as violated.
+    The constraint is restated for the remaining robots, dropped, or counted as violated.
     """
 
     RESTATE = "restate"
@@ -57,7 +57,7 @@ class Semantics(StrEnum):
 class Domain:
     """A finite set of integers, as disjoint ascending ranges.
 
-    Adjacent ranges are merged, so equal sets are equal domains.
+    Adjacent ranges are merged, so that equal sets are equal domains.
 
     Attributes:
         name: Its name.
@@ -98,7 +98,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class Relation:
-    """A constraint's definition in extension: tuples of integers.
+    """The definition of a constraint in extension: tuples of integers.
 
     Attributes:
         name: Its name.
@@ -106,8 +106,8 @@ class Relation:
         semantics: The meaning of the tuples.
         tuples: The tuples.
         costs: The cost of each tuple. Empty unless the semantics is `soft`.
-        default_cost: The cost of the tuples that a soft relation does not list.
-        symbolic: The columns that hold symbols.
+        default_cost: The cost of tuples not listed in a soft relation.
+        symbolic: The columns that contain symbols.
     """
 
     name: str
@@ -143,9 +143,9 @@ class Relation:
 
 @dataclass(frozen=True)
 class Predicate:
-    """A constraint's definition in intension: a Boolean expression over formal `parameters`.
+    """The definition of a constraint in intension: a Boolean expression over formal `parameters`.
 
-    The parameters are integers, except that those in `symbolic`, and constants compared with them, are symbols.
+    Parameters are integers. Those in `symbolic`, and constants compared with them, are symbols.
     """
 
     name: str
@@ -154,7 +154,7 @@ class Predicate:
     symbolic: tuple[str, ...] = ()
 
     def holds(self, arguments: Sequence[int]) -> bool:
-        """Return whether the body is true for `arguments`. An undefined body (division by zero) is false."""
+        """Return whether the body is true for `arguments`. An undefined value (division by zero) counts as false."""
         try:
             return bool(evaluate(self.body, dict(zip(self.parameters, arguments, strict=True))))
         except UndefinedValueError:
@@ -166,7 +166,7 @@ class GlobalPredicate(Predicate):
     """A global constraint of XCSP 2.1, with an equivalent body (`formats/global_constraints.py` creates both).
 
     Attributes:
-        form: Its parameters in XCSP 2.1, with formal parameters for variables: `[ { 1 X0 } { -1 X1 } ] <le/> 3`.
+        form: The parameters in XCSP 2.1, with formal parameters for variables: `[ { 1 X0 } { -1 X1 } ] <le/> 3`.
     """
 
     form: str = ""
@@ -174,9 +174,9 @@ class GlobalPredicate(Predicate):
 
 @dataclass(frozen=True)
 class Function:
-    """A constraint's definition in intension whose value is its cost: an integer expression over `parameters`.
+    """The definition of a constraint in intension whose value is its cost: an integer expression over `parameters`.
 
-    The value is in whole units of the user (`CostUnits.places` does not scale it). As in a predicate, parameters in
+    The value is in whole units of the user, not scaled by `CostUnits.places`. As in predicates, parameters in
     `symbolic` are symbols.
     """
 
@@ -186,7 +186,7 @@ class Function:
     symbolic: tuple[str, ...] = ()
 
     def cost(self, arguments: Sequence[int]) -> float:
-        """Return the cost of `arguments`: `INFINITE` if the body is undefined (division by zero)."""
+        """Return the cost of `arguments`: `INFINITE` if the value is undefined (division by zero)."""
         try:
             return evaluate(self.body, dict(zip(self.parameters, arguments, strict=True)))
         except UndefinedValueError:
@@ -202,18 +202,18 @@ class Constraint:
     """A relation, predicate or function, applied to a scope of variables and integer constants.
 
     Attributes:
-        name: Its name, which need not be unique: Figure 2 calls every constraint `C5`.
+        name: The name, which need not be unique: Figure 2 calls every constraint `C5`.
         definition: The relation, predicate or function.
         scope: The variables and constants.
         parameters: The actual parameters of a predicate. For a relation they equal `scope`.
         model: The robots' knowledge of a shared constraint. None: the constraint is private.
         cost: The cost of violating a predicate, in a DisWCSP. `INFINITE`: a hard constraint.
-        line: The line of the file that it was read from.
-        offset: The number that was subtracted from each of its costs, so that none is negative (`model/costs.py`).
-        when_absent: Its meaning when a robot is absent. None: as its form implies.
-        original: The original form of a constraint that was restated for the robots that stay.
+        line: The line in the file from which the constraint was read.
+        offset: The number subtracted from each cost of the constraint, so that no cost is negative (`model/costs.py`).
+        when_absent: The meaning when a robot is absent. None: the form of the constraint determines it.
+        original: The original form of a constraint that was restated for the remaining robots.
         absent: The variables of `original` whose robots are absent.
-        robots: The robots of `original`, in priority order, in a team that some of them have left.
+        robots: The robots of `original`, in priority order, if some of them have left the team.
     """
 
     name: str
@@ -235,7 +235,7 @@ class Constraint:
         return tuple(dict.fromkeys(term for term in self.scope if isinstance(term, str)))
 
     def price(self, assignment: Assignment) -> float:
-        """Return the cost of `assignment`, which has values for the scope. 0: the constraint holds."""
+        """Return the cost of `assignment`, which must contain the scope. 0: the constraint is satisfied."""
         values = [assignment[term] if isinstance(term, str) else term for term in self.parameters]
         if isinstance(self.definition, Predicate):
             return 0 if self.definition.holds(values) else self.cost

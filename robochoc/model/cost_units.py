@@ -1,4 +1,4 @@
-"""The unit of a team's costs: decimals of the user, perhaps maximised and with a constant, are integers internally."""
+"""The unit of a team's costs. Users see decimals, perhaps maximised or with a constant; internally they are integers."""
 
 from __future__ import annotations
 

@@ -32,19 +32,19 @@ from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Ro
 from robochoc.system.errors import RobochocError
 
 MAX_TRIED = 4096
-"""The maximum number of combinations of values of which the least cost of a function is computed exactly."""
+"""The maximum number of value combinations for which the least cost of a function is computed exactly."""
 
 Domains = Mapping[str, Domain]
 
 
 class UnboundedCostError(RobochocError, ValueError):
-    """The cost of a function has no bounds, because the domain of a variable is unknown."""
+    """Raised if the cost of a function has no bounds, because the domain of a variable is unknown."""
 
 
 def normalized(team: Team) -> Team:
-    """Return `team` with integer costs of 0 or more that are minimised, and the user's units in `user_units`.
+    """Return `team` with minimised integer costs of 0 or more, and with the user's units in `user_units`.
 
-    A team with such costs is returned unchanged.
+    If the costs already have this form, `team` is returned unchanged.
 
     Raises:
         UnboundedCostError: if the cost of a function has no bounds.
@@ -66,11 +66,11 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
 
     Args:
         robot: The robot.
-        units: The units of its team.
+        units: The units of the robot's team.
         domains: The known domains of variables. The expression of a function over other variables must imply bounds.
 
     Raises:
-        UnboundedCostError: if it does not.
+        UnboundedCostError: if the cost of a function has no bounds.
     """
     finer = 10 ** (units.places - robot.costs.places)
 
@@ -104,12 +104,12 @@ def normalized_constraint(constraint: Constraint, units: CostUnits, domains: Dom
 
 
 def user_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
-    """Return a cost in the user's numbers.
+    """Return a cost in the user's units.
 
     Args:
         team: A normalised team.
         total: A sum of normalised costs of the constraints of `team`.
-        without: Robots that have withdrawn: their constraints were restated or dropped.
+        without: The withdrawn robots. Their constraints were restated or dropped.
     """
     sign = -1 if team.user_units.maximize else 1
     return team.user_units.in_user_units(sign * (int(total) + _taken_out(team, without)))
@@ -128,11 +128,11 @@ def _taken_out(team: Team, without: Collection[str] = ()) -> int:
 
 
 def normalized_joining(team: Team, robot: Robot) -> Robot:
-    """Return `robot`, from its present file, with normalised costs for a `team` that it joins or rejoins.
+    """Return `robot`, as read from its file, with normalised costs for a `team` that it joins or rejoins.
 
     Raises:
-        UnboundedCostError: if the cost of a function has no bounds, or a function of another robot is bounded for other
-            values than the robot's variables have now.
+        UnboundedCostError: if the cost of a function has no bounds, or the bounds of another robot's function were
+            computed for other values than the robot's variables have now.
     """
     before = _domains(team)
     domains = dict(before)
@@ -146,11 +146,11 @@ def normalized_joining(team: Team, robot: Robot) -> Robot:
 
 
 def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
-    """Return `event`, which is not in the scenario, with normalised costs for a `team`.
+    """Return `event`, which is not in the scenario, with normalised costs for `team`.
 
     Raises:
-        UnboundedCostError: if the cost of a function in it has no bounds, or a value is added to a variable whose
-            functions are bounded for its present values.
+        UnboundedCostError: if the cost of a function in the event has no bounds, or a value is added to a variable, but
+            the bounds of its functions were computed for its current values.
     """
     domains = _domains(replace(team, scenario=(event,)))
     for change in event.changes:
@@ -189,7 +189,7 @@ def _joining(team: Team) -> list[Robot]:
 
 
 def _held_by_others(team: Team, name: str) -> Iterable[Constraint]:
-    """Yield the constraints of all robots except `name`, now or after some event."""
+    """Yield the constraints held by all robots except `name`, now or after some event."""
     for robot in [*team.robots, *_joining(team)]:
         if robot.name != name:
             yield from robot.constraints()
@@ -200,7 +200,7 @@ def _held_by_others(team: Team, name: str) -> Iterable[Constraint]:
 
 
 def _domains(team: Team) -> dict[str, Domain]:
-    """Return the domains of all variables, with the values that the scenario adds."""
+    """Return the domains of all variables, including the values added by the scenario."""
     domains = {name: variable.domain for name, variable in team.variables.items()}
     for event in team.scenario:
         for change in event.changes:
@@ -248,7 +248,7 @@ def _scaled(cost: float, factor: int) -> float:
 
 
 def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> Constraint:
-    """Return a predicate with this `cost`; for a negative cost, a function that is positive if the predicate holds."""
+    """Return a predicate with this `cost`. If it is negative: a function that is positive if the predicate holds."""
     if cost >= 0:
         return replace(constraint, cost=cost)
     body = Apply("if", (predicate.body, Constant(-cost), Constant(0)))
@@ -257,7 +257,7 @@ def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> 
 
 
 def _with_function(constraint: Constraint, function: Function, factor: int, domains: Domains) -> Constraint:
-    """Return a function with bounds in its expression: from 0 to the maximum cost of values in `domains`."""
+    """Return a function whose expression is bounded: from 0 to the maximum cost for values in `domains`."""
     body = function.body if factor == 1 else Apply("mul", (Constant(factor), function.body))
     least, most = _bounds(constraint, body, function.parameters, domains)
     if least < 0:
@@ -272,9 +272,9 @@ def _with_function(constraint: Constraint, function: Function, factor: int, doma
 
 
 def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...], domains: Domains) -> tuple[int, int]:
-    """Return the minimum and the maximum cost of a function, or bounds of these."""
+    """Return the minimum and the maximum cost of a function, or bounds on them."""
     names = constraint.variables
-    if len(names) > 1 and can_be_restated(constraint):  # its costs for fewer robots may differ
+    if len(names) > 1 and can_be_restated(constraint):  # the costs for fewer robots may differ
         low, high = bounds(body, defaultdict(lambda: ANY_INTEGER))
         return int(low), int(high)
     size = math.prod(len(domains[name]) if name in domains else MAX_TRIED + 1 for name in names)

@@ -1,9 +1,9 @@
-"""Check that constraints compute no numbers that are too large, for all values of their variables.
+"""Checks that constraints compute no numbers that are too large, for all values of their variables.
 
-Expressions are evaluated within +-2**63 (`model/expression`); beyond that, a constraint would be violated and a cost
-would forbid, which the author did not intend. Costs have at most 18 digits, so that they stay within 64 bits when they
-are converted to the team's unit and normalised (`model/costs.py`). Interval arithmetic finds possible excesses; if
-there are few combinations of values, all are tried, and only actual excesses count.
+Expressions are evaluated within +-2**63 (`model/expression`). Beyond that range, a constraint would be violated and a
+cost would be infinite, which the author did not intend. Costs have at most 18 digits, so that they stay within 64 bits
+when they are converted to the team's unit and normalised (`model/costs.py`). Interval arithmetic finds possible
+excesses; if there are few value combinations, all of them are tried, and only actual excesses count.
 """
 
 from __future__ import annotations
@@ -32,16 +32,16 @@ from robochoc.system.errors import RobochocError
 MAX_COST = 10**18 - 1
 """The largest cost, in the team's unit."""
 MAX_TRIED = 4096
-"""The maximum number of combinations of values that are tried to confirm an excess."""
+"""The maximum number of value combinations tried to confirm an excess."""
 _MAX_DIGITS = 25
 
 
 class MagnitudeError(RobochocError, ValueError):
-    """A constraint computes numbers that are too large.
+    """Raised if a constraint computes numbers that are too large.
 
     Attributes:
         message: The expression and the bound that it reaches.
-        hint: The next step.
+        hint: A suggestion to the user.
     """
 
     def __init__(self, message: str, hint: str) -> None:
@@ -68,7 +68,7 @@ class Magnitudes:
     def check(self, constraint: Constraint) -> None:
         """Raise `MagnitudeError` if `constraint` computes numbers that are too large for some of its values.
 
-        A constraint with a variable that has no known domain, or no values, is not checked.
+        A constraint over a variable whose domain is unknown or empty is not checked.
         """
         definition, terms = constraint.definition, constraint.parameters
         if isinstance(definition, Relation) or len(terms) != len(definition.parameters):
@@ -100,7 +100,7 @@ class Magnitudes:
         return any(abs(cost) > self._max_cost for cost in costs)
 
     def _is_confirmed(self, definition: Predicate | Function, terms: Sequence[Actual]) -> bool:
-        """Return whether trying all values finds a result that is too large; True if there are too many."""
+        """Return whether trying all values finds a too large result. True if there are too many values to try."""
         names = tuple(dict.fromkeys(term for term in terms if isinstance(term, str)))
         if math.prod(len(self._domains[name]) for name in names) > MAX_TRIED:
             return True
@@ -148,7 +148,7 @@ def _renamed(expression: Expression, actual: Mapping[str, Actual]) -> Expression
 
 
 def _in_digits(number: float) -> str:
-    """Return a number with all its digits, or as a power of ten if it is very long."""
+    """Return a number with all its digits, or as a power of ten if the number is very long."""
     if number in {math.inf, -math.inf}:
         return f"{'-' if number < 0 else ''}10^1000 and more"
     digits = str(number)

@@ -1,11 +1,12 @@
 """Total priority orders, and teams with other priorities (`robochoc solve --order`).
 
-The files of a team define the priorities, on which the speed of a protocol depends. The static orders are those that
-Dechter and Meiri compare ("Experimental evaluation of preprocessing algorithms for constraint satisfaction
-problems", AIJ 68, 1994, Section 3: minimum width, maximum degree, depth-first search), and dom/deg (Bessiere and
-Regin, "MAC and combined heuristics: two reasons to forsake FC (and CBJ?) on hard problems", CP 1996).
+The files of a team define the priorities, which determine the speed of a protocol. The static orders are those compared
+by Dechter and Meiri ("Experimental evaluation of preprocessing algorithms for constraint satisfaction problems", AIJ
+68, 1994, Section 3: minimum width, maximum degree, depth-first search), and dom/deg (Bessiere and Regin, "MAC and
+combined
+heuristics: two reasons to forsake FC (and CBJ?) on hard problems", CP 1996).
 
-The functions are pure: they return a team with the same problem and other links.
+The functions are pure: they return a team with the same problem and different links.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ Graph = Mapping[str, frozenset[str]]
 
 
 class Order(StrEnum):
-    """The names of orders. Ties are broken by natural name order. `given` is the order of the files."""
+    """The names of orders. Ties are broken by natural order of names. `given` is the order of the files."""
 
     GIVEN = "given"
     LEXICOGRAPHIC = "lexicographic"
@@ -39,7 +40,7 @@ class Order(StrEnum):
 
 
 class OrderError(RobochocError):
-    """A team cannot be reordered; the message is one sentence with the reason."""
+    """Raised if a team cannot be reordered. The message is a sentence with the reason."""
 
 
 def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
@@ -48,7 +49,7 @@ def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -
     Args:
         team: The team.
         order: The name of an order, or the names of all robots. None: the team stays unchanged.
-        seed: For the order `random`.
+        seed: The seed for the order `random`.
 
     Raises:
         OrderError: if the team cannot be reordered.
@@ -64,7 +65,7 @@ def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
     Args:
         team: The team.
         order: The name of the order.
-        seed: For the order `random`.
+        seed: The seed for the order `random`.
     """
     graph = constraint_graph(team)
     match order:
@@ -88,7 +89,7 @@ def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
 
 
 def with_dom_deg_order(team: Team) -> Team:
-    """Return `team` in the order `dom-deg`, which finds withdrawals fast; unchanged if it cannot be reordered."""
+    """Return `team` in the order `dom-deg`, which finds withdrawals fast. Unchanged if the team cannot be reordered."""
     try:
         return with_order(team, Order.DOM_DEG)
     except OrderError:
@@ -96,7 +97,7 @@ def with_dom_deg_order(team: Team) -> Team:
 
 
 def constraint_graph(team: Team) -> Graph:
-    """Return the neighbours of each robot: robots with which it shares a constraint, or is linked in the files."""
+    """Return the neighbours of each robot: robots that share a constraint with it, or are linked to it in the files."""
     near: dict[str, set[str]] = {robot.name: set() for robot in team.robots}
     for robot in team.robots:
         groups = [_owners(team, constraint) for constraint in robot.shared]
@@ -116,7 +117,7 @@ def _lexicographic(graph: Graph) -> tuple[str, ...]:
 
 
 def _max_degree(graph: Graph) -> tuple[str, ...]:
-    """Return the robots with the most neighbours first."""
+    """Return the robots sorted by the number of neighbours, in descending order."""
     return tuple(sorted(graph, key=lambda name: (-len(graph[name]), natural_key(name))))
 
 
@@ -124,7 +125,7 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
     """Return a minimum-width order, built from its end: the robot with the fewest remaining neighbours comes last.
 
     Freuder, "A sufficient condition for backtrack-free search", JACM 29, 1982: no order has a smaller width (the
-    most neighbours that a robot has above it).
+    largest number of neighbours above a robot).
     """
     place = {name: number for number, name in enumerate(_lexicographic(graph))}
     left = {name: set(others) for name, others in graph.items()}
@@ -134,7 +135,7 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
     while waiting:
         degree, _, last = heapq.heappop(waiting)
         if last not in left or degree != len(left[last]):
-            continue  # the heap has another entry of this robot, with fewer neighbours
+            continue  # the heap has another entry for this robot, with fewer neighbours
         for other in left.pop(last):
             left[other].discard(last)
             heapq.heappush(waiting, (len(left[other]), -place[other], other))
@@ -143,11 +144,11 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
 
 
 def _depth_first(graph: Graph) -> tuple[str, ...]:
-    """Return the order in which a depth-first search visits the robots. It induces that search's pseudo-tree.
+    """Return the order in which a depth-first search visits the robots. It induces the pseudo-tree of that search.
 
-    It starts with the robot that has the most neighbours, continues with its neighbour that has the most, and starts
-    again in each further component of the graph. Pseudo-trees: Freuder and Quinn, "Taking advantage of stable sets of
-    variables in constraint satisfaction problems", IJCAI 1985.
+    The search starts with the robot that has the most neighbours, continues with its neighbour that has the most, and
+    restarts in each further component of the graph. Pseudo-trees: Freuder and Quinn, "Taking advantage of stable sets
+    of variables in constraint satisfaction problems", IJCAI 1985.
     """
     by_degree = _max_degree(graph)
     place = {name: number for number, name in enumerate(by_degree)}
@@ -165,10 +166,10 @@ def _depth_first(graph: Graph) -> tuple[str, ...]:
 
 
 def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
-    """Return the robots with the smallest domain per neighbour first, and those without neighbours last.
+    """Return the robots sorted by domain size per neighbour, in ascending order. Robots without neighbours are last.
 
-    The domain is the declared one; for a robot with several variables, all combinations of their values. The values
-    that its private constraints allow are known only after compilation.
+    The domain is the declared one; for a robot with several variables, it consists of all combinations of their values.
+    The values allowed by private constraints are known only after compilation.
     """
     from fractions import Fraction  # noqa: PLC0415 - start-up: no other order needs it
 
@@ -184,7 +185,7 @@ def _dom_deg(graph: Graph, team: Team) -> tuple[str, ...]:
 def _random(graph: Graph, seed: int) -> tuple[str, ...]:
     """Return a random order, each as likely as any other.
 
-    Only `Random.random` is used, which Python promises never to change.
+    Only `Random.random` is used, since Python guarantees that its results never change.
     """
     from random import Random  # noqa: PLC0415 - once imported, it draws a new state in each forked process
 
@@ -197,20 +198,20 @@ def _random(graph: Graph, seed: int) -> tuple[str, ...]:
 
 
 def with_priorities(team: Team, names: Sequence[str]) -> Team:
-    """Return `team` with the priorities of `names`, highest first: the same constraints and solutions.
+    """Return `team` with the priorities of `names`, highest first. Constraints and solutions stay the same.
 
-    A totally known constraint moves to the robot of its scope that is now the lowest; the others are parents of that
-    robot. Links without a constraint stay, and are reversed if necessary. Children know the variables that their
-    constraints need, and those that the files list if the link was not reversed. So the team is as its author would
-    have written it with these priorities. Robots that are not linked may be in any order.
+    A totally known constraint moves to the robot in its scope that is now the lowest; the other robots in the scope are
+    parents of that robot. Links without a constraint stay, and are reversed if necessary. Children know the variables
+    that their constraints need, and the variables listed in the files if the link was not reversed. So the team is as
+    if its author had written it with these priorities. Robots that are not linked may be in any order.
 
     Args:
         team: The team.
-        names: The names of all its robots, each once.
+        names: The names of all robots in the team, each exactly once.
 
     Raises:
         OrderError: if the holder of a partially known constraint would change, or the team has a scenario.
-        ValueError: if `names` are not the robots' names.
+        ValueError: if `names` differ from the robots' names.
     """
     if sorted(names) != sorted(team.order):
         raise ValueError(f"the order must name each robot of {team.name} once")
@@ -222,7 +223,7 @@ def with_priorities(team: Team, names: Sequence[str]) -> Team:
 
 
 class _Reordering:
-    """The new links of a team with other priorities, and the new holders of its constraints."""
+    """Computes the new links of a team with other priorities, and the new holders of its constraints."""
 
     def __init__(self, team: Team, names: Sequence[str]) -> None:
         self._old = team
@@ -249,13 +250,13 @@ class _Reordering:
         return replace(self._old, robots=tuple(map(self._robot, self._rank)))
 
     def _holder(self, robot: Robot, constraint: Constraint) -> str:
-        """Return the new holder of `constraint`, which `robot` has held so far."""
+        """Return the new holder of `constraint`, which was held by `robot`."""
         if constraint.model == ConstraintModel.PKC:
             return robot.name
         return max(_owners(self._old, constraint), key=self._rank.__getitem__)
 
     def _lasting_links(self) -> Iterator[tuple[str, str]]:
-        """Yield parent and child of each link that stays even without totally known constraints."""
+        """Yield the parent and the child of each link that stays even without totally known constraints."""
         for robot in self._old.robots:
             needed = self._needed_before[robot.name]
             for parent in robot.parents:
@@ -293,11 +294,11 @@ class _Reordering:
         )
 
     def _listed(self, before: Mapping[str, object], now: set[str]) -> list[str]:
-        """Return the names in `now`: those listed before in their old order, then the new names by priority."""
+        """Return the names in `now`: first those listed before, in their old order, then the new names by priority."""
         return [*(name for name in before if name in now), *sorted(now - before.keys(), key=self._rank.__getitem__)]
 
     def _with_needed_variables(self, robot: Robot, child: Child) -> Child:
-        """Return `child` with the variables of `robot` that it must know now."""
+        """Return `child` with the variables of `robot` that the child must know now."""
         needs_now = self._needed[child.name].get(robot.name, set())
         needed_before = self._needed_before[child.name].get(robot.name, set())
         remaining = [name for name in child.variables if name in needs_now or name not in needed_before]
@@ -314,7 +315,7 @@ def _owners(team: Team, constraint: Constraint) -> set[str]:
 
 
 def _needed(team: Team, name: str, constraints: Sequence[Constraint]) -> dict[str, set[str]]:
-    """Return, for each other robot, its variables in `constraints`, which the robot `name` holds."""
+    """Return, for each other robot, its variables in those `constraints` that the robot `name` holds."""
     needed: dict[str, set[str]] = defaultdict(set)
     for constraint in constraints:
         for variable in constraint.variables:

@@ -1,4 +1,4 @@
-"""Convert teams and results to the names that robots and variables had in the files of another tool."""
+"""Convert teams and results to the names that robots and variables had in another tool's files."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Outcome, P
 from robochoc.model.problem import Team
 
 _NAME = re.compile(r"[A-Za-z0-9_.]+")
-"""A name in the description of a change that opened an epoch (`describe_change`)."""
+"""A name in the description of the change that opened an epoch (`describe_change`)."""
 
 
 def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
-    """Return `outcome` with the original `names` of robots and variables, given by their names in the team."""
+    """Return `outcome` with the original names of robots and variables. `names` maps current to original names."""
     if not names:
         return outcome
     return replace(
@@ -31,12 +31,12 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
 
 
 def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:
-    """Return `team` for reports: its robots and variables have their original `names`, and no links.
+    """Return `team` for reports, without links. Its robots and variables have their original `names`.
 
     Args:
         team: The team.
-        names: The original names, by the names in the team. If empty, the team is returned unchanged.
-        events: The number of events of its scenario that have happened.
+        names: Maps the names in the team to the original names. If empty, the team is returned unchanged.
+        events: The number of events in its scenario that have happened.
     """
     if not names:
         return team
@@ -56,7 +56,7 @@ def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:
 
 
 def robots_called(team: Team, names: Mapping[str, str]) -> dict[str, str]:
-    """Return the names of the robots of `team`, by these names and by their original `names`."""
+    """Return the current names of robots in `team`, by their current names and by their original `names`."""
     return {**{names.get(name, name): name for name in team.order}, **{name: name for name in team.order}}
 
 

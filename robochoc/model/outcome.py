@@ -11,12 +11,13 @@ from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 
 RULED_OUT = "has ruled everything out"
-"""The reason for which one robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty
-nogood, tried all values, or used bounds."""
+"""The reason why a single robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty
+nogood, tried all values, or used bounds.
+"""
 
 
 class Verdict(StrEnum):
-    """The answer to a problem; `UNKNOWN` when a limit was reached first."""
+    """The answer to a problem. `UNKNOWN` means that a limit was reached first."""
 
     SOLUTION = "solution"
     OPTIMAL = "optimal"
@@ -26,20 +27,20 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Metrics:
-    """The metrics of a run. Definitions are in `docs/reference/metrics.md`.
+    """The metrics of a run. They are defined in `docs/reference/metrics.md`.
 
     Attributes:
         messages: The number of protocol messages sent, by type.
-        bytes: The bytes of their encoded contents.
+        bytes: The total size of their encoded contents, in bytes.
         ncccs: Non-concurrent constraint checks.
-        checks: Constraint checks of all robots.
-        wall_s: Seconds of wall-clock time.
-        compile_s: Seconds before that, in which local domains were compiled.
-        memory: Bytes that the largest robot's process alone used in the end. 0: robots had no processes.
-        simulated_s: Seconds of simulated time, by a channel model. 0: there was none.
-        largest: Bytes of the largest message's content.
-        cycles: Cycles of the simulator's schedule `cycles`. 0: they were not counted.
-        lost_messages: How many messages were lost on their way, for good.
+        checks: The constraint checks of all robots together.
+        wall_s: The wall-clock time, in seconds.
+        compile_s: The time before that for compiling local domains, in seconds.
+        memory: The private memory of the largest robot process at its end, in bytes. 0: robots had no processes.
+        simulated_s: The simulated time by a channel model, in seconds. 0: time was not simulated.
+        largest: The size of the largest message's content, in bytes.
+        cycles: The number of cycles in the simulator's schedule `cycles`. 0: cycles were not counted.
+        lost_messages: The number of messages that were permanently lost.
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -55,7 +56,7 @@ class Metrics:
     lost_messages: int = 0
 
     def __add__(self, other: Metrics) -> Metrics:
-        """Return the cost of two runs, one after the other."""
+        """Return the sum of the costs of two consecutive runs."""
         types = sorted({*self.messages, *other.messages})
         return Metrics(
             messages={name: self.messages.get(name, 0) + other.messages.get(name, 0) for name in types},
@@ -74,11 +75,11 @@ class Metrics:
 
 @dataclass(frozen=True)
 class PseudoTreeNode:
-    """A robot's place in a pseudo-tree.
+    """A robot's position in a pseudo-tree.
 
     Attributes:
-        parent: The robot right above it. None: it is a root.
-        pseudo_parents: Its other neighbours on the way to the root.
+        parent: The robot directly above this robot. None: the robot is a root.
+        pseudo_parents: The robot's other neighbours on the path to the root.
     """
 
     parent: str | None
@@ -86,12 +87,12 @@ class PseudoTreeNode:
 
 
 class Improvement(NamedTuple):
-    """An answer that was published while the search went on: it is better than all before.
+    """An answer published during the search, better than all earlier answers.
 
     Attributes:
-        at_s: The seconds since the run, or the epoch, began.
-        verdict: What was known of it then: `SOLUTION`, or `OPTIMAL`.
-        cost: What it costs, in the user's numbers.
+        at_s: The seconds since the start of the run or the epoch.
+        verdict: The verdict at that time: `SOLUTION` or `OPTIMAL`.
+        cost: The cost in the user's units.
         withdrawn: The robots that do not fly.
     """
 
@@ -102,17 +103,17 @@ class Improvement(NamedTuple):
 
 
 CENTRAL_SOLVER = "the central solver"
-"""The name of ACE, and of what is done before it is asked, in `confirmed_by`."""
+"""The name in `confirmed_by` for ACE, including the checks made before ACE is called."""
 ALL_ROBOTS = "all robots"
-"""The `claimed_by` of a verdict that any one of the robots could have made untrue. No robot has such a name."""
+"""The value of `claimed_by` for a verdict that any single robot could have falsified. No robot has this name."""
 
 
 class CheckCounts(NamedTuple):
-    """Across machines: the numbers of checked constraints, by the robots that checked them.
+    """The number of checked constraints in a run across machines, by the robots that checked them.
 
     Attributes:
-        by_both: Checked by the robot that holds the constraint, and by another one.
-        by_owner: Checked by the robot that holds the constraint alone.
+        by_both: The constraints checked by the robot that holds the constraint and by another robot.
+        by_owner: The constraints checked only by the robot that holds the constraint.
     """
 
     by_both: int
@@ -120,11 +121,11 @@ class CheckCounts(NamedTuple):
 
 
 class Optima(NamedTuple):
-    """The list of optima, or of solutions, that a protocol has found.
+    """The optima, or the solutions, listed by a protocol.
 
     Attributes:
         number: The number of optima that robots can distinguish.
-        assignments: The first ones, each checked: the values of all variables of the robots that are not withdrawn.
+        assignments: The first optima, each checked: the values of all variables of the robots that are not withdrawn.
     """
 
     number: int
@@ -133,13 +134,13 @@ class Optima(NamedTuple):
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """The result of a preprocessing step, which robots took before the protocol began; of all epochs together.
+    """The result of preprocessing by the robots, before the protocol started, summed over all epochs.
 
     Attributes:
-        name: What it is called: `ac`.
-        metrics: What it took. It is not part of the run's other metrics.
-        removed: How many values of robots it has removed.
-        values: How many there were.
+        name: The name of the preprocessing: `ac`.
+        metrics: The metrics of the preprocessing. They are not included in the other metrics of the run.
+        removed: The number of values that were removed from the robots' domains.
+        values: The number of values before the preprocessing.
     """
 
     name: str
@@ -150,34 +151,34 @@ class Preprocessing:
 
 @dataclass(frozen=True)
 class Answer:
-    """The answer to a problem, of a search, an epoch or a whole run. Costs are in the user's numbers.
+    """The answer to a problem, given by a search, an epoch or a whole run. Costs are in the user's units.
 
     Attributes:
         verdict: The verdict.
-        assignment: The values of all variables of the robots that are not withdrawn, as the integers that robots
-            compute with: those of `symbolic` variables are places in `symbols`. `Solution.values` has the values of
-            the user.
-        cost: The cost of the assignment, exactly; the utility if that is maximised. None: there is no assignment.
-        withdrawn: The names of the withdrawn robots; in an `Outcome` including the lost ones.
+        assignment: The values of all variables of the robots that are not withdrawn, as the integers used by the
+            robots. The values of `symbolic` variables are indices in `symbols`. `Solution.values` has the user's
+            values.
+        cost: The exact cost of the assignment, or the utility if it is maximised. None: there is no assignment.
+        withdrawn: The names of the withdrawn robots; in an `Outcome` including lost robots.
         metrics: The messages, checks and time spent.
         verified: Whether the checker has compared the assignment with every constraint of a team that was validated
-            before; for `no-solution`, whether the central solver has found the same.
-        witness: The robot that ended the search: for `no-solution`, the one that has `RULED_OUT`.
+            before. For `no-solution`: whether the central solver has also found `no-solution`.
+        witness: The robot that ended the search. For `no-solution`: the robot that has `RULED_OUT`.
         reason: The reason for the verdict, if it is not obvious: a robot without a local solution, or a limit.
         count: The number of solutions, if it was requested.
-        bound: A lower bound on the cost of any assignment (an upper one on the utility, if that is maximised); with
-            withdrawal, on the weight of the withdrawn robots. None: not known.
+        bound: A lower bound on the cost of any assignment (an upper bound on the utility if it is maximised); with
+            withdrawal, a bound on the weight of the withdrawn robots. None: unknown.
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
-        confirmed: Whether the central solver was asked, and has found the same `no-solution` or the same minimum cost.
-        confirmed_by: The names of the solvers that have found the same, on the machine of the run.
-        checked: Across machines: the numbers of checked constraints, by the robots that checked them.
-        preprocessing: The result of preprocessing, if that was requested.
-        optima: The optima, or solutions, if the protocol lists them.
-        deadline: The seconds after which an answer was due, if the search was ended by the time and the answer is the
-            best one known at that moment.
-        improvements: The answers that were published during the search, the first of them at the deadline.
+        confirmed: Whether the central solver was called, and has found the same `no-solution` or the same minimum cost.
+        confirmed_by: The names of the solvers that have found the same result, on the machine of the run.
+        checked: The number of checked constraints in a run across machines, by the robots that checked them.
+        preprocessing: The result of preprocessing, if it was requested.
+        optima: The optima, or the solutions, if the protocol lists them.
+        deadline: The seconds after which an answer was due, if time ended the search and the answer is the best one
+            known at that moment.
+        improvements: The answers published during the search; the first was published at the deadline.
         dropped_constraints: The constraints between robots that were dropped because robots are absent, if there is an
-            assignment (`model/absence.py`). Across machines no robot knows all of them, and none is listed.
+            assignment (`model/absence.py`). In runs across machines no robot knows all of them, and none is listed.
     """
 
     verdict: Verdict
@@ -202,21 +203,21 @@ class Answer:
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
 
     def assignment_parts(self) -> dict[str, Any]:
-        """Return the fields that describe the assignment by name; they belong together."""
+        """Return the fields that describe the assignment, by name. These fields belong together."""
         names = ("assignment", "cost", "withdrawn", "verified", "checked", "dropped_constraints")
         return {name: getattr(self, name) for name in names}
 
     def parts(self, kind: type[Answer] | None = None) -> dict[str, Any]:
-        """Return the fields of `kind`, a base class, by name; by default those of `Answer`."""
+        """Return the fields of the base class `kind`, by name. The default is `Answer`."""
         return {one.name: getattr(self, one.name) for one in fields(kind or Answer)}
 
 
 @dataclass(frozen=True, kw_only=True)
 class EpochOutcome(Answer):
-    """The outcome of one epoch of a problem that changes over time, or whose robots were lost.
+    """The outcome of one epoch, for a problem that changes over time or whose robots were lost.
 
     Attributes:
-        robots: The robots of the team in this epoch, in the files' order.
+        robots: The robots in the team during this epoch, in the order of the files.
         opened_by: The event that opened the epoch, in a few words.
         lost: The robots whose loss ended the epoch.
     """
@@ -228,25 +229,25 @@ class EpochOutcome(Answer):
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome(Answer):
-    """The result of a run: how it was run, and its answer. With several epochs the answer is that of the last one.
+    """The result of a run: its settings and its answer. With several epochs, the answer is that of the last epoch.
 
     Metrics are summed up over the epochs.
 
     Attributes:
         team: The name of the team.
-        protocol: The protocol that was given or chosen.
+        protocol: The protocol that was specified or chosen.
         runtime: The runtime.
         seed: The seed of the run.
-        lost: The names of the withdrawn robots whose processes died, and that did not come back.
-        order: The name of the priority order that was given or chosen; `listed` for a list of names.
+        lost: The names of the withdrawn robots whose processes died and that did not return.
+        order: The name of the priority order that was specified or chosen; `listed` for a list of names.
         epochs: The epochs, if there were several.
-        channel: The name of the channel model, if time was simulated by one.
-        placed_by: The protocol of the withdrawal, if it differs from `protocol`.
-        claimed_by: Across machines: the robot on whose claim the verdict rests, as it cannot be checked; or
-            `ALL_ROBOTS`.
-        symbols: The names of the team's symbols, if it has any: the value 2 means the symbol at place 2.
+        channel: The name of the channel model, if time was simulated by a channel model.
+        placed_by: The protocol that decided the withdrawal, if it differs from `protocol`.
+        claimed_by: In runs across machines: the robot whose claim is the basis of the verdict, since the claim cannot
+            be checked; or `ALL_ROBOTS`.
+        symbols: The names of the team's symbols, if any: the value 2 means the symbol at index 2.
         symbolic: The variables whose values are symbols.
-        chosen: The reasons for the choice of `protocol` and `order`, where they were not given.
+        chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.
     """
 
     team: str
@@ -274,7 +275,7 @@ class Outcome(Answer):
         return _without_measurements(self, Outcome) == _without_measurements(other, Outcome)
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
-        """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""
+        """Return `assignment`, from this outcome or one of its epochs, with symbols given by their names."""
         named = set(self.symbolic)
         return {
             name: self.symbols[value] if name in named and 0 <= value < len(self.symbols) else value
@@ -295,17 +296,17 @@ class Outcome(Answer):
 
     @property
     def events(self) -> int:
-        """Return how many events of the scenario have happened: they, and losses, open epochs."""
+        """Return the number of events in the scenario that have happened. Epochs are opened by events and losses."""
         return sum(not epoch.lost for epoch in self.epochs[:-1])
 
     @property
     def protocols(self) -> str:
-        """The protocol that was asked for, and the one that said who withdraws, if that is another."""
+        """The protocol of the run, and the protocol that decided the withdrawal if it is another one."""
         return f"{self.protocol}, then {self.placed_by}" if self.placed_by else self.protocol
 
     @property
     def withdrawn_alive(self) -> tuple[str, ...]:
-        """The withdrawn robots that are not lost: there was no place for them."""
+        """The withdrawn robots that were not lost."""
         return tuple(name for name in self.withdrawn if name not in self.lost)
 
 

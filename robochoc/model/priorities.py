@@ -1,4 +1,4 @@
-"""Priorities: natural order of names, and total orders that respect the links of a team."""
+"""Priorities: the natural order of names, and total orders that respect the links in a team."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from robochoc.system.errors import RobochocError
 
 
 class CycleError(RobochocError, ValueError):
-    """The parents of robots form a cycle; `cycle` lists its robots, each the parent of the next."""
+    """Raised if the parents of robots form a cycle. `cycle` lists its robots, each the parent of the next."""
 
     def __init__(self, cycle: Sequence[str]) -> None:
         super().__init__(" -> ".join((*cycle, cycle[0])))
@@ -24,12 +24,12 @@ def natural_key(name: str) -> tuple[tuple[int, str], ...]:
 
 
 def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
-    """Return the total order of the robots in `parents`: topological, ties broken by natural name order.
+    """Return a total order of the robots in `parents`: a topological order with ties broken by natural name order.
 
-    Parents that are not themselves keys are ignored.
+    Parents that are not keys are ignored.
 
     Raises:
-        CycleError: if there is no such order.
+        CycleError: if no such order exists.
     """
     waiting = {name: {parent for parent in above if parent in parents} for name, above in parents.items()}
     children: dict[str, list[str]] = {name: [] for name in parents}
@@ -52,7 +52,7 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
 
 
 def _a_cycle(waiting: Mapping[str, set[str]]) -> list[str]:
-    """Return a cycle: walk up from a robot through parents that have no place yet, until a robot is reached again."""
+    """Return a cycle: go up from a robot through parents not yet in the order, until a robot is reached again."""
     walk = [min(waiting, key=natural_key)]
     place = {walk[0]: 0}
     while True:

@@ -1,7 +1,7 @@
-"""The problem a team solves, as data: the paper's tuple (A, X, D, C, psi) (Section 3.1).
+"""The problem solved by a team, as data: the paper's tuple (A, X, D, C, psi) (Section 3.1).
 
-A `Team` is a set of `Robot` objects (A). Each owns variables (X) with domains (D): that is psi. Constraints (C) are
-*private* to a robot, or *shared* between robots. Domains, variables and constraints are defined in
+A `Team` is a set of `Robot` objects (A). Each robot owns variables (X) with domains (D); psi is this ownership.
+Constraints (C) are *private* to a robot, or *shared* between robots. Domains, variables and constraints are defined in
 `model/constraint.py`, and can be imported from here.
 
 These are plain data. `formats` reads them from XML, `solver` compiles them, and `protocols` use only compiled problems.
@@ -72,9 +72,9 @@ __all__ = [
 ]
 
 Value = tuple[int | None, ...]
-"""A robot's value for its neighbours: the values of its interface variables, in the order of its file.
+"""A robot's value as seen by its neighbours: the values of its interface variables, in the order of its file.
 
-In a nogood, None is the value of a variable that does not matter: the nogood holds for each of its values.
+In a nogood, None is the value of an irrelevant variable: the nogood holds for each of the variable's values.
 """
 
 
@@ -87,7 +87,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic on which a robot's decision is published (ROS Layer unit).
+    """A topic to which a robot's decision is published (ROS Layer unit).
 
     `x`, `y`, `z` are the waypoint's position.
     """
@@ -101,7 +101,7 @@ class Topic:
 
 @dataclass(frozen=True)
 class Parent:
-    """A neighbour of higher priority, and the shared constraints that this robot holds with it."""
+    """A neighbour of higher priority, with the shared constraints that this robot holds for both."""
 
     name: str
     constraints: tuple[Constraint, ...] = ()
@@ -114,11 +114,11 @@ class Child:
 
     Attributes:
         name: The neighbour's name.
-        variables: The robot's own variables that the child must know.
-        constraints: The robot's parts of partially known constraints with the child.
-        line: The line of the robot's file that lists the child.
-        copies: Copies of TKC constraints of the child, in the robot's file. Across machines the robot checks the answer
-            with them too. They are ignored when robots are compared, and are not written to files.
+        variables: This robot's own variables that the child must know.
+        constraints: This robot's parts of partially known constraints with the child.
+        line: The line in the robot's file that lists the child.
+        copies: Copies in the robot's file of the child's TKC constraints. In a run across machines the robot also uses
+            them to check the answer. Copies are ignored when robots are compared, and are not written to files.
     """
 
     name: str
@@ -130,22 +130,22 @@ class Child:
 
 @dataclass(frozen=True)
 class Robot:
-    """One agent, with the contents of its file, its only knowledge.
+    """One agent: the contents of its file, which is all it knows.
 
     Attributes:
-        name: Its name, unique in the team.
-        variables: Its decisions.
+        name: The robot's name, unique in the team.
+        variables: The robot's decision variables.
         kind: The kind of problem, the same in the whole team.
-        private: Constraints on its own variables only.
-        parents: Neighbours of higher priority, with the constraints that it shares with them.
+        private: Constraints on the robot's own variables only.
+        parents: Neighbours of higher priority, with the constraints shared with them.
         children: Neighbours of lower priority.
-        topics: The topics of its decisions.
-        file: The file that it was read from, if any.
-        shown: Variables that neighbours see only because a parent's part of a partially known constraint has them.
-        weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
-        costs: The unit of its costs, and whether their sum is minimised or maximised.
-        symbols: The names of the team's symbols, if none of its domains is symbolic.
-        user_units: Of a robot with normalised costs (`model/costs.py`): the units in which the user reads its costs.
+        topics: The topics for the robot's decisions.
+        file: The file that the robot was read from, if any.
+        shown: Variables that neighbours see only because they occur in a parent's part of a partially known constraint.
+        weight: The weight of a withdrawal: a robot of weight 3 counts as much as three robots of weight 1.
+        costs: The unit of the robot's costs, and whether their sum is minimised or maximised.
+        symbols: The names of the team's symbols, if none of the robot's domains is symbolic.
+        user_units: The user's units of costs, if the robot's costs are normalised (`model/costs.py`).
     """
 
     name: str
@@ -163,7 +163,7 @@ class Robot:
     user_units: CostUnits = PLAIN_COSTS
 
     def constraints(self) -> Iterator[Constraint]:
-        """Yield every constraint in its file: private ones, shared ones, and its parts of partially known ones."""
+        """Yield every constraint in the robot's file: private and shared ones, and parts of partially known ones."""
         yield from self.private
         yield from self.shared
         for child in self.children:
@@ -171,7 +171,7 @@ class Robot:
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
-        """The shared constraints that this robot holds: those in whose scopes it is the lowest robot."""
+        """The shared constraints that this robot holds, since it is the lowest robot in their scopes."""
         return tuple(constraint for parent in self.parents for constraint in parent.constraints)
 
     @cached_property
@@ -230,7 +230,7 @@ class AddConstraint:
 
 @dataclass(frozen=True)
 class RemoveConstraint:
-    """All constraints called `name` that `agent` and `parent` share are removed."""
+    """All constraints called `name` shared by `agent` and `parent` are removed."""
 
     agent: str
     parent: str
@@ -242,12 +242,12 @@ Change = RemoveAgent | AddAgent | RemoveValue | AddValue | AddConstraint | Remov
 
 @dataclass(frozen=True)
 class ScenarioEvent:
-    """An event of a scenario: changes that happen together. It opens an epoch.
+    """An event in a scenario: changes that happen together. Each event opens an epoch.
 
     Attributes:
-        changes: The changes, in their order.
-        after: The number of messages in the epoch before, after which the event happens. None, or fewer messages:
-            when the epoch before is solved.
+        changes: The changes, in the order in which they are applied.
+        after: The number of messages in the previous epoch after which the event happens. If None, or if there are
+            fewer messages, it happens when the previous epoch is solved.
     """
 
     changes: tuple[Change, ...]
@@ -256,13 +256,13 @@ class ScenarioEvent:
 
 @dataclass(frozen=True)
 class Team:
-    """The robots of one problem, in priority order (the highest first).
+    """The robots of one problem, in priority order (highest first).
 
     Attributes:
         name: The team's name.
         robots: The robots.
-        scenario: How the problem changes over time. With events it is a DDisCSP, and this is its function delta.
-        dropped: Constraints that were dropped as robots left (`model/absence.py`).
+        scenario: The changes of the problem over time. A team with events is a DDisCSP, with the scenario as its delta.
+        dropped: Constraints that were dropped because robots left (`model/absence.py`).
     """
 
     name: str
@@ -288,7 +288,7 @@ class Team:
         return name in self._by_name
 
     def get(self, name: str) -> Robot | None:
-        """Return the robot called `name`. None: the team has none."""
+        """Return the robot called `name`, or None if the team has no such robot."""
         return self._by_name.get(name)
 
     @property
@@ -303,7 +303,7 @@ class Team:
 
     @cached_property
     def user_units(self) -> CostUnits:
-        """Of a normalised team (`model/costs.py`): the units in which the user reads its costs."""
+        """The user's units of costs, for a normalised team (`model/costs.py`)."""
         return common_units(robot.user_units for robot in self.robots)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Symbols: values that are names. Internally they are integer codes, indices of one table of the whole team."""
+"""Symbols: values with names. Internally they are integer codes: indices in a table common to the whole team."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def symbol_table(robots: Iterable[Robot]) -> tuple[str, ...]:
 
 
 def symbolic_variables(team: Team) -> tuple[str, ...]:
-    """Return the variables of `team`, and of robots that its scenario adds, whose values are symbols."""
+    """Return the variables with symbols as values, in `team` and in robots that its scenario adds."""
     changes = [change for event in team.scenario for change in event.changes]
     robots = [*team.robots, *(change.robot for change in changes if isinstance(change, AddAgent))]
     return tuple(dict.fromkeys(one.name for robot in robots for one in robot.variables if one.domain.symbols))
@@ -45,7 +45,7 @@ def with_marked_symbols(constraints: Iterable[Constraint], symbolic: Collection[
 
 
 def with_table(robot: Robot, names: tuple[str, ...]) -> Robot:
-    """Return `robot` with the table `names` in its symbolic domains or, if it has none, in `Robot.symbols`."""
+    """Return `robot` with the symbol table `names` in its symbolic domains, or in `Robot.symbols` if it has none."""
     if not names:
         return robot
     domains: dict[int, Domain] = {}
@@ -57,7 +57,7 @@ def with_table(robot: Robot, names: tuple[str, ...]) -> Robot:
 
 
 def with_table_everywhere(team: Team, names: tuple[str, ...]) -> Team:
-    """Return `team` with the table `names` of symbols, also in the robots that its scenario adds."""
+    """Return `team` with the symbol table `names`, including in the robots that its scenario adds."""
 
     def converted(change: Change) -> Change:
         return AddAgent(with_table(change.robot, names)) if isinstance(change, AddAgent) else change

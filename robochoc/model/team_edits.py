@@ -1,4 +1,4 @@
-"""Edits of a team that several changes share, with their checks. Every function returns another team."""
+"""Edits of a team that are common to several changes, with checks. Every function returns another team."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ MAX_SHOWN = 60
 
 
 class ChangeError(RobochocError, ValueError):
-    """A change that is impossible for a team.
+    """Raised for a change that is impossible for a team.
 
     Attributes:
-        message: The error.
-        hint: The next step.
-        missing: The name that does not exist in the team, if that is the mistake.
-        line: The line of the mistake in an added robot's file. 0: it is not in one line.
+        message: The error message.
+        hint: A suggestion to the user.
+        missing: The missing name, if the error is that the team has no such name.
+        line: The line of the error in the file of an added robot. 0: the error is not in a single line.
     """
 
     def __init__(self, message: str, hint: str, *, missing: str = "", line: int = 0) -> None:
@@ -34,12 +34,12 @@ class ChangeError(RobochocError, ValueError):
 def without_robots(team: Team, names: Iterable[str], *, with_files: bool = False) -> Team:
     """Return `team` without the robots `names` and their variables.
 
-    Constraints that they share are restated for the robots that stay, or dropped and listed in `Team.dropped`.
+    Their shared constraints are restated for the remaining robots, or dropped and listed in `Team.dropped`.
 
     Args:
         team: The team.
-        names: The robots that leave. Names that the team does not have are ignored.
-        with_files: Whether constraints leave with the robots that hold them, since no other robot knows them.
+        names: The robots that leave. Names not in the team are ignored.
+        with_files: Whether the constraints held by these robots are lost too, since no other robot knows them.
     """
     gone = {name for name in names if name in team}
     if not gone:
@@ -67,11 +67,11 @@ def without_robots(team: Team, names: Iterable[str], *, with_files: bool = False
 
 
 class Absence:
-    """The constraints of `team` without the robots `absent`.
+    """Computes the constraints of `team` without the robots `absent`.
 
     Attributes:
-        restated: Those that were restated for the robots that stay.
-        dropped: Those that were dropped, except private constraints of the absent robots.
+        restated: The constraints that were restated for the remaining robots.
+        dropped: The constraints that were dropped, except private constraints of the absent robots.
     """
 
     def __init__(self, team: Team, absent: Collection[str], *, with_files: bool = False) -> None:
@@ -104,35 +104,35 @@ class Absence:
             self.restated.append(replace(left, robots=self._robots(constraint)))
 
     def _robots(self, constraint: Constraint) -> tuple[str, ...]:
-        """Return the robots of `constraint`, those included that have left before, in priority order."""
+        """Return the robots of `constraint`, including those that left earlier, in priority order."""
         owners = {self._team.owner[name] for name in constraint.variables if name in self._team.owner}
         return constraint.robots or tuple(sorted(owners, key=self._rank.__getitem__))
 
     def untouched(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
-        """Return those of `constraints` that mention no absent robot."""
+        """Return those `constraints` that mention no absent robot."""
         return tuple([one for one in constraints if self._gone.isdisjoint(one.variables)])
 
     def in_force(self, constraints: Iterable[Constraint]) -> list[Constraint]:
-        """Return the `constraints` that mention no absent robot, and all that were restated."""
+        """Return the `constraints` that mention no absent robot, and all restated constraints."""
         return [*self.untouched(constraints), *self.restated]
 
 
 def constraints_in_force(team: Team, absent: Collection[str]) -> list[Constraint]:
-    """Return the constraints of `team` that are in force without the robots `absent`."""
+    """Return the constraints of `team` that stay in force without the robots `absent`."""
     return Absence(team, absent).in_force(team.constraints()) if absent else list(team.constraints())
 
 
 def dropped_constraints(team: Team, absent: Collection[str]) -> tuple[DroppedConstraint, ...]:
-    """Return the constraints that are dropped because robots in their scopes have left `team` or are in `absent`."""
+    """Return the constraints dropped because robots in their scopes have left `team` or are in `absent`."""
     before = (one for one in team.dropped if any(name not in team for name in one.robots))
     return (*before, *Absence(team, absent).dropped)
 
 
 def with_shared_constraint(team: Team, constraint: Constraint) -> Team:
-    """Return `team` with `constraint` added to the lowest robot of its scope; private if the scope has one robot.
+    """Return `team` with `constraint` added to the lowest robot in its scope. It is private if the scope has one robot.
 
-    All robots of the scope are linked with the lowest one. A constraint without robots becomes private to the first
-    robot of the team.
+    All robots in the scope are linked to the lowest one. A constraint without robots becomes private to the first robot
+    in the team.
     """
     owners = [name for name in team.order if name in {team.owner[name] for name in constraint.variables}]
     if len(owners) <= 1:
@@ -153,12 +153,12 @@ def with_shared_constraint(team: Team, constraint: Constraint) -> Team:
 
 
 def keep_interfaces(team: Team, before: Team) -> Team:
-    """Return `team`, a part of `before`, in which robots have the same interface variables as in `before`."""
+    """Return `team`, a part of `before`, with the same interface variables of each robot as in `before`."""
     return replace(team, robots=tuple(replace(robot, shown=before[robot.name].interface) for robot in team.robots))
 
 
 def keep_needed_interfaces(team: Team) -> Team:
-    """Return `team`, in which every variable in a parent's part of a partially known constraint is shown."""
+    """Return `team` with every variable shown that occurs in a parent's part of a partially known constraint."""
     for robot in team.robots:
         for child in robot.children:
             needed = {name for part in child.constraints for name in part.variables if team.owner[name] == child.name}
@@ -217,12 +217,12 @@ def check_variable(team: Team, variable: str) -> None:
 
 
 def replace_robot(team: Team, robot: Robot) -> Team:
-    """Return `team` with `robot` in place of the robot of the same name."""
+    """Return `team` with `robot` in place of the robot with the same name."""
     return replace(team, robots=tuple(robot if one.name == robot.name else one for one in team.robots))
 
 
 def robot_named(team: Team, name: str) -> Robot:
-    """Return the robot called `name`. Raises `ChangeError` if there is none."""
+    """Return the robot called `name`. Raises `ChangeError` if there is no such robot."""
     if name not in team:
         raise no_robot(name)
     return team[name]
@@ -235,10 +235,10 @@ def no_robot(name: str, line: int = 0) -> ChangeError:
 
 
 def quoted(name: str) -> str:
-    """Return `name` in quotes, short enough for a message."""
+    """Return `name` in quotes, shortened for a message."""
     return f"'{shortened(name)}'"
 
 
 def shortened(text: str) -> str:
-    """Return `text` cut off so that it fits into a message."""
+    """Return `text`, truncated to fit into a message."""
     return text if len(text) <= MAX_SHOWN else f"{text[: MAX_SHOWN - 3]}..."

@@ -1,8 +1,8 @@
-"""The control messages between the master and robots across machines. Frames (`framing.py`) carry them.
+"""The control messages between the master and robots across machines. They are sent in frames (`framing.py`).
 
 The master is the paper's: it registers robots, waits until all are present, orders the start, detects quiescence, and
-stops all (Figure 3). It knows only the profiles of robots' files. Protocol messages (`ProtocolMessage`) go from robot
-to robot, and never to the master. Messages shared with the runtime of processes are in `communication/control.py`.
+stops all robots (Figure 3). It knows only the profiles of the robots' files. Protocol messages (`ProtocolMessage`) are
+sent from robot to robot, never to the master. Messages also used by the process runtime: `communication/control.py`.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from robochoc.protocols.message import Value
 from robochoc.solver.encoding import Cost
 
 LATEST = 2**53
-"""The largest clock of constraint checks. A robot reports its clock, which must not overflow another robot's."""
+"""The largest NCCC clock. A robot reports its clock, which must not overflow the clocks of others."""
 
 
 class _Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -53,9 +53,9 @@ class Register(_Message, frozen=True):
 
 
 class Joined(_Message, frozen=True):
-    """Confirms the welcome of an incarnation; sent for each welcome, as an answer may get lost.
+    """Confirms the welcome of an incarnation. It is sent for each welcome, since an answer may get lost.
 
-    `card` contains the robot's keys of this run (`KeyCard`; empty: no filter needs keys).
+    `card` contains the robot's keys for this run (`KeyCard`; empty: no filter needs keys).
     """
 
     incarnation: str
@@ -63,13 +63,13 @@ class Joined(_Message, frozen=True):
 
 
 class DomainAnswer(_Message, frozen=True):
-    """The domains that the master has requested."""
+    """Contains the domains that the master has requested."""
 
     variables: dict[str, Ranges]
 
 
 class Exchanged(NamedTuple):
-    """Protocol messages with one other robot: `sent` to it, `received` from it, and the latest `clock` of these."""
+    """The messages exchanged with one other robot: `sent` to it, `received` from it, and the latest `clock` in them."""
 
     sent: int = 0
     received: int = 0
@@ -77,10 +77,10 @@ class Exchanged(NamedTuple):
 
 
 class DetailedReport(EpochReport, frozen=True):
-    """A report with data for its check by the master. In private runs `assignment` and findings are empty.
+    """A report with data that lets the master check it. In private runs `assignment` and findings are empty.
 
-    `assigned`: the robot has values. `exchanged` counts the messages with each other robot, so that the master can
-    compare the reports of two robots.
+    `assigned`: the robot has values. `exchanged` counts the messages exchanged with each other robot, so that the
+    master can compare two robots' reports.
     """
 
     assigned: bool
@@ -88,7 +88,7 @@ class DetailedReport(EpochReport, frozen=True):
 
 
 class Charge(NamedTuple):
-    """The total cost of the totally known constraints of `holder` over the same `variables`."""
+    """The total cost of the totally known constraints of `holder` that have the same `variables`."""
 
     holder: str
     variables: tuple[str, ...]
@@ -97,10 +97,11 @@ class Charge(NamedTuple):
 
 
 class CheckResult(EpochMessage, frozen=True):
-    """The cost of the robot's constraints for the decided values. `allowed`: none is violated.
+    """The cost of the robot's constraints under the decided values. `allowed`: no constraint is violated.
 
-    `held` is their number. `shared` are those of them that others may also know; `copies` are constraints of others
-    that the robot knows. `snapshot` is the number of the checked snapshot; 0: the final reports.
+    `held` is the number of these constraints. `shared` are those that other robots may know too; `copies` are
+    constraints of other robots that this robot knows. `snapshot` is the number of the checked snapshot; 0: the final
+    reports.
     """
 
     allowed: bool
@@ -112,7 +113,7 @@ class CheckResult(EpochMessage, frozen=True):
 
 
 class Objection(_Message, frozen=True):
-    """A report that the robot has refused `what` from `who`."""
+    """Reports that the robot has refused `what` from `who`."""
 
     who: str
     what: str
@@ -120,16 +121,16 @@ class Objection(_Message, frozen=True):
 
 
 class LostFrames(_Message, frozen=True):
-    """A report that this number of `frames` from `who` to the robot are lost for good."""
+    """Reports that a number of `frames` from `who` to the robot are permanently lost."""
 
     who: str
     frames: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
 
 class DirectoryRequest(_Message, frozen=True):
-    """A request to the Directory Facilitator, in SL0. Answers have the same `number`.
+    """A request to the Directory Facilitator, in SL0. The answers have the same `number`.
 
-    `subscribe`: answer now, and whenever the result of this search changes.
+    `subscribe`: answer now, and whenever the search result changes.
     """
 
     number: int
@@ -151,7 +152,7 @@ class Bye(_Message, frozen=True):
 
 
 class Welcome(_Message, frozen=True):
-    """Confirms the registration of an incarnation for the run `run`, whose messages go through `filters`."""
+    """Confirms the registration of an incarnation for the run `run`, whose messages pass through `filters`."""
 
     incarnation: str
     run: str
@@ -168,7 +169,7 @@ class RegistrationDenied(_Message, frozen=True):
 
 
 class DomainRequest(_Message, frozen=True):
-    """Requests the domains of variables that occur in parts of partially known constraints."""
+    """Requests the domains of variables that occur in this robot's parts of partially known constraints."""
 
     variables: tuple[str, ...]
 
@@ -190,14 +191,13 @@ class SearchTask(EpochMessage, frozen=True, tag="Task"):
 
 
 class StartSearch(EpochMessage, frozen=True):
-    """The order to start, as all robots are ready."""
+    """The order to start, sent when all robots are ready."""
 
 
 class Recall(EpochMessage, frozen=True):
-    """Requests a `RobotSnapshot` with this `number`: the robot's present values.
-
-    With a `cycle`: its values in that cycle of its protocol. With a `value`: the values of its variables behind this
-    value, which others see.
+    """Requests a `RobotSnapshot` with this `number`, containing the robot's current values.
+    With a `cycle`: its values in that cycle of the protocol. With a `value`: the values of its variables that
+    correspond to this value, which is visible to others.
     """
 
     number: int
@@ -206,9 +206,9 @@ class Recall(EpochMessage, frozen=True):
 
 
 class CheckRequest(EpochMessage, frozen=True):
-    """The order to check the decided values of robots that share constraints with the robot, together with its own.
+    """The order to check the decided values: those of this robot, and those of robots that share constraints with it.
 
-    `snapshot`: the number of the snapshot that contains them (0: the final reports).
+    `snapshot`: the number of the snapshot that contains the values (0: the final reports).
     """
 
     values: Mapping[str, int]
@@ -216,9 +216,9 @@ class CheckRequest(EpochMessage, frozen=True):
 
 
 class Adopt(EpochMessage, frozen=True):
-    """The order to keep the values of the snapshot `number`, the best so far (0: those of the final report).
+    """The order to keep the values in the snapshot `number`, the best so far (0: those in the final report).
 
-    With a `why`, the verdict in a few words, they are the robot's decision until a further order.
+    With a `why`, the verdict in a few words, these values are the robot's decision until a further order.
     """
 
     number: int
@@ -226,13 +226,13 @@ class Adopt(EpochMessage, frozen=True):
 
 
 class Revoked(_Message, frozen=True):
-    """The order to accept nothing more from `name`."""
+    """The order to accept no more messages from `name`."""
 
     name: str
 
 
 class DirectoryAnswer(_Message, frozen=True):
-    """The Directory Facilitator's answer: a performative, and content in SL0."""
+    """The answer of the Directory Facilitator: a performative, and content in SL0."""
 
     number: int
     performative: str
@@ -240,7 +240,7 @@ class DirectoryAnswer(_Message, frozen=True):
 
 
 class JournalAnswer(_Message, frozen=True):
-    """The answer to a `JournalRequest`: the run's name, or why the journal is refused."""
+    """The answer to a `JournalRequest`: the name of the run, or the reason why the journal is refused."""
 
     number: int
     run: str
@@ -248,7 +248,7 @@ class JournalAnswer(_Message, frozen=True):
 
 
 class Leave(_Message, frozen=True):
-    """The run is over. `failed`: it could not be completed, because of `why`; otherwise `why` is the verdict."""
+    """The run is over. `failed`: it was not completed, for the reason `why`; otherwise `why` is the verdict."""
 
     why: str
     failed: bool
@@ -258,16 +258,16 @@ class Leave(_Message, frozen=True):
 
 
 class ProtocolMessage(EpochMessage, frozen=True):
-    """A protocol's message, sealed by the filters, with the sender's NCCC clock."""
+    """A protocol message sealed by the filters, with the sender's NCCC clock."""
 
     clock: Annotated[int, msgspec.Meta(ge=0, le=LATEST)]
     content: bytes
 
 
 class Copies(EpochMessage, frozen=True):
-    """The sender's totally known constraints over the receiver's variables, for protocols with shared scopes.
+    """The sender's totally known constraints that contain the receiver's variables, for protocols with shared scopes.
 
-    `content` contains `SharedRecord`s, sealed by the filters.
+    `content` contains `SharedRecord` objects, sealed by the filters.
     """
 
     content: bytes

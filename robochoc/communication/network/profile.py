@@ -1,7 +1,7 @@
-"""A robot's profile, which the master receives instead of its file: its neighbours, and the variables that they see.
+"""A robot's profile, sent to the master instead of the file: its neighbours, and the variables that they see.
 
-From profiles the master builds robots as others see them, without constraints and hidden variables. From these it
-computes the common knowledge of all robots: the priority order, the interfaces, the declared domains.
+From profiles the master builds robots as others see them, without constraints and hidden variables. From these robots
+it computes the common knowledge of the team: the priority order, the interfaces, the declared domains.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from robochoc.solver.encoding import Cost, max_cost
 from robochoc.system.errors import RobochocError
 
 Ranges = tuple[tuple[int, int], ...]
-"""A domain: first and last value of each range, ascending."""
+"""A domain: the first and last value of each range, in ascending order."""
 
 MOST_NEIGHBOURS = 10_000
 MOST_VARIABLES = 10_000
 LONGEST_NAME = 255
 LARGEST_WEIGHT = 1_000_000
-"""As in files."""
+"""The largest weight of a robot, as in files."""
 LARGEST_DEAREST = 2.0**80
-"""More than the costs of any file, such that the cost of withdrawing all robots is still finite."""
+"""An upper bound on the costs in any file, chosen so that the cost of withdrawing all robots is still finite."""
 
 
 LARGEST_CONSTANT = 2**62
@@ -40,18 +40,18 @@ LARGEST_CONSTANT = 2**62
 
 
 class ProfileError(RobochocError, ValueError):
-    """The profile of a robot is invalid."""
+    """Raised if the profile of a robot is invalid."""
 
 
 class Profile(msgspec.Struct, frozen=True, array_like=True):
     """The declarations of the robot `name` about its file.
 
-    `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables in
-    this robot's parts of partially known constraints; `wants` are others' variables in the constraints that it has
-    with its parents. `max_cost` is the largest total cost of its constraints, violations aside. `topics` are the topics
-    of its decision. `cost_scale` are its cost units: whether the sum is maximised, the decimal places, and a constant.
-    `symbols` are the names of the team's symbols, in the order of their codes; empty if it knows none. `symbolic` are
-    those of `variables` whose values are codes of symbols.
+    `variables` are the robot's interface variables with their domains. `looks_at` contains, by child, the child's
+    variables in this robot's parts of partially known constraints; `wants` contains other robots' variables in the
+    constraints that this robot shares with its parents. `max_cost` is the largest total cost of its constraints,
+    without violations. `topics` are the topics in its decision. `cost_scale` contains its cost units: whether the sum
+    is maximised, the decimal places, and a constant. `symbols` are the names of the team's symbols, in the order of
+    their codes; empty if the robot knows no symbols. `symbolic` are those `variables` whose values are symbol codes.
     """
 
     name: str
@@ -70,12 +70,12 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
 
     @property
     def units(self) -> CostUnits:
-        """The user's units of its costs, with the constant that was removed from its constraints' costs."""
+        """The user's cost units, with the constant that was removed from the costs of the constraints."""
         return CostUnits(*self.cost_scale)
 
     @property
     def neighbours(self) -> tuple[str, ...]:
-        """The parents, then the children."""
+        """The neighbours: first the parents, then the children."""
         return (*self.parents, *self.children)
 
 
@@ -109,12 +109,12 @@ def profile_of(robot: Robot) -> Profile:
 
 
 def ranges_of(domain: Domain) -> Ranges:
-    """Return the ranges of `domain`, for the wire."""
+    """Return the ranges of `domain` for sending."""
     return tuple((part[0], part[-1]) for part in domain.ranges)
 
 
 def domain_of(name: str, ranges: Ranges) -> Domain:
-    """Return the domain of the variable `name`. Raises `ProfileError` for invalid or too large ranges."""
+    """Return the domain of the variable `name`. Raises `ProfileError` for ranges that are invalid or too large."""
     last: int | None = None
     size = 0
     for low, high in ranges:
@@ -127,7 +127,7 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
 
 
 def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
-    """Return the robot as others see it; `also` are variables that it has disclosed later. Raises `ProfileError`."""
+    """Return the robot as others see it. `also` contains variables that it disclosed later. Raises `ProfileError`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
     names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
@@ -141,7 +141,7 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
         raise ProfileError("it names itself, or a neighbour twice")
     unknown = profile.looks_at.keys() - set(profile.children)
-    if unknown:  # the master would make them disclose variables to a robot that is not their neighbour
+    if unknown:  # the master would make these robots disclose variables to a robot that is not their neighbour
         raise ProfileError(f"it refers to variables of {min(unknown)[:LONGEST_NAME]}, which is not a child of it")
     if not (0 <= profile.cost_scale[1] <= MAX_PLACES and abs(profile.cost_scale[2]) <= LARGEST_CONSTANT):
         raise ProfileError("its cost units are out of range")
@@ -161,7 +161,7 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
 
 
 def _check_symbols(profile: Profile) -> None:
-    """Raise `ProfileError` if the symbols of `profile` are invalid."""
+    """Raise `ProfileError` if the symbols in `profile` are invalid."""
     if len(profile.symbols) > MAX_VALUES or len(set(profile.symbols)) < len(profile.symbols):
         raise ProfileError("it has too many symbols, or one of them twice")
     for name in profile.symbols:
@@ -172,7 +172,7 @@ def _check_symbols(profile: Profile) -> None:
 
 
 def _domain_in(profile: Profile, name: str, ranges: Ranges) -> Domain:
-    """Return the domain of the variable `name` of `profile`, with its symbols if any. Raises `ProfileError`."""
+    """Return the domain of the variable `name` in `profile`, including its symbols. Raises `ProfileError`."""
     domain = domain_of(name, ranges)
     if name not in profile.symbolic:
         return domain
@@ -182,7 +182,7 @@ def _domain_in(profile: Profile, name: str, ranges: Ranges) -> Domain:
 
 
 def profile_contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
-    """Yield contradictions between profiles of one team: neighbours that disagree, variables with two owners."""
+    """Yield contradictions between the profiles in a team: neighbours that disagree, variables with two owners."""
     owner: dict[str, str] = {}
     for profile in profiles.values():
         for variable in profile.variables:
@@ -223,14 +223,14 @@ def _differing_symbols(profiles: Mapping[str, Profile]) -> Iterator[str]:
 
 
 def missing(profiles: Mapping[str, Profile]) -> set[str]:
-    """Return the named neighbours that have not joined."""
+    """Return the neighbours named in profiles that have not joined."""
     return {name for profile in profiles.values() for name in profile.neighbours} - profiles.keys()
 
 
 def possible_neighbours(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
-    """Return, for each robot, those that may share a constraint with it: its neighbours, and other parents of a child.
+    """Return, for each robot, the robots that may share a constraint with it: neighbours, and other parents of a child.
 
-    The lowest robot of a scope holds the constraint, and the others are its parents.
+    The lowest robot in a scope holds the constraint, and the other robots in the scope are its parents.
     """
     found: dict[str, dict[str, None]] = {name: dict.fromkeys(one.neighbours) for name, one in profiles.items()}
     for profile in profiles.values():
@@ -240,18 +240,19 @@ def possible_neighbours(profiles: Mapping[str, Profile]) -> dict[str, tuple[str,
 
 
 def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
-    """Return the total priority order of a team whose profiles do not contradict each other."""
+    """Return the total priority order of a team. Its profiles must not contradict each other."""
     return priority_order({profile.name: profile.parents for profile in profiles.values()})
 
 
 def restrict_to_team(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> Robot:
-    """Return `robot` restricted to the team of `interfaces`, which are in priority order.
+    """Return `robot`, restricted to the team with these `interfaces`, which are in priority order.
 
-    Neighbours that have left are removed. Constraints of the robot that mention them are restated for the others, or
-    dropped (`model/absence.py`); a remaining constraint over variables of this robot alone becomes private.
+    Neighbours that have left are removed. The robot's constraints that contain their variables are restated for the
+    remaining robots, or dropped (`model/absence.py`). A remaining constraint over this robot's variables alone becomes
+    private.
 
-    The robot discloses exactly its variables in `interfaces`, in that order, as others read its values by it. The order
-    may differ from its file if it had to disclose more variables than the file lists.
+    The robot discloses exactly its variables in `interfaces`, in that order, because others use the order to read its
+    values. The order may differ from the robot's file if it had to disclose more variables than the file lists.
     """
     shown = tuple(interfaces[robot.name])
     place = {name: number for number, name in enumerate(shown)}
@@ -262,12 +263,12 @@ def restrict_to_team(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> R
     rank = {name: number for number, name in enumerate(interfaces)}
 
     def lowest(constraint: Constraint) -> str | None:
-        """Return the lowest of the other robots in the scope; None if there is no other."""
+        """Return the lowest of the other robots in the scope, or None if there is no other robot."""
         others = {owners[name] for name in constraint.variables if name not in own}
         return max(others, key=rank.__getitem__, default=None)
 
     def kept(constraints: Iterable[Constraint]) -> Iterator[Constraint]:
-        """Yield the remaining `constraints` that mention this robot."""
+        """Yield those of the remaining `constraints` that contain variables of this robot."""
         for constraint in constraints:
             gone = {name for name in constraint.variables if name not in own and name not in owners}
             left = restated(constraint, gone)
@@ -280,7 +281,7 @@ def restrict_to_team(robot: Robot, interfaces: Mapping[str, Sequence[str]]) -> R
     private = [replace(one, model=None) for found in held.values() for one in found if lowest(one) is None]
     under: dict[str | None, list[Constraint]] = {}
     every = [one for found in held.values() for one in found]
-    for one in sorted(every, key=lambda left: left.original is not None):  # as in `without_robots`
+    for one in sorted(every, key=lambda left: left.original is not None):  # the same order as in `without_robots`
         under.setdefault(lowest(one), []).append(one)
     children = (child for child in robot.children if child.name in interfaces)
     return replace(

@@ -1,7 +1,7 @@
-"""The reporting of refusals: each kind is reported, but a flood of refusals causes few reports.
+"""Reports refusals: each kind is reported, but a flood of refusals causes few reports.
 
 A refused participant may try again without end, under new names. So each kind is reported at its 1st, 10th, 100th, ...
-time, with the count so far, and the numbers of kinds and participants are limited.
+occurrence, with the count so far, and the numbers of kinds and participants are limited.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from collections.abc import Callable
 from robochoc.system.plain_text import on_one_line
 
 KINDS = 50
-"""The largest number of kinds of refusals that are distinguished for one member."""
+"""The maximum number of kinds of refusals distinguished for one member."""
 WHO = 1000
-"""The largest number of refused members that are distinguished."""
+"""The maximum number of refused members distinguished."""
 LONGEST = 200
-"""The most characters of a text; refused data may have any length."""
+"""The maximum number of characters in a text. Refused data may have any length."""
 _OTHERS = "others"
 _ELSE = ("other requests", "see the previous refusals")
 
 
 class Refusals:
-    """A counter of refusals. It calls `report` with who, what and why. Thread-safe."""
+    """Counts refusals, and calls `report` with who, what and why. Thread-safe."""
 
     def __init__(self, report: Callable[[str, str, str], None]) -> None:
         self._report = report
@@ -30,7 +30,7 @@ class Refusals:
         self._lock = threading.Lock()
 
     def note(self, who: str, what: str, why: str) -> None:
-        """Count that `who` was refused `what`, because of `why`."""
+        """Count that `who` was refused `what`, for the reason `why`."""
         who, what, why = (on_one_line(word[:LONGEST]) for word in (who, what, why))
         with self._lock:
             if who not in self._counts and len(self._counts) >= WHO:

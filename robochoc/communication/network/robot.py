@@ -1,8 +1,9 @@
 """A robot in a run across machines: it registers with the master, and searches when the master orders the start.
 
-It knows only its own file; names, order and interfaces of the team are in the master's `SearchTask`. This module
-contains the loop around the search, which is in `searcher.py`. All frames that wait in the inbox are one packet. The
-robot ends when the master orders it, and by itself if the master is absent for longer than its patience.
+The robot knows only its own file. The names, the order and the interfaces of the team come from the master, in
+`SearchTask`. This module contains the loop around the search; the search is in `searcher.py`. All frames waiting in the
+inbox form one packet. The robot ends when the master orders it, or if the master is absent for longer than its
+patience.
 """
 
 from __future__ import annotations
@@ -67,7 +68,7 @@ _INCARNATION_BYTES = 8
 
 
 class RunOverError(RobochocError):
-    """The run is over for this robot; `failed`: it could not be completed."""
+    """Raised when the run is over for this robot. `failed`: the run was not completed."""
 
     def __init__(self, why: str, *, failed: bool) -> None:
         super().__init__(why)
@@ -76,15 +77,15 @@ class RunOverError(RobochocError):
 
 
 class Registration:
-    """The registration of the robot `name`; it is repeated until the master answers, and after each outage.
+    """The registration of the robot `name`. It is repeated until the master answers, and after each outage.
 
     Attributes:
-        incarnation: The name of this process of the robot; a restarted robot has another one.
-        welcome: The master's answer; None before it arrives.
+        incarnation: The name of this process of the robot. A restarted robot has another one.
+        welcome: The master's answer, or None before the answer arrives.
 
     Args:
         name: The robot's name.
-        transport: Its connection to the router.
+        transport: The robot's connection to the router.
         patience_s: Seconds for which the master may be absent or silent.
         register: Sends a registration for an incarnation.
     """
@@ -109,7 +110,7 @@ class Registration:
         self._register(self.incarnation)
 
     def accept(self, welcome: Welcome) -> bool:
-        """Note the master's answer; return whether it is the first one.
+        """Record the master's answer. Return whether it is the first answer.
 
         Raises `RunOverError` if the answer comes from another run.
         """
@@ -152,11 +153,11 @@ _UNUSABLE = (FrameRefusedError, NotGenuineError, UnknownPeerError, BadMessageErr
 
 
 class Ending(NamedTuple):
-    """The end of the run for this robot.
+    """The end of the run, as seen by this robot.
 
     Attributes:
-        why: The reason from the master, or the reason why the robot ended by itself.
-        failed: The run could not be completed.
+        why: The reason sent by the master, or the reason why the robot ended by itself.
+        failed: Whether the run was not completed.
         assignment: The values that the robot has decided on.
     """
 
@@ -166,12 +167,12 @@ class Ending(NamedTuple):
 
 
 class NetworkRobot:
-    """The robot `own` at its `transport`.
+    """The robot `own`, connected by `transport`.
 
     Args:
-        own: The robot, compiled.
-        identity: Its certificate and key.
-        transport: Its connection to the router.
+        own: The compiled robot.
+        identity: The robot's certificate and key.
+        transport: The robot's connection to the router.
         protocol_named: Finds the protocol that the master requests; raises `LookupError`.
         settings: The owner's settings of the robot.
     """
@@ -193,14 +194,14 @@ class NetworkRobot:
         self._registration = Registration(own.robot.name, transport, settings.patience_s, self._register)
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
-        """Frames of an epoch whose task this robot has not received yet."""
+        """Frames for an epoch whose task this robot has not yet received."""
         self._kept = Backlog()
         self._lost_frames: set[tuple[int, str]] = set()
-        """Epochs and senders with a reported frame loss. Each pair is reported once."""
+        """The epochs and senders of reported frame losses. Each pair is reported once."""
         self._refusals = Refusals(lambda who, what, why: self._send_to_master(Objection(who, what, why)))
 
     def run(self) -> Ending:
-        """Register, and take part until the end."""
+        """Register, and participate until the end."""
         try:
             self._registration.send()
             while True:
@@ -222,7 +223,7 @@ class NetworkRobot:
     # The loop
 
     def _items(self) -> list[Item]:
-        """Wait for frames for a short time, and return all that have arrived."""
+        """Wait a short time for frames, and return all frames that have arrived."""
         restless = self._searcher is not None and self._searcher.is_restless
         items = []
         with suppress(Empty):
@@ -253,7 +254,7 @@ class NetworkRobot:
             self._registration.check_link()
 
     def _report_lost_frames(self, sender: str, frames: int) -> None:
-        """Report lost frames to the master, once for each search; it decides whether the run can continue."""
+        """Report lost frames to the master, once per search. The master decides whether the run can continue."""
         loss = (self._searcher.epoch if self._searcher else 0, sender)
         if loss not in self._lost_frames:
             self._lost_frames.add(loss)
@@ -276,14 +277,14 @@ class NetworkRobot:
             self._object(sender, str(refused))
 
     def _handle(self, sender: str, opened: Opened, packet: list[Envelope]) -> None:
-        """Handle a frame of this epoch. A frame of the next epoch is stored, as its key cards have not arrived yet.
+        """Handle a frame for this epoch. A frame for the next epoch is stored until its key cards have arrived.
 
-        A frame is accepted only if it can be used, so that an unusable one does not use up the number of another.
+        A frame is accepted only if it can be used. Otherwise an unusable frame would use up the number of a valid one.
 
         Raises:
-            BadMessageError: if it contains no message of the protocol, or a message that is not allowed now.
-            FrameRefusedError: if its epoch is not the next one, or too many frames are stored for the next one.
-            NotGenuineError: if the filters find that it was changed.
+            BadMessageError: if the frame contains no protocol message, or a message that is not allowed now.
+            FrameRefusedError: if its epoch is not the next one, or too many frames are stored for the next epoch.
+            NotGenuineError: if the filters detect a change in the message.
             UnknownPeerError: if the sender's key card is not known.
         """
         message, epoch = opened.message, self._searcher.epoch if self._searcher else 0
@@ -367,7 +368,7 @@ class NetworkRobot:
                 self._refuse_order(order)
 
     def _obey_about_answers(self, order: ControlMessage, searcher: Searcher) -> None:
-        """Obey an order about the robots' values, at a snapshot or at the end of the search."""
+        """Obey an order about the robot's values, at a snapshot or at the end of the search."""
         match order:
             case TakeSnapshot(number):
                 searcher.report_snapshot(number)
@@ -389,7 +390,7 @@ class NetworkRobot:
         self._send_to_master(Register(profile_of(self._robot), incarnation))
 
     def _enter(self, welcome: Welcome) -> None:
-        """Enter the run. Welcomes are repeated after an outage; a restarted master sends one of another run."""
+        """Join the run. Welcomes are repeated after an outage; a restarted master sends a welcome to another run."""
         if welcome.incarnation != self._registration.incarnation:
             return
         if self._registration.accept(welcome):
@@ -398,7 +399,7 @@ class NetworkRobot:
         self._send_to_master(Joined(welcome.incarnation, self._channel.card))
 
     def _take_task(self, task: SearchTask) -> None:
-        """Enter a new epoch."""
+        """Start a new epoch."""
         welcome = self._registration.welcome
         if welcome is None:
             return
@@ -424,7 +425,7 @@ class NetworkRobot:
     # The end
 
     def _fail(self, message: RobotFailed) -> None:
-        """Report to the master why this robot cannot continue, and wait for a `Leave` for a short time."""
+        """Report to the master why this robot cannot continue, and wait a short time for a `Leave`."""
         if self._registration.welcome is None:
             return
         self._send_to_master(message)

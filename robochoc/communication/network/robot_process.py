@@ -1,4 +1,4 @@
-"""A robot's process of `--runtime network`. Apart from `local.py`, as the fork server imports it without the master."""
+"""A robot's process for `--runtime network`. It is separate from `local.py`, as the fork server imports no master."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class NetworkRobotStart(NamedTuple):
 
 
 def network_robot_process(given: NetworkRobotStart) -> None:
-    """Run one robot in this process. Ctrl-C reaches the whole process group, and is left to the parent."""
+    """Run one robot in this process. Ctrl-C reaches the whole process group, and is handled by the parent."""
     leave_ctrl_c_to_the_parent()
     _end_with_the_fork_server()
     if sys.platform == "linux":
@@ -48,7 +48,7 @@ def network_robot_process(given: NetworkRobotStart) -> None:
     identity = Identity.from_texts(given.identity)
 
     def set_niceness(rank: int, size: int) -> None:
-        """Let the scheduler favour robots that come earlier in the order, as `processes/robot_process.py` does."""
+        """Let the scheduler prefer robots that come earlier in the order, like `processes/robot_process.py`."""
         wanted = _LOWEST_NICE * rank // size
         os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
 
@@ -61,10 +61,10 @@ def network_robot_process(given: NetworkRobotStart) -> None:
 
 
 def _end_with_the_fork_server() -> None:
-    """Have the kernel kill this process when the fork server ends, which happens when the parent is gone.
+    """Let the kernel kill this process when the fork server ends, which it does when the parent is gone.
 
-    Otherwise the server would wait for its children, which all inherit an end of its pipe to the parent; and a stopped
-    server (SIGSTOP) does not notice that the parent is gone.
+    Otherwise the fork server would wait for its children, each of which inherits an end of its pipe to the parent. A
+    stopped fork server (SIGSTOP) would not notice that the parent is gone.
     """
     signal_when_orphaned(signal.SIGKILL)
     alive = getattr(multiprocessing.forkserver, "_forkserver", None)

@@ -1,4 +1,4 @@
-"""The settings of a robot in a run across machines, as its owner chooses them."""
+"""The settings of a robot in a run across machines, chosen by its owner."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ class RobotSettings:
     """The settings of a robot.
 
     Attributes:
-        patience_s: Seconds for which the master may be absent.
-        sniffed: The master's observers always receive all events of the robot.
-        set_rank: Called before each search with the robot's place in the priority order, and the number of robots.
+        patience_s: The seconds for which the master may be absent.
+        sniffed: Whether the master's observers always receive all events of the robot.
+        set_rank: Called before each search with the robot's index in the priority order, and the number of robots.
         stage: Called with a short text on the robot's progress.
         decided: Called with the verdict in words and the robot's values when the team has a decision but continues.
-        compiled: Compiles the robot's domain again if it must disclose more variables than expected.
+        compiled: Compiles the robot's domain again if the robot must disclose more variables than expected.
     """
 
     patience_s: float = 10.0

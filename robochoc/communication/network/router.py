@@ -1,9 +1,9 @@
 """The router: the process to which all participants connect. It checks certificates and the rights to write.
 
 It is a separate process (`router_process.py`) that stores only frames in transit. zenoh's access control cannot be
-changed while it runs: to register or revoke a participant, the router is restarted with other rules, in a fraction of a
-second; frames that were sent meanwhile are recovered (`transport.py`). Refusals appear only in its log, so the log is
-read (`Log`).
+changed while the router runs. To register or revoke a participant, the router is restarted with other rules, in a
+fraction of a second; frames sent meanwhile are recovered (`transport.py`). Refusals are visible only in the router's
+log, so the log is parsed (`Log`).
 """
 
 from __future__ import annotations
@@ -31,18 +31,19 @@ _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _RESPONDING = b"responding\n"
 _CHECK_S = 0.5
-"""The interval between checks that the router's process responds, in seconds."""
+"""The interval between two checks that the router's process responds, in seconds."""
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
-"""A log that includes allowed actions has several lines for each frame, which cost more than the frames."""
+"""Excludes allowed actions from the log: they would cause several lines per frame, which cost more than the frame."""
 _CHUNK = 65536
 _DECISION = re.compile(
     rb"ThreadId\((\d+)\) zenoh::net::routing::interceptor(?:"
     rb"::access_control: [^\n]*?(?:CertCommonName\([^)\n]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to "
     rb"([A-Za-z/ ]+?) \((in|e)gress\) on (\S+)|: (Msg intercepted!))"
 )
-"""The two lines of a refusal: the forbidden action of a session, and the fact that it stopped a message. Other threads
-of the router may write between them."""
+"""The two lines of a refusal: one with the forbidden action of a session, one when it stops a message. Other threads
+of the router may write lines between them.
+"""
 _TELLING = re.compile(rb"unauthorized|intercepted|zenoh_link_tls")
 _KNOWN = re.compile(rb"CertCommonName\(([^)]*)\)\S*\+([0-9a-f]+) is unauthorized")
 _ACCEPTED = re.compile(rb"zenoh_link_tls::unicast: Accepted TLS connection [^\n]*Common Name: ([^\n]*)\.\n")
@@ -58,18 +59,18 @@ _MEANINGS = {
     "received fatal alert: UnknownCA": "it does not trust the master, which its Authority has not certified",
     "tls handshake eof": "it has closed the connection during the handshake",
 }
-"""The meanings of zenoh's texts for refused connections; the first match counts."""
+"""The meanings of zenoh's texts for refused connections. The first match counts."""
 _KEPT_SESSIONS = 10_000
 _KEPT_THREADS = 100
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
 
 class RouterError(RobochocError):
-    """The router cannot listen."""
+    """Raised if the router cannot listen."""
 
 
 class Refusal(NamedTuple):
-    """The router has refused `what` to `who` (the name in its certificate; `somebody`: it was not admitted)."""
+    """The router has refused `what` to `who` (the name in the certificate; `somebody`: a client not admitted)."""
 
     who: str
     what: str
@@ -83,8 +84,9 @@ class Router:
     """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
 
     `refused` receives refusals, from another thread (None: no refusals are reported, which is much faster). The opener
-    closes the router. The router's process removes `scratch` if this process dies (see `NetworkSettings`). A process
-    that has not responded for `patience_s` seconds is killed: zenoh would wait much longer for a stopped one.
+    closes the router. The router's process removes `scratch` if this process dies (see `NetworkSettings`). A router
+    that does not respond for `patience_s` seconds is killed, because zenoh would wait much longer for a stopped
+    process.
     """
 
     def __init__(
@@ -111,7 +113,7 @@ class Router:
         self._is_silent = False
 
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
-        """Listen, with these rules (see `access_control`) in place of the previous ones. Raises `RouterError`."""
+        """Listen, with these rules (see `access_control`) instead of the previous rules. Raises `RouterError`."""
         self.close()
         with signals_delayed():
             self._process = process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
@@ -142,16 +144,17 @@ class Router:
         return f"did not respond for {self._patience_s:g} s" if self._is_silent else "has ended"
 
     def _watch(self, process: subprocess.Popen[bytes], questions: IO[bytes]) -> None:
-        """Kill the process if it no longer responds.
+        """Kill the router's process if it no longer responds.
 
-        Time is counted in steps of `_CHECK_S`, so that the router can still respond if this process was stopped.
+        Time is counted in steps of `_CHECK_S`, so that the router gets time to respond even if this process was
+        stopped.
         """
         silent_s = 0.0
         while silent_s < self._patience_s:
             if silent_s == 0:
                 try:
                     os.write(questions.fileno(), b"\n")  # unbuffered: `close` would write buffered bytes
-                except (OSError, ValueError):  # it has ended
+                except (OSError, ValueError):  # the process has ended
                     return
             if not self._response.wait(_CHECK_S):
                 silent_s += _CHECK_S
@@ -198,7 +201,7 @@ class Router:
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:
-        """Wait until the router is ready, and return its output so far. Waiting peers connect before that."""
+        """Wait until the router is ready, and return its output so far. Waiting peers connect even before that."""
         first_output: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
@@ -219,7 +222,7 @@ class Router:
             self._process.kill()
 
     def _read(self, output: IO[bytes], log: Log, first_output: bytes) -> None:
-        """Read the log to its end in chunks (up to 80,000 lines a second), and report refusals."""
+        """Read the log in chunks until its end (up to 80,000 lines per second), and report refusals."""
         rest = b""
         for refusal in log.refusals(first_output):
             if self._refused:
@@ -236,17 +239,17 @@ class Router:
 
 
 class Log:
-    """Parses refusals from the router's log; only the names in `reach` have rules."""
+    """Parses refusals in the router's log. Only the names in `reach` have rules."""
 
     def __init__(self, reach: Collection[str]) -> None:
         self._reach = reach
         self._names: dict[bytes, str] = {}
-        """The name of each session. zenoh logs the name in a certificate only when a right is not in its cache."""
+        """The name of each session. zenoh logs the certificate's name only when the right is not in its cache."""
         self._denied: dict[bytes, tuple[bytes, bytes, bytes] | None] = {}
         """Each thread's latest forbidden action, with its session and key (None: an outgoing message)."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
-        """Yield the refusals in a part of the log, which consists of complete lines."""
+        """Yield the refusals in a part of the log. The part must consist of complete lines."""
         plain = _COLOURS.sub(b"", log)
         for name in _ACCEPTED.findall(plain):
             who = name.decode(errors="replace")
@@ -260,7 +263,7 @@ class Log:
             yield Refusal("somebody", "connect", _meaning(_HINT.sub("", why.decode(errors="replace"))))
 
     def _stopped(self, log: bytes) -> Iterator[Refusal]:
-        """Yield the stopped incoming messages, each with the latest forbidden action of its thread."""
+        """Yield the stopped incoming messages, each with the latest forbidden action in the same thread."""
         if len(self._denied) > _KEPT_THREADS:
             self._denied.clear()
         for thread, session, what, direction, where, intercepted in _DECISION.findall(log):

@@ -1,8 +1,8 @@
 """The router's process: `python -m robochoc.communication.network.router_process`, started by `router.py`.
 
-It reads its configuration from standard input, reports when it listens, answers each further line, and ends at the end
-of standard input: with the master at the latest, whose scratch folder it then removes. It imports very little, because
-opening the router waits for its start.
+The process reads its configuration from standard input, reports when it listens, answers each further line, and ends
+when standard input ends, at the latest when the master ends. It then removes the master's scratch folder. It imports
+very little, because opening the router includes waiting for this process.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def main() -> None:
         while sys.stdin.readline():
             sys.stdout.write(f"{RESPONDING}\n")
             sys.stdout.flush()
-        if scratch:  # the master was killed, and could not remove it
+        if scratch:  # the master was killed, and could not remove the folder
             import shutil  # noqa: PLC0415 - seldom needed
 
             shutil.rmtree(scratch, ignore_errors=True)

@@ -1,6 +1,6 @@
-"""One epoch of a robot across machines: from the master's task to the final report.
+"""One epoch for a robot in a run across machines: from the master's task to the final report.
 
-The connection to the run is in `robot.py`. The loop of a search is in `communication/robot_loop.py`.
+The connection to the run is in `robot.py`, the loop of a search in `communication/robot_loop.py`.
 """
 
 from __future__ import annotations
@@ -56,16 +56,16 @@ def check_constraints(
     values: Mapping[str, int],
     learnt: Mapping[str, Sequence[Constraint]],
 ) -> CheckResult:
-    """Return the costs of the constraints that `robot` knows for the team's decision.
+    """Return the costs of the constraints known to `robot`, for the team's decision.
 
-    They are computed from the problem itself, not from the compiled constraints of the protocol.
+    The costs are computed from the problem itself, not from the protocol's compiled constraints.
 
     Args:
         epoch: The epoch of the search.
         robot: The robot.
-        values: The decided values of all variables it knows. Withdrawn robots have none, and constraints over
-            their variables are restated for the others or dropped (`model/absence.py`).
-        learnt: Constraints that it has received from others, by their holders.
+        values: The decided values of all variables known to the robot. Withdrawn robots have no values, and constraints
+            over their variables are restated for the other robots or dropped (`model/absence.py`).
+        learnt: The constraints that the robot has received from others, by their holders.
     """
     parts = [part for child in robot.children for part in child.constraints]
     known_to_it = (_in_force(one, values) for one in (*robot.private, *robot.shared, *parts))
@@ -80,7 +80,7 @@ def check_constraints(
 
 
 def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:
-    """Yield, by scope, the costs of the `constraints` of `holder` that are in force."""
+    """Yield the costs, by scope, of those `constraints` of `holder` that are in force."""
     groups: dict[tuple[str, ...], list[Constraint]] = {}
     for one in constraints:
         in_force = _in_force(one, values)
@@ -91,7 +91,7 @@ def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str
 
 
 def _in_force(constraint: Constraint, values: Mapping[str, int]) -> Constraint | None:
-    """Return `constraint` as restated without the robots that have no values; None if it is dropped."""
+    """Return `constraint`, restated without the robots that have no values, or None if it is dropped."""
     return restated(constraint, {name for name in constraint.variables if name not in values})
 
 
@@ -100,12 +100,12 @@ _Values = dict[str, int]
 
 @dataclass(frozen=True)
 class RobotContext:
-    """A searcher's interface to the robot's connection to the run.
+    """The searcher's interface to the robot's connection to the run.
 
     Attributes:
         send_to_master: Sends a control message to the master.
         send: Sends a message to another robot.
-        set_rank: Called with the robot's place in the priority order, and the number of robots.
+        set_rank: Called with the robot's index in the priority order, and the number of robots.
         observed: Whether the robot reports its events.
         private: Whether robots do not disclose their values in this run.
     """
@@ -118,13 +118,13 @@ class RobotContext:
 
 
 class Searcher(RobotLoop):
-    """The robot `own` in the epoch of `task`.
+    """The search of the robot `own` in the epoch of `task`.
 
     Args:
-        own: The robot, linked to the participants.
-        task: The master's task, with the common knowledge of the team.
-        protocol: The protocol that it runs.
-        context: Its connection to the run.
+        own: The robot, linked to the other participants.
+        task: The master's task, which contains the common knowledge of the team.
+        protocol: The protocol to run.
+        context: The robot's connection to the run.
 
     Raises:
         UnsupportedError: if the task is for another robot.
@@ -147,7 +147,7 @@ class Searcher(RobotLoop):
         self._received_from: Counter[str] = Counter()
         self._clocks: dict[str, int] = {}
         self._snapshot_values = SnapshotValues()
-        if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
+        if task.interfaces.get(self._robot.name) != self._robot.interface:  # other robots would misread its values
             raise UnsupportedError(
                 f"{self._robot.name} received invalid data: other interface variables than in its file"
             )
@@ -159,9 +159,9 @@ class Searcher(RobotLoop):
 
     @property
     def assignment(self) -> dict[str, int]:
-        """The decided values of the robot's variables; empty while there are none.
+        """The decided values of the robot's variables; empty while no decision exists.
 
-        They are those of a snapshot if the master has ordered the robot to adopt it.
+        If the master has ordered the robot to adopt a snapshot, these are the values in that snapshot.
         """
         adopted = self._snapshot_values.adopted
         return self._present if adopted is None else adopted
@@ -173,9 +173,9 @@ class Searcher(RobotLoop):
     # Preparation
 
     def prepare(self) -> None:
-        """Send constraints to the robots that have to know them; get ready once all children have sent theirs.
+        """Send constraints to the robots that must know them. The robot is ready when all children have sent theirs.
 
-        Only with `Traits.shared_scopes` do other robots than the lowest one of a scope know a constraint. Raises
+        Robots other than the lowest one in a scope know a constraint only with `Traits.shared_scopes`. Raises
         `UnsupportedError`.
         """
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
@@ -189,12 +189,12 @@ class Searcher(RobotLoop):
         self._get_ready()
 
     def _refuse_unfit(self, owners: Mapping[str, str]) -> None:
-        """Raise `UnsupportedError` if this robot's file requires more than the protocol supports."""
+        """Raise `UnsupportedError` if this robot's file needs more than the protocol supports."""
         if unmet := unmet_requirement(self._robot, self._protocol.traits, owners):
             raise UnsupportedError(f"{unmet}, which {self._task.protocol} does not support")
 
     def learn(self, sender: str, content: bytes) -> None:
-        """Receive constraints of `sender` over variables of this robot. Raises `UnsupportedError`."""
+        """Receive constraints from `sender` that contain variables of this robot. Raises `UnsupportedError`."""
         try:
             self._copies[sender] = msgspec.msgpack.decode(content, type=tuple[SharedRecord, ...])
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as bad:
@@ -224,7 +224,7 @@ class Searcher(RobotLoop):
         return AgentProblem(self._own, everyone, copies, task.secretive, parameters)
 
     def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
-        """Return a constraint of `sender`, which must be a child; the scope must contain variables of both robots."""
+        """Return a constraint from `sender`, which must be a child. The scope must contain variables of both robots."""
         known = known_of(record)
         variables = set(known.constraint.variables)
         mine, theirs = (set(self._task.interfaces.get(name, ())) for name in (self._robot.name, sender))
@@ -250,7 +250,7 @@ class Searcher(RobotLoop):
         """See `RobotLoop.admit`.
 
         Raises:
-            BadMessageError: if the sender does not take part in this search, or has sent too much before its start.
+            BadMessageError: if the sender does not participate in this search, or has sent too much before its start.
         """
         if envelope.sender not in self._task.interfaces:
             raise BadMessageError(f"{envelope.sender} does not take part in this search")
@@ -260,7 +260,7 @@ class Searcher(RobotLoop):
         return super().admit(envelope)
 
     def receive(self, packet: Sequence[Envelope]) -> None:
-        """See `RobotLoop.receive`. Messages are counted by sender, as the master compares the counts."""
+        """See `RobotLoop.receive`. Messages are counted by sender, because the master compares the counts."""
         if self._host and self._searching:
             for envelope in packet:
                 self._received_from[envelope.sender] += 1
@@ -269,7 +269,7 @@ class Searcher(RobotLoop):
 
     def _transmit(self, envelopes: Sequence[Envelope]) -> None:
         for _, receiver, content, clock in envelopes:
-            # The clock may have been set by another robot.
+            # Another robot may have set this clock.
             self._context.send(receiver, ProtocolMessage(self.epoch, min(clock, LATEST), content))
             self._sent_to[receiver] += 1
 
@@ -289,14 +289,14 @@ class Searcher(RobotLoop):
         self._context.send_to_master(DetailedReport(self.epoch, values, metrics, findings, assigned, self._exchanged()))
 
     def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
-        """See `RobotLoop`. Nothing in private runs."""
+        """See `RobotLoop`. In private runs nothing is returned."""
         return ({}, NO_FINDINGS) if self._context.private else (host.protocol.assignment, self._findings(host.protocol))
 
     def _findings(self, protocol: Protocol) -> Findings:
-        """Return the findings; nothing if one that comes from other robots is invalid.
+        """Return the findings, or no findings if one that comes from other robots is invalid.
 
-        A master that sends `Recall` requests the cycles it needs, so the trail is left out: in a long search it does
-        not fit into a frame.
+        The trail is left out, because in a long search it does not fit into a frame. A master that sends `Recall`
+        requests the cycles that it needs.
         """
         findings = protocol.findings
         if findings.trail is not None and self._snapshot_values.is_used:
@@ -304,7 +304,7 @@ class Searcher(RobotLoop):
         return NO_FINDINGS if fault_of_findings(findings, self._task.order) else findings
 
     def _exchanged(self) -> dict[str, Exchanged]:
-        """Return the counts of messages with each other robot."""
+        """Return the number of messages exchanged with each other robot."""
         others = self._sent_to.keys() | self._received_from.keys()
         return {
             other: Exchanged(self._sent_to[other], self._received_from[other], self._clocks.get(other, 0))
@@ -324,13 +324,13 @@ class Searcher(RobotLoop):
         self._send_to_master(RobotSnapshot(self.epoch, order.number, values, lost, findings))
 
     def adopt(self, number: int, *, published: bool) -> None:
-        """Keep the values of a snapshot; see `SnapshotValues.adopt`. Raises `FrameRefusedError`."""
+        """Keep the values in a snapshot; see `SnapshotValues.adopt`. Raises `FrameRefusedError`."""
         self._snapshot_values.adopt(number, published=published)
 
     def check_constraints(self, values: Mapping[str, int], snapshot: int = 0) -> CheckResult:
-        """Check the robot's constraints against the team's decision, or against a `snapshot`. See `check_constraints`.
+        """Check the robot's constraints against the team's decision or a `snapshot`, by `check_constraints`.
 
-        Raises `FrameRefusedError` if the snapshot is not known.
+        Raises `FrameRefusedError` if the snapshot is unknown.
         """
         own = self._snapshot_values.at(snapshot) if snapshot else self._present
         found = check_constraints(self.epoch, self._robot, {**values, **own}, self._learnt)
@@ -338,16 +338,16 @@ class Searcher(RobotLoop):
 
 
 def _sorted(copies: Sequence[KeyedConstraint], order: Sequence[str]) -> tuple[KeyedConstraint, ...]:
-    """Return `copies` in the order of their holders, as in all runtimes."""
+    """Return `copies` in the order of their holders, like in all runtimes."""
     rank = {name: place for place, name in enumerate(order)}
     return tuple(sorted(copies, key=lambda known: rank.get(known.key.partition("<")[0], -1)))
 
 
 class SnapshotValues:
-    """The values that a robot has reported in snapshots: the latest ones, and those that it is to keep.
+    """The values that a robot has reported in snapshots: the latest values, and those that it must keep.
 
     Attributes:
-        adopted: The values that are the robot's decision until a further order; None: there are none.
+        adopted: The values that are the robot's decision until a further order, or None.
     """
 
     def __init__(self) -> None:
@@ -365,16 +365,16 @@ class SnapshotValues:
         self._last = (number, values)
 
     def at(self, number: int) -> _Values:
-        """Return the values of a snapshot. Raises `FrameRefusedError` if they are not stored."""
+        """Return the values in a snapshot. Raises `FrameRefusedError` if they are not stored."""
         for known, values in (self._last, self._kept):
             if known == number:
                 return values
         raise FrameRefusedError(f"it is about snapshot {number}, which is not known")
 
     def adopt(self, number: int, *, published: bool) -> None:
-        """Keep the values of a snapshot (0: none), and decide on them if they are `published`.
+        """Keep the values in a snapshot (0: no snapshot), and decide on them if they are `published`.
 
-        Raises `FrameRefusedError` if they are not known.
+        Raises `FrameRefusedError` if the values are not known.
         """
         values = self.at(number) if number else None
         if values is not None:
@@ -384,7 +384,7 @@ class SnapshotValues:
 
 
 def values_for_recall(order: Recall, protocol: Protocol, domain: CompiledDomain) -> _Values:
-    """Return the values of the robot's variables that `order` requests; empty if it has none, or withdraws."""
+    """Return the values of the robot's variables requested by `order`; empty if it has none, or withdraws."""
     if order.value is not None:
         return domain.behind(order.value)
     trail = protocol.findings.trail
@@ -395,6 +395,6 @@ def values_for_recall(order: Recall, protocol: Protocol, domain: CompiledDomain)
 
 
 def _place_in(trail: Trail, cycle: int) -> int | None:
-    """Return the place of the robot's value in `cycle`; None if it had none yet."""
+    """Return the index of the robot's value in `cycle`, or None if it had no value yet."""
     after = bisect_right(trail.entries, cycle, key=lambda entry: entry[0])
     return trail.entries[after - 1][1] if after else None

@@ -1,6 +1,6 @@
 """A robot's channel to the master and to other robots: frames, and filters that seal messages between robots.
 
-No I/O: it writes and reads bytes. Key cards of other robots arrive with the master's task.
+It performs no I/O, and only writes and reads bytes. Other robots' key cards arrive with the master's task.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ class SecureChannel:
 
     @property
     def card(self) -> bytes:
-        """The robot's key card of this run; empty if no filter needs one."""
+        """The robot's key card for this run; empty if no filter needs a key card."""
         return self._ring.card.encode() if self._ring else b""
 
     def admit(self, cards: Iterable[bytes]) -> list[str]:
-        """Accept others' key cards that the Authority has certified; return the reasons why cards were not accepted."""
+        """Accept key cards of others that the Authority has certified. Return the reasons for refused cards."""
         if self._ring is None:
             return []
         faults = []
@@ -59,7 +59,7 @@ class SecureChannel:
         return faults
 
     def revoke(self, name: str) -> None:
-        """Accept no further messages from `name`, whose certificate was revoked."""
+        """Accept no more messages from `name`, whose certificate was revoked."""
         if self._ring:
             self._ring.dismiss(name)
 
@@ -68,7 +68,7 @@ class SecureChannel:
         return self._framing.write(MASTER, message)
 
     def sealed_frame(self, receiver: str, message: ToPeer) -> bytes | None:
-        """Return the next frame to another robot; None if the robot was revoked."""
+        """Return the next frame to another robot, or None if that robot was revoked."""
         if self._filters:
             context = self._context(self._name, receiver, self._framing.next_number(receiver), message)
             try:
@@ -79,18 +79,18 @@ class SecureChannel:
         return self._framing.write(receiver, message)
 
     def read(self, sender: str, content: bytes) -> Opened:
-        """Return the content of a frame, which is received once `accept` is called. Raises `FrameRefusedError`."""
+        """Return the content of a frame. The frame counts as received after `accept`. Raises `FrameRefusedError`."""
         return self._framing.read(sender, content)
 
     def accept(self, sender: str, number: int) -> None:
-        """Accept the frame `number` of `sender`, and expect the next one."""
+        """Accept the frame `number` from `sender`, and expect the next number."""
         self._framing.accept(sender, number)
 
     def unsealed(self, sender: str, number: int, message: ToPeer) -> ToPeer:
-        """Return the unsealed message of another robot.
+        """Return the unsealed message from another robot.
 
         Raises:
-            NotGenuineError: if the filters find that it was changed.
+            NotGenuineError: if the filters detect a change in the message.
             UnknownPeerError: if the sender's key card is not known.
         """
         if self._filters is None:
@@ -99,6 +99,6 @@ class SecureChannel:
         return msgspec.structs.replace(message, content=self._filters.open(sender, message.content, context))
 
     def _context(self, sender: str, receiver: str, number: int, message: ProtocolMessage | Copies) -> bytes:
-        """Return the context that binds a sealed message to its place in the run."""
+        """Return the context that binds a sealed message to its position in the run."""
         kind = message.clock if isinstance(message, ProtocolMessage) else "copies"
         return f"{self._framing.run} {sender} {receiver} {number} {message.epoch} {kind}".encode()

@@ -1,8 +1,8 @@
-"""The transport of one participant by zenoh: it carries frames in both directions, and tracks the present members.
+"""The transport of one participant by zenoh: transmits frames in both directions, and tracks the present members.
 
-Frames are sent by zenoh's advanced publishers and subscribers, which number and store them, and request again those
-that an outage has lost; plain ones lose messages silently. Only this file and the router's import zenoh. zenoh's
-callbacks run in its threads, and only put items into `inbox`.
+Frames are sent by zenoh's advanced publishers and subscribers, which number and store frames, and request frames again
+that were lost in an outage; plain ones lose messages silently. Only this module and the router's import zenoh. zenoh
+runs callbacks in its own threads; they only put items into `inbox`.
 """
 
 from __future__ import annotations
@@ -31,37 +31,37 @@ RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1
 HEARTBEAT_S = 5.0
 """The longest time in seconds until a receiver notices that the last frame is missing.
 
-Other missing frames are noticed at the next frame. Each pair that has exchanged a frame has its own heartbeat, which
-costs about 0.2 ms of CPU: 121 robots have some 4,000 pairs. Frames of an outage do not wait for the heartbeat: a
-receiver requests them as soon as it sees the sender again.
+Other missing frames are noticed when the next frame arrives. Each pair that has exchanged a frame has its own
+heartbeat, which costs about 0.2 ms of CPU; 121 robots have some 4,000 pairs. Frames lost in an outage need not wait for
+the heartbeat: a receiver requests them as soon as it sees the sender again.
 """
 KEPT_FRAMES = 100_000
 _LATE_S = 1.0
 _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
-"""The duration of attempts to connect, in seconds. A busy router may need long for a handshake."""
+"""The duration of attempts to connect, in seconds. A busy router may need a long time for a handshake."""
 
 
 DESCRIPTORS = 24
-"""Open files that a session may need, including those of zenoh's threads."""
+"""The number of open files that a session may need, including those for zenoh's threads."""
 
 
 class CannotConnectError(RobochocError):
-    """There is no master at that address, or it does not admit this agent."""
+    """Raised if there is no master at that address, or the master does not admit this agent."""
 
 
 TEAM = (MASTER, ALL)
-"""The senders to which a robot subscribes: the master, by a separate subscriber, and all others."""
+"""The senders to which a robot subscribes: the master, with a separate subscriber, and all others."""
 _Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
 Answering = Callable[[str, bytes], bytes | None]
-"""Returns the answer to a participant's question; None: there is none."""
+"""A function that returns the answer to a participant's question, or None if there is no answer."""
 
 
 class Transport:
-    """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
+    """The connection of `identity` to the router at `endpoint` (`HOST:PORT`); a context manager.
 
-    It tracks the presence of the names in `watch`, and puts the frames of `senders` (more: `subscribe`) into `inbox`.
-    A link that is silent for `lease_ms` counts as down. Raises `CannotConnectError` if there is no connection within
-    `patience_s`.
+    It tracks the presence of the names in `watch`, and puts the frames from `senders` (and others: `subscribe`) into
+    `inbox`. A link that is silent for `lease_ms` counts as down. Raises `CannotConnectError` if no connection is
+    established within `patience_s`.
     """
 
     def __init__(
@@ -88,19 +88,19 @@ class Transport:
         ]
 
     def subscribe(self, senders: Iterable[str]) -> None:
-        """Subscribe to the frames of `senders`, too. Their earlier frames arrive soon.
+        """Subscribe also to the frames from `senders`. Their earlier frames arrive soon.
 
-        Each sender has its own subscriber, as zenoh trusts the source and number in a packet: with one subscriber for
-        all, a sender can use the source of another, whose frames then count as old or missing. But separate subscribers
-        are expensive, as the router stores every pair; so robots use one for all neighbours (`ALL`), and one for the
-        master.
+        Each sender has its own subscriber, because zenoh trusts the source and the number in a packet: with one
+        subscriber for all senders, a sender could use the source of another, whose frames would then count as old or
+        missing. But separate subscribers are expensive, since the router stores every pair. So robots use one
+        subscriber for all neighbours (`ALL`), and one for the master.
         """
         for sender in senders:
             if sender not in self._subscribers:
                 self._subscribers[sender] = self._subscribed(sender)
 
     def send(self, receiver: str, content: bytes) -> None:
-        """Send a frame. While the link is down, it is stored; later it is sent, or requested by the receiver."""
+        """Send a frame. While the link is down the frame is stored. Later it is sent, or requested by the receiver."""
         publisher = self._publishers.get(receiver)
         if publisher is None:
             publisher = self._publishers[receiver] = zenoh.ext.declare_advanced_publisher(
@@ -115,11 +115,11 @@ class Transport:
 
     @property
     def router(self) -> str:
-        """The identifier of the connected router; empty if there is none. A restarted router has another one."""
+        """The identifier of the connected router; empty without a connection. A restarted router has another one."""
         return next(map(str, self._session.info.routers_zid()), "")
 
     def answer(self, key: str, answered: Answering) -> None:
-        """Start to answer questions on `key`, in one of zenoh's threads."""
+        """Start answering questions on `key`, in one of zenoh's threads."""
 
         def reply(query: zenoh.Query) -> None:
             content = answered(name_in(str(query.key_expr)), query.payload.to_bytes() if query.payload else b"")
@@ -129,7 +129,7 @@ class Transport:
         self._answering = self._session.declare_queryable(key, reply)
 
     def ask(self, key: str, content: bytes, patience_s: float) -> bytes | None:
-        """Return the answer to `content` on `key`; None if none arrives within `patience_s` seconds.
+        """Return the answer to `content` on `key`, or None if no answer arrives within `patience_s` seconds.
 
         The answer has a lower priority than robots' frames, and is dropped if it cannot be sent at once.
         """
@@ -154,7 +154,7 @@ class Transport:
         self.inbox.put(WakeUp())
 
     def close(self) -> None:
-        """Close the connection. Pending frames are sent before, unless the link is dead."""
+        """Close the connection. Pending frames are sent first, unless the link is dead."""
         with suppress(zenoh.ZError):  # the other end of a dead link does not answer
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
@@ -169,8 +169,9 @@ class Transport:
     def _subscribed(self, sender: str) -> _Subscriber:
         """Return a subscriber to `sender` alone (`ALL`: to all others), which also notices lost frames.
 
-        zenoh reports a gap just before the frame after it, in the same thread (with `indirect`, in another one). So the
-        loss is attributed to the sender of that frame, which the router has proven, and not to the source in a packet.
+        zenoh reports a gap just before the frame after the gap, in the same thread (with `indirect`, in another
+        thread). So the loss is attributed to the sender of that frame, which the router has verified, not to the source
+        in a packet.
         """
         gap = 0
 
@@ -207,7 +208,7 @@ class Transport:
 
 
 def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
-    """Return a session. zenoh ignores Ctrl-C while it connects, so each attempt is short."""
+    """Return a session. Each attempt to connect is short, because zenoh ignores Ctrl-C while it connects."""
     if endpoint.startswith("["):
         raise CannotConnectError(
             f"{endpoint}: zenoh cannot check certificates of IPv6 addresses: use a host name of the master"
@@ -228,7 +229,7 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
 
 
 def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
-    """Return the configuration of a participant: it connects only to this router, by mutual TLS."""
+    """Return a participant's configuration: it connects only to this router, by mutual TLS."""
     texts = identity.texts
     tls = {
         "root_ca_certificate_base64": encoded(texts.ca),
@@ -252,5 +253,5 @@ def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms
 
 
 def encoded(content: bytes) -> str:
-    """Return PEM as zenoh accepts it without a file."""
+    """Return PEM in the form that zenoh accepts without a file."""
     return base64.b64encode(content).decode()

@@ -1,4 +1,4 @@
-"""The zenoh configuration of every process of a run, and of sessions with ROS 2.
+"""The zenoh configuration for every process in a run, and for sessions with ROS 2.
 
 It imports little, so that the router starts fast.
 """
@@ -12,13 +12,13 @@ from pathlib import Path
 import zenoh
 
 RX_BYTES = 32 * 2**20
-"""The largest message that zenoh receives. It exceeds a frame's limit, so that too large a frame causes an error."""
+"""The largest message that zenoh receives, in bytes. It exceeds the frame limit, so that larger frames are detected."""
 
 
 def config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
-    """Return a configuration of zenoh with `settings`, and without discovery or other listeners.
+    """Return a zenoh configuration with `settings`, without discovery and without other listeners.
 
-    Other settings come from `file`, or are zenoh's defaults.
+    Other settings come from `file`, or have zenoh's defaults.
     """
     made = zenoh.Config() if file is None else zenoh.Config.from_file(file)
     common = {

@@ -1,9 +1,9 @@
 """Functional expressions, the bodies of predicates and functions, as trees (docs/reference/format.md; Figure 2).
 
-The operators are those of XCSP 2.1. A text is parsed and type-checked, never passed to `eval`. Results stay within 64
-bits, so that no expression can use up the machine's memory; `model/magnitudes.py` rejects teams whose expressions may
-exceed that. `evaluate` walks the tree and `compile_expression` builds closures: two independent implementations, which
-the tests compare with each other.
+The operators are those of XCSP 2.1. A text is parsed and type-checked, and never passed to `eval`. Results stay within
+64 bits, so that no expression can exhaust the memory; `model/magnitudes.py` rejects teams whose expressions may exceed
+this. `evaluate` walks the tree, while `compile_expression` builds closures. These two implementations are independent,
+and tests compare them.
 
 All arguments of an operator are evaluated, except those of `if`. Booleans are 0 and 1.
 """

@@ -1,4 +1,4 @@
-"""Bounds of an expression by interval arithmetic (Moore, "Interval Analysis", 1966): never too narrow."""
+"""Bounds on expressions by interval arithmetic (Moore, "Interval Analysis", 1966). They are never too narrow."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, N
 
 
 class Interval(NamedTuple):
-    """All integers from `low` to `high`; an end may be infinite."""
+    """All integers from `low` to `high`. Either end may be infinite."""
 
     low: float
     high: float
@@ -23,11 +23,11 @@ ANY_INTEGER = Interval(-math.inf, math.inf)
 
 
 def bounds(expression: Expression, limits: Mapping[str, Interval]) -> Interval:
-    """Return an interval in which every defined value of `expression` lies.
+    """Return an interval that contains every defined value of `expression`.
 
     Args:
         expression: The expression.
-        limits: Intervals in which the values of its names lie.
+        limits: Intervals that contain the values of the names in the expression.
     """
     match expression:
         case Constant(value):
@@ -41,7 +41,7 @@ def bounds(expression: Expression, limits: Mapping[str, Interval]) -> Interval:
 
 
 class Excess(NamedTuple):
-    """A part of an expression whose values may lie beyond +-`BOUND`, and the interval in which they lie."""
+    """A part of an expression whose values may exceed +-`BOUND`, and the interval that contains them."""
 
     part: Expression
     interval: Interval
@@ -52,7 +52,7 @@ def excess(expression: Expression, limits: Mapping[str, Interval]) -> Excess | N
 
     Args:
         expression: The expression.
-        limits: Intervals in which the values of its names lie.
+        limits: Intervals that contain the values of the names in the expression.
     """
     found: list[Excess] = []
 
@@ -71,7 +71,7 @@ def excess(expression: Expression, limits: Mapping[str, Interval]) -> Excess | N
 
 
 def _steps(operator: str, parts: list[Interval]) -> Iterator[Interval]:
-    """Yield the intervals of all intermediate results of an operator, and last that of its value."""
+    """Yield the intervals of all intermediate results of an operator. The last one is that of its value."""
     match operator:
         case "if":
             yield _hull(*parts[1:])
@@ -88,7 +88,7 @@ def _steps(operator: str, parts: list[Interval]) -> Iterator[Interval]:
 def _applied(operator: str, parts: list[Interval]) -> Interval:
     if operator in _BOUNDS:
         return _BOUNDS[operator](*parts)
-    return Interval(0, 1)  # all others are Boolean
+    return Interval(0, 1)  # all other operators are Boolean
 
 
 def _sum(*parts: Interval) -> Interval:
@@ -119,11 +119,11 @@ def _square(part: Interval) -> Interval:
 
 def _power(base: Interval, exponent: Interval) -> Interval:
     low, high = _raised(base, exponent)
-    return Interval(max(low, -BOUND), min(high, BOUND))  # results beyond are undefined
+    return Interval(max(low, -BOUND), min(high, BOUND))  # results beyond the bound are undefined
 
 
 def _raised(base: Interval, exponent: Interval) -> Interval:
-    """Return the bounds of a power, infinite ones where it has more than `_MAX_BITS` bits."""
+    """Return the bounds of a power. They are infinite if the power has more than `_MAX_BITS` bits."""
     size, most = _absolute(base).high, exponent.high
     greatest: float = 1
     if size > 1 and most >= 1:
@@ -147,12 +147,12 @@ def _product_of_two(one: Interval, other: Interval) -> Interval:
 
 
 def _plus(left: float, right: float) -> float:
-    """Return a sum of integers or equal infinities. Python adds no large integer to an infinity."""
+    """Return a sum of integers or equal infinities. Python cannot add a large integer to an infinity."""
     return left if left in _INFINITE else right if right in _INFINITE else left + right
 
 
 def _times(left: float, right: float) -> float:
-    """Return a product of integers or infinities. Zero times infinity is zero: the factor is zero everywhere."""
+    """Return a product of integers or infinities. Zero times infinity is zero, since the factor is always zero."""
     if left in _INFINITE or right in _INFINITE:
         return 0 if not left or not right else math.inf if (left > 0) == (right > 0) else -math.inf
     return left * right

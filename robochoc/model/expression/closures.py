@@ -25,9 +25,9 @@ Closure = Callable[[Sequence[int]], int]
 
 
 def compile_expression(expression: Expression, names: Sequence[str]) -> Closure:
-    """Return `expression` as a function of the values of `names`, in their order, which is faster than `evaluate`.
+    """Return `expression` as a function of the values of `names`, in their order. It is faster than `evaluate`.
 
-    The function raises `UndefinedValueError` as `evaluate` does.
+    The function raises `UndefinedValueError` in the same cases as `evaluate`.
 
     Raises:
         ValueError: if a name of the expression is not in `names`.

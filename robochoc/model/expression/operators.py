@@ -1,4 +1,4 @@
-"""The table of the operators of XCSP 2.1, and the evaluation of expressions."""
+"""The table of XCSP 2.1 operators, and the evaluation of expressions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def _bounded(value: int) -> int:
 
 
 def _quotient(dividend: int, divisor: int) -> int:
-    """Return the quotient, truncated toward zero."""
+    """Return the quotient, truncated towards zero."""
     if divisor == 0:
         raise UndefinedValueError
     size = abs(dividend) // abs(divisor)
@@ -34,12 +34,12 @@ def _quotient(dividend: int, divisor: int) -> int:
 
 
 def _remainder(dividend: int, divisor: int) -> int:
-    """Return the remainder, with the dividend's sign."""
+    """Return the remainder, with the sign of the dividend."""
     return dividend - divisor * _quotient(dividend, divisor)
 
 
 def _power(base: int, exponent: int) -> int:
-    """Return the power. Its size is checked first: large powers would use up memory."""
+    """Return the power. Its size is checked first, because large powers would exhaust the memory."""
     if exponent < 0:
         raise UndefinedValueError
     if abs(base) > 1 and exponent >= BOUND.bit_length():
@@ -52,17 +52,17 @@ def _all_equal(first: int, *others: int) -> bool:
 
 
 class Operator(NamedTuple):
-    """A row of the table: types of the arguments and of the result, and the meaning that `evaluate` computes."""
+    """A row of the table: the types of the arguments and the result, and the `meaning`, which `evaluate` computes."""
 
     takes: tuple[Type, ...]
     gives: Type
     meaning: Callable[..., int]
     variadic: bool = False
-    """Whether it has two or more arguments: `meaning` folds them from the left, unless `takes_all`."""
+    """Whether the operator has two or more arguments. `meaning` folds them from the left, unless `takes_all` is set."""
     infix: str = ""
-    """A sign: if an infix term with it is the only argument, its operands are the arguments: `minus(i-j)`."""
+    """A sign. If the only argument is an infix term with this sign, its operands are the arguments: `minus(i-j)`."""
     takes_all: bool = False
-    """Whether `meaning` gets all arguments at once."""
+    """Whether `meaning` receives all arguments at once."""
 
 
 _I, _B = Type.INTEGER, Type.BOOLEAN
@@ -96,7 +96,7 @@ OPERATORS: dict[str, Operator] = {
     "if": Operator((_B, _I, _I), _I, lambda condition, then, otherwise: then if condition else otherwise),
 }
 ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
-"""The paper's names of some operators."""
+"""The names of some operators in the paper."""
 
 
 def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
@@ -104,10 +104,10 @@ def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
 
     Args:
         expression: The expression.
-        environment: The values of its names.
+        environment: The values of the names in the expression.
 
     Raises:
-        UndefinedValueError: for a division by zero, a negative exponent, and a result beyond +-2**63.
+        UndefinedValueError: for a division by zero, a negative exponent, or a result beyond +-2**63.
     """
     match expression:
         case Constant(value):

@@ -19,7 +19,7 @@ MAX_DIGITS = 18
 
 
 class ExpressionError(RobochocError, ValueError):
-    """A text that is not a valid expression, with an error message, its position (an offset in the text) and a hint."""
+    """Raised for an invalid expression. It contains a message, the position (an offset in the text) and a hint."""
 
     def __init__(self, message: str, position: int, hint: str = "") -> None:
         super().__init__(f"{message}, at character {position + 1}" + (f" ({hint})" if hint else ""))
@@ -33,7 +33,7 @@ class SymbolNames:
     """The symbols that an expression may contain.
 
     Attributes:
-        names: The names of the expression that are symbols.
+        names: The names in the expression that are symbols.
         code: Returns the code of a symbol by its name. Raises `ValueError` with the reason for an invalid symbol.
     """
 
@@ -42,20 +42,20 @@ class SymbolNames:
 
 
 def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames | None = None) -> Expression:
-    """Read a functional expression over `names`.
+    """Parse a functional expression over `names`.
 
-    This is XCSP 2.1's functional form, with the extensions in Figure 2: an argument list in further parentheses, infix
-    `+ - *`, and `minus(i-j)` (docs/reference/format.md).
+    This is the functional form of XCSP 2.1 with the extensions in Figure 2: an argument list in additional parentheses,
+    infix `+ - *`, and `minus(i-j)` (docs/reference/format.md).
 
     Args:
         text: The text.
-        names: The names that may occur in it.
-        wanted: The type of its value.
+        names: The names that may occur in the expression.
+        wanted: The type of the expression's value.
         symbols: The `names` that are symbols, if any; then other words, and words in quotes (`'red'`), are names
             of symbols. Only eq, ne and in compare symbols.
 
     Raises:
-        ExpressionError: if the text is not such an expression, with the position and the next step.
+        ExpressionError: if the text is not a valid expression. It contains the position and a suggestion to the user.
     """
     if len(text) > MAX_TEXT:
         raise ExpressionError(
@@ -77,7 +77,7 @@ class _Parsed(NamedTuple):
     position: int
     depth: int = 1
     infix: str = ""
-    """The sign, where the part is an infix term outside parentheses."""
+    """The sign if the part is an infix term outside parentheses."""
     operands: tuple[_Parsed, ...] = ()
 
 
@@ -312,7 +312,7 @@ def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
 
 
 def _operands(name: _Token, operator: Operator, only: _Parsed) -> tuple[_Parsed, ...]:
-    """Return the two arguments of a function that has one infix term as its argument: `minus(i-j)`."""
+    """Return the two arguments of a function whose only argument is an infix term: `minus(i-j)`."""
     if only.infix and only.infix == operator.infix:
         return only.operands
     shown = _shortened(text(only.expression))

@@ -13,7 +13,7 @@ BOUND = 2**63
 
 
 class Type(StrEnum):
-    """The type of an expression's value. Names (formal parameters, variables) are integers or symbols."""
+    """The type of an expression's value. Names (formal parameters or variables) are integers or symbols."""
 
     INTEGER = "integer"
     BOOLEAN = "Boolean"
@@ -47,11 +47,11 @@ Expression = Constant | Name | Apply
 
 
 class UndefinedValueError(RobochocError, ArithmeticError):
-    """The expression has no value: a division by zero, a negative exponent, or a result out of bounds."""
+    """Raised if the expression has no value: a division by zero, a negative exponent, or a result out of bounds."""
 
 
 class ExcessiveValueError(UndefinedValueError):
-    """The expression, or a part of it, has a value beyond +-`BOUND`. Teams in which that can happen are invalid."""
+    """Raised if the expression or a part of it has a value beyond +-`BOUND`. Teams that allow this are invalid."""
 
 
 SYMBOLIC = ("eq", "ne", "in")
@@ -63,7 +63,8 @@ def text(expression: Expression, symbolic: Collection[str] = (), symbols: Sequen
 
     Args:
         expression: The expression.
-        symbolic: Its names that are symbols. Constants compared with them are written as symbols, `eq(X,'red')`.
+        symbolic: The names in the expression that are symbols. Constants compared with them are written as symbols,
+            `eq(X,'red')`.
         symbols: The symbols, by their codes. Other codes are written as integers.
     """
     match expression:
@@ -89,7 +90,7 @@ def _is_in(expression: Expression, names: Collection[str]) -> bool:
 
 
 def names(expression: Expression) -> tuple[str, ...]:
-    """Return the distinct names in `expression`, in the order in which they appear."""
+    """Return the distinct names in `expression`, in order of appearance."""
     return tuple(dict.fromkeys(_every_name(expression)))
 
 
@@ -105,7 +106,7 @@ def _every_name(expression: Expression) -> Iterator[str]:
 
 
 def total(terms: Iterable[Expression]) -> Expression:
-    """Return the sum of any number of integer `terms`; `add` requires at least two."""
+    """Return the sum of any number of integer `terms`. `add` requires at least two terms."""
     given = tuple(terms)
     match given:
         case ():
