@@ -1,4 +1,4 @@
-"""The unit of a team's costs. Users see decimals, perhaps maximised or with a constant; internally they are integers."""
+"""The unit of a team's costs. Users see decimals, maximised or with a constant; internally all costs are integers."""
 
 from __future__ import annotations
 

@@ -10,9 +10,9 @@ Integers = NDArray[np.integer]
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Places = NDArray[np.intp] | NDArray[np.int32] | NDArray[np.int64] | Integers
-"""Places in other arrays."""
+"""Indices in other arrays."""
 Index = slice | Places
-"""A choice of rows."""
+"""A selection of rows."""
 
 FEW = 8
-"""The longest axis along which a loop is faster than numpy's."""
+"""The longest axis along which a Python loop is faster than numpy's."""

@@ -1,4 +1,4 @@
-"""The common base of synchronous protocols as arrays, like `protocols/shared/cycles.py` for robots as objects.
+"""The common base of synchronous protocols on arrays, like `protocols/shared/cycles.py` for robots as objects.
 
 One `step` is a cycle of all robots. Comments name the corresponding methods in `protocols`.
 """
@@ -30,14 +30,14 @@ Costs = TypeVar("Costs", Integers, Floats)
 
 
 class CycleChange(NamedTuple):
-    """The rows whose values have changed in a cycle, and their values."""
+    """The rows whose values changed in a cycle, and the new values."""
 
     rows: Integers
     values: Integers
 
 
 class Draws:
-    """The random numbers of all robots, equal to those of `protocols/chance.py`: two words for each robot."""
+    """The random numbers of all robots, equal to those in `protocols/chance.py`: two words per robot."""
 
     def __init__(self, seed: int, names: Iterable[str], many: int) -> None:
         words = (word for name in names for word in key_and_step(seed, name))
@@ -45,7 +45,7 @@ class Draws:
         self._states, self._steps = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
 
     def draw(self, robots: Index) -> NDArray[np.float64]:
-        """Return the next number of each of `robots`, which contain no duplicates."""
+        """Return the next random number of each robot in `robots`, which must not contain duplicates."""
         bits = self._states[robots] + self._steps[robots]
         self._states[robots] = bits
         mixed = (bits ^ bits >> np.uint64(30)) * _FIRST
@@ -54,7 +54,7 @@ class Draws:
         return (mixed >> _FLOAT_BITS).astype(np.float64) * UNIT
 
     def choose(self, robots: Places, many: Integers) -> Integers:
-        """Return, for each of `robots`, a random number below `many`; nothing is drawn for a single choice."""
+        """Return, for each of `robots`, a random number below `many`. If there is only one choice, nothing is drawn."""
         chosen = np.zeros(len(robots), np.int64)
         several = np.flatnonzero(many > 1)
         chosen[several] = (self.draw(robots[several]) * many[several]).astype(np.int64)
@@ -65,14 +65,14 @@ class CycleRun(ABC):
     """A run of one protocol on one team.
 
     Attributes:
-        values: The place of each row's value in its domain.
-        cycle: The cycle of these values; -1 before the start.
-        costs: The cost of the values of each cycle; `inf` if a hard constraint is broken.
-        changes: The changes of each cycle; None if they are not recorded.
-        best: The values of the first cheapest cycle; of the last cycle if all cost `inf`.
+        values: The index of each row's value in its domain.
+        cycle: The number of the current cycle; -1 before the start.
+        costs: The cost of the values in each cycle; `inf` if a hard constraint is violated.
+        changes: The changed values in each cycle; None if they are not recorded.
+        best: The values in the first of the cheapest cycles; in the last cycle if all cycles cost `inf`.
         verdict: Set when the robot `witness` has proven that there is no solution.
         tally: The counts of sent messages.
-        checks: Constraint checks of all robots.
+        checks: The constraint checks of all robots together.
         clocks: The NCCC clock of each row; None if clocks are not computed.
     """
 
@@ -100,7 +100,7 @@ class CycleRun(ABC):
         self._firsts = [np.arange(group.active) * group.size for group in layout.groups]
         self._active = sum(group.active for group in layout.groups)
         self.all_checks = np.zeros(layout.many, np.int64)
-        """The constraint checks with which each row evaluates its values; 0 for rows without neighbours."""
+        """The constraint checks that each row needs to evaluate its values; 0 for rows without neighbours."""
         for group in layout.groups:
             self.all_checks[group.first : group.first + group.active] = group.checks[: group.active]
 
@@ -151,27 +151,27 @@ class CycleRun(ABC):
 
     @abstractmethod
     def _start_active(self) -> None:
-        """Give robots with neighbours their first values, and send their first messages."""
+        """Set the first values of robots with neighbours, and send their first messages."""
 
     @abstractmethod
     def _step(self) -> None:
-        """Compute the cost of the present values, and choose those of the next cycle."""
+        """Compute the cost of the current values, and choose the values of the next cycle."""
 
     @abstractmethod
     def _weigh(self) -> None:
-        """Compute the cost of the present values."""
+        """Compute the cost of the current values."""
 
     # Values
 
     def choose_random_values(self) -> None:
-        """Choose a random value of the domain for each robot with neighbours."""
+        """Choose a random value from the domain of each robot with neighbours."""
         for group in self.layout.groups:
             rows = np.arange(group.first, group.first + group.active)
             chosen = self.draws.choose(rows, np.full(group.active, group.size))
             self.values[rows] = chosen.astype(self.layout.kind)
 
     def value_costs(self) -> list[Integers]:
-        """Return the cost of each value of robots with neighbours, by group; note the cost of the present values."""
+        """Return the cost of each value of robots with neighbours, by group. Record the cost of the current values."""
         found, sums = [], _Sums()
         for group, firsts in zip(self.layout.groups, self._firsts, strict=True):
             own = group.values(self.values)
@@ -192,13 +192,13 @@ class CycleRun(ABC):
         return found
 
     def note(self, cost: float) -> None:
-        """Note the cost of the present values."""
+        """Record the cost of the current values."""
         if not self.costs or cost < min(self.costs) or cost == INFINITE == min(self.costs):
             self.best = self.values.copy()
         self.costs.append(cost)
 
     def present(self, number: int, value_costs: Integers) -> Integers:
-        """Return the costs of the present values of the robots with neighbours in the group `number`."""
+        """Return the costs of the current values of robots with neighbours in the group `number`."""
         group = self.layout.groups[number]
         chosen: Integers = value_costs.ravel().take(self._firsts[number] + group.values(self.values)[: group.active])
         return chosen
@@ -206,25 +206,25 @@ class CycleRun(ABC):
     # Messages, checks and clocks
 
     def send_values(self) -> None:
-        """Send all robots' values to their neighbours."""
+        """Send the values of all robots to their neighbours."""
         lengths = self.layout.description.value_bytes
         if isinstance(lengths, np.ndarray):
             lengths = lengths[self._first_entries + self.values]
         self.tally.add(Value.__name__, lengths, self.layout.degrees)
 
     def count_checks(self, checks: Integers, times: int = 1) -> None:
-        """Count `checks` constraint checks of each row, made at the same time."""
+        """Count `checks` constraint checks for each row. They are made at the same time."""
         self.checks += times * int(checks.sum())
         if self.clocks is not None:
             self.clocks += times * checks
 
     def receive(self) -> None:
-        """Receive a message of each neighbour: raise clocks to theirs."""
+        """Receive a message from each neighbour: advance each clock to the neighbours' clocks."""
         if self.clocks is not None:
             self.clocks = self.greatest(self.clocks, self.clocks.copy())
 
     def greatest(self, numbers: Integers, largest: Integers) -> Integers:
-        """Raise `largest` to the largest `numbers` number of the neighbours of each row, and return it."""
+        """Raise `largest` in each row to the largest of its neighbours' `numbers`, and return it."""
         for group, lists, neighbours, _ in self.layout.links:
             part = largest[group.first : group.last]
             if isinstance(lists, slice):
@@ -234,7 +234,7 @@ class CycleRun(ABC):
         return largest
 
     def _settle_alone(self, group: RobotGroup) -> None:
-        """Give robots without neighbours their cheapest values."""
+        """Set robots without neighbours to their cheapest values."""
         alone = slice(group.first + group.active, group.last)
         if group.fixed is not None:
             self.values[alone] = group.fixed[group.active :].argmin(axis=1).astype(self.layout.kind)
@@ -250,28 +250,28 @@ class CycleRun(ABC):
 
 
 class _Sums:
-    """A sum of costs, each of which several robots count."""
+    """A sum of costs in which several robots count each cost."""
 
     def __init__(self) -> None:
         self._broken: dict[int, int] = {}
         self._paid: dict[int, int] = {}
 
     def add(self, layout: ArrayLayout, costs: Integers, times: int) -> None:
-        """Add `costs`, each counted by `times` robots."""
+        """Add `costs`, each of which is counted by `times` robots."""
         broken = int(layout.costs.broken(costs).sum())
         self._broken[times] = self._broken.get(times, 0) + broken
         self._paid[times] = self._paid.get(times, 0) + layout.costs.sum(costs) - (broken << layout.costs.bits)
 
     @property
     def cost(self) -> float:
-        """The sum."""
+        """The resulting sum."""
         if any(self._broken.values()):
             return INFINITE
         return sum(paid // times for times, paid in self._paid.items())
 
 
 def _fixed(group: RobotGroup) -> Integers:
-    """Return a copy of the fixed costs of the values of robots with neighbours."""
+    """Return a copy of the fixed costs of the values, for robots with neighbours."""
     if group.fixed is not None:
         return group.fixed[: group.active].copy()
     kind = group.blocks[0].rows.dtype if group.blocks else np.dtype(np.int32)
@@ -279,7 +279,7 @@ def _fixed(group: RobotGroup) -> Integers:
 
 
 def exact_sum(costs: Floats) -> float:
-    """Return the sum of `costs`, whole numbers or `inf`: an integer if a float is not exact."""
+    """Return the sum of `costs`, whole numbers or `inf`. It is an integer if a float would not be exact."""
     total = float(costs.sum())
     return total if total < EXACT or total == INFINITE else sum(map(int, costs.ravel().tolist()))
 
@@ -306,13 +306,13 @@ def count(flags: Flags) -> Integers:
 
 
 def nth(flags: Flags, numbers: Integers) -> Integers:
-    """Return, for each row, the place of the set flag with this number (from 0)."""
+    """Return, for each row, the index of the set flag with this number (counted from 0)."""
     found: Integers = (flags.cumsum(axis=1) > numbers[:, None]).argmax(axis=1)
     return found
 
 
 def cycles_of(run: CycleRun) -> Iterator[CycleRun]:
-    """Run all cycles; yield `run` before each next cycle, and once more at the end."""
+    """Run all cycles. Yield `run` before each next cycle, and once more at the end."""
     run.start()
     yield run
     while not run.is_over:

@@ -1,4 +1,4 @@
-"""The description of a team by arrays, before its layout for a run: robots are numbers, in priority order."""
+"""The description of a team by arrays, before its layout for a run. Robots are numbers, in priority order."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ from robochoc.solver.local_problem import LocalProblem
 
 @dataclass(frozen=True)
 class KnownConstraints:
-    """Constraints of one shape, each as known by one of its robots.
+    """Constraints whose tables have the same shape, each as known by one of its robots.
 
     Attributes:
         owners: The robot that knows each constraint.
-        others: The other robots of each scope, a column for each, the highest first.
-        tables: Distinct tables of costs: an axis for each of the others, then one for the owner's values. `inf`
-            forbids.
-        which: The number of each constraint's table.
-        numbers: The place of each constraint among all that its owner knows.
+        others: The other robots in each scope, one column per robot, highest first.
+        tables: Distinct tables of costs: one axis for each of the others, then one for the owner's values. `inf` means
+            forbidden.
+        which: The index of each constraint's table.
+        numbers: The index of each constraint among all constraints that its owner knows.
     """
 
     owners: Integers
@@ -37,18 +37,19 @@ class KnownConstraints:
 
 @dataclass(frozen=True)
 class Description:
-    """A team: robot 0 is the highest in the order.
+    """A team. Robot 0 is the highest in the order.
 
     Attributes:
-        names: The robots' names, from which their random numbers follow.
+        names: The robots' names, which determine their random numbers.
         sizes: The number of values of each robot.
         degrees: The number of neighbours of each robot.
-        neighbours: The neighbours of robot 0, then of robot 1, and so on, each list in priority order.
+        neighbours: The neighbours of robot 0, then those of robot 1, and so on, each list in priority order.
         charges: The unary cost of each value of robot 0, then of robot 1, and so on. None: no unary costs.
         held: The constraints, as known by each robot.
-        value_bytes: The size of the message with each value, in the order of `charges`; one number if all are equal.
-        domain_bytes: The size of the message with all values, by robot; one number if all are equal.
-        table_checks: The constraint checks that build each robot's tables. None: one check for each entry.
+        value_bytes: The size of the message with each value, in the order of `charges`. A single number if all are
+            equal.
+        domain_bytes: The size of the message with all values, by robot. A single number if all are equal.
+        table_checks: The constraint checks for building each robot's tables. None: one check per entry.
     """
 
     names: Sequence[str]
@@ -63,7 +64,7 @@ class Description:
 
 
 def describe_team(parts: Mapping[str, AgentProblem]) -> Description:
-    """Return the description of the team with these `parts`, in priority order.
+    """Return the description of the team with these `parts`, which are in priority order.
 
     Raises:
         UnsupportedError: when a constraint's table is too large.
@@ -93,7 +94,7 @@ def _value_bytes(value: Value) -> int:
 
 @dataclass
 class _Shape:
-    """Constraints whose tables have one shape."""
+    """Constraints whose tables have the same shape."""
 
     owners: list[int] = field(default_factory=list)
     others: list[list[int]] = field(default_factory=list)
@@ -113,7 +114,7 @@ class _Shape:
 
 
 class _Draft:
-    """Constraints by the shape of their tables; equal tables are stored once."""
+    """Collects constraints by the shape of their tables. Equal tables are stored once."""
 
     def __init__(self) -> None:
         self._shapes: dict[tuple[int, ...], _Shape] = {}
@@ -121,7 +122,7 @@ class _Draft:
     def add(
         self, place: int, problem: LocalProblem, rank: Mapping[str, int], domains: Mapping[str, Sequence[Value]]
     ) -> None:
-        """Add the constraints that the robot at `place` knows."""
+        """Add the constraints known by the robot with index `place`."""
         for number, table in enumerate(problem.tables(domains)):
             shape = self._shapes.setdefault(table.charges.shape, _Shape())
             shape.add(place, [rank[name] for name in table.agents], table.charges, number)

@@ -1,4 +1,4 @@
-"""DSA for all robots at once: `protocols/local_search/dsa.py`, where the algorithm is explained."""
+"""DSA for all robots at once. `protocols/local_search/dsa.py` explains the algorithm."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ class ArrayDSA(CycleRun):
         own[moving] = nth(choices, chosen).astype(own.dtype)
 
     def _probability(self, gains: Flags) -> Floats | float:
-        """Return the probability of a move for each robot; `gains` marks robots whose move is a gain."""
+        """Return the probability that each robot moves. `gains` marks robots whose move is a gain."""
         settings = cast("DSASettings", self.settings)
         return np.where(gains, 1.0, settings.probability) if settings.variant in "DE" else settings.probability
 
     def _sideways(self, number: int, group: RobotGroup, now: Integers) -> Flags | bool:
-        """Return the robots whose moves without a gain the variant allows (`DSA._probability`)."""
+        """Return the robots for which the variant allows moves without a gain (`DSA._probability`)."""
         variant = cast("DSASettings", self.settings).variant
         if variant not in "BD":
             return variant in "CE"

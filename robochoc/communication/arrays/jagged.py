@@ -1,8 +1,8 @@
-"""Lists of different lengths, column by column: the first entries of all lists, then the second ones, and so on.
+"""Lists of different lengths, stored column by column: the first entries of all lists, then the second ones, and so on.
 
-A column is one array, so a sum over each list takes as many additions of arrays as the longest list has entries, in the
-order of the list: the sum is rounded as in a loop. (Jagged diagonals, the storage of sparse matrices on vector
-machines: Saad, "Krylov subspace methods on supercomputers", 1989.)
+A column is one array, so summing all lists takes as many array additions as the longest list has entries. Entries are
+added in the order of the list, so the sum is rounded as in a loop. (Jagged diagonals, the storage of sparse matrices on
+vector machines: Saad, "Krylov subspace methods on supercomputers", 1989.)
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ from robochoc.communication.arrays.array_types import Index, Integers
 
 
 def columns(lengths: Integers) -> Iterator[tuple[Index, Integers]]:
-    """Yield, for each column, the lists that reach it, and the places of their entries if lists are concatenated.
+    """Yield, for each column, the lists long enough for it, and the indices of their entries in the concatenated lists.
 
-    The lists are a slice if they are sorted by descending length.
+    If the lists are sorted by descending length, they are yielded as a slice.
     """
     starts = np.cumsum(lengths) - lengths
     order = np.argsort(-lengths, kind="stable")
@@ -30,12 +30,12 @@ def columns(lengths: Integers) -> Iterator[tuple[Index, Integers]]:
 
 
 def segments(lengths: Integers) -> Integers:
-    """Return the number of its list for each entry of concatenated lists."""
+    """Return, for each entry of concatenated lists, the index of its list."""
     return np.repeat(np.arange(len(lengths)), lengths)
 
 
 def narrowest(largest: int) -> np.dtype[np.integer]:
-    """Return the smallest integer type for -1 to `largest`."""
+    """Return the smallest integer type for the numbers from -1 to `largest`."""
     for kind in (np.int8, np.int16, np.int32):
         if largest <= np.iinfo(kind).max:
             return np.dtype(kind)

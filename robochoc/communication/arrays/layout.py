@@ -1,8 +1,8 @@
-"""The layout of a team in arrays: robots with equally many values form a group, sorted by descending degree.
+"""The layout of a team in arrays: robots with the same number of values form a group, sorted by descending degree.
 
-Rows number the robots in this order; `ArrayLayout.robots` maps rows to robots. The cost of a value is one integer: the
-number of broken constraints in the high bits, the other costs in the low bits (`IntegerCosts`), so that
-integers compare as `LexicographicCost` does.
+Rows are numbered in this order; `ArrayLayout.robots` maps rows to robots. The cost of a value is one integer: the
+number of violated constraints is in the high bits, the other costs are in the low bits (`IntegerCosts`), so that
+integers compare like `LexicographicCost`.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ _LOW = (1 << _LOW_BITS) - 1
 
 @dataclass(frozen=True)
 class IntegerCosts:
-    """Costs as integers: the number of broken constraints, shifted by `bits`, plus all other costs.
+    """Costs as integers: the number of violated constraints, shifted by `bits`, plus all other costs.
 
-    A difference of two sums has the same form; its other costs may be negative, and are less than half of the unit.
+    A difference between two sums has the same form. Its other costs may be negative, and are less than half of the
+    unit.
     """
 
     bits: int
@@ -36,7 +37,7 @@ class IntegerCosts:
 
     @classmethod
     def up_to(cls, total: float, constraints: int) -> IntegerCosts:
-        """Return the form for robots with at most `constraints` constraints and costs of at most `total`.
+        """Return the form for robots with at most `constraints` constraints and a total cost of at most `total`.
 
         Raises:
             TooLargeError: if the costs do not fit into 64 bits.
@@ -52,30 +53,30 @@ class IntegerCosts:
         return cls(bits, np.dtype(np.int32 if largest < 1 << 31 else np.int64))
 
     def of(self, costs: Floats) -> Integers:
-        """Return `costs` in this form; `inf` stands for a broken constraint."""
+        """Return `costs` in this form. `inf` means a violated constraint."""
         broken = np.isinf(costs)
         return (np.where(broken, 0, costs).astype(np.int64) + (broken.astype(np.int64) << self.bits)).astype(self.kind)
 
     def sum(self, costs: Integers) -> int:
-        """Return the sum of `costs`, which may exceed 64 bits."""
+        """Return the sum of `costs`. It may exceed 64 bits."""
         if len(costs) << self.bits < 1 << _SIGNED_BITS:
             return int(costs.sum(dtype=np.int64))
         low = int((costs & _LOW).sum(dtype=np.int64))
         return low + (int((costs >> _LOW_BITS).sum(dtype=np.int64)) << _LOW_BITS)
 
     def broken(self, costs: Integers) -> Integers:
-        """Return the numbers of broken constraints, of sums or of differences."""
+        """Return the numbers of violated constraints, in sums or differences."""
         half = (1 << self.bits) >> 1
         return (costs.astype(np.int64) + half) >> self.bits
 
     def paid(self, costs: Integers) -> Integers:
-        """Return the other costs."""
+        """Return the costs other than violated constraints."""
         return costs.astype(np.int64) - (self.broken(costs) << self.bits)
 
 
 @dataclass(frozen=True)
 class Column:
-    """A constraint of each of many robots (`lists`, numbered within their group).
+    """One constraint for each of many robots (`lists`, numbered within their group).
 
     The costs of the robot's values are in the row `base` + the sum of `strides` times the others' values.
     """
@@ -86,7 +87,7 @@ class Column:
     strides: tuple[int, ...]
 
     def rows(self, values: Integers) -> Integers:
-        """Return the row of each robot's constraint under these `values`."""
+        """Return the row of each robot's constraint for these `values`."""
         if isinstance(self.base, int) and not self.base and self.strides == (1,):
             return values.take(self.others[0])
         total = np.zeros(len(self.others[0]), np.int64) + self.base
@@ -97,7 +98,7 @@ class Column:
 
 @dataclass(frozen=True)
 class ConstraintBlock:
-    """Constraints of one shape that robots of one group know: a row of costs for each combination of others' values."""
+    """Constraints with one shape, known by robots in one group: a row of costs per combination of others' values."""
 
     held: KnownConstraints
     rows: Integers
@@ -106,10 +107,10 @@ class ConstraintBlock:
 
 @dataclass
 class RobotGroup:
-    """The robots with `size` values: rows `first` to `last` of the team's arrays, the first `active` with neighbours.
+    """The robots with `size` values: rows `first` to `last` in the team's arrays. The first `active` have neighbours.
 
-    `charges` is the unary cost of each value; None: no unary costs. `fixed` also includes constraints over no other
-    robot. `checks` is the number of constraint checks that evaluate all values of each robot.
+    `charges` contains the unary cost of each value; None: no unary costs. `fixed` also includes constraints over no
+    other robot. `checks` is the number of constraint checks for evaluating all values of each robot.
     """
 
     size: int
@@ -127,19 +128,19 @@ class RobotGroup:
         return self.last - self.first
 
     def values(self, values: Integers) -> Integers:
-        """Return the part of the team's `values` that is this group's."""
+        """Return this group's part of the team's `values`."""
         return values[self.first : self.last]
 
 
 class ArrayLayout:
-    """A team's arrays.
+    """The arrays of a team.
 
     Attributes:
         description: The team.
-        costs: The form of its costs.
+        costs: The integer form of its costs.
         robots: The robot in each row.
-        places: The row of each robot; -1 for those without values.
-        groups: The groups of robots with equally many values, in ascending order of this number.
+        places: The row of each robot; -1 for robots without values.
+        groups: The groups of robots with the same number of values, in ascending order of that number.
         degrees: The number of neighbours of the robot in each row.
     """
 
@@ -164,17 +165,17 @@ class ArrayLayout:
 
     @cached_property
     def index(self) -> np.dtype[np.integer]:
-        """The type of integers that number rows."""
+        """The integer type for row numbers."""
         return np.dtype(np.int32 if self.many < np.iinfo(np.int32).max else np.int64)
 
     @cached_property
     def starts(self) -> Integers:
-        """The place of each row's first neighbour in `neighbours`."""
+        """The index of each row's first neighbour in `neighbours`."""
         return np.cumsum(self.degrees) - self.degrees
 
     @cached_property
     def neighbours(self) -> Integers:
-        """The rows of neighbours: those of the robot in row 0, in priority order, then those of row 1, and so on."""
+        """The rows of the neighbours of the robot in row 0, in priority order, then those for row 1, and so on."""
         given = self.description
         starts = np.cumsum(given.degrees) - given.degrees
         entries = np.repeat(starts[self.robots] - self.starts, self.degrees) + np.arange(self.degrees.sum())
@@ -183,7 +184,7 @@ class ArrayLayout:
 
     @cached_property
     def links(self) -> list[tuple[RobotGroup, Index, Integers, Integers]]:
-        """Each group's neighbours, column by column: the robots (within the group), neighbours, places of the links."""
+        """Each group's neighbours, by column: the robots (within the group), the neighbours, the links' indices."""
         return [
             (group, lists, self.neighbours[places + self._start(group)], places + self._start(group))
             for group in self.groups
@@ -192,21 +193,21 @@ class ArrayLayout:
 
     @cached_property
     def higher(self) -> list[Flags]:
-        """For each column of `links`, whether the neighbour is before the robot in the order."""
+        """For each column of `links`, whether the neighbour precedes the robot in the order."""
         return [
             self.robots[neighbours] < self.robots[group.first : group.last][lists]
             for group, lists, neighbours, _ in self.links
         ]
 
     def link(self, robots: Integers, neighbours: Integers) -> Integers:
-        """Return the places in `neighbours` of links from `robots` to those of their `neighbours`."""
+        """Return the indices in `neighbours` of the links from `robots` to `neighbours`."""
         keys, order = self._links_sorted
         found: Integers = order[np.searchsorted(keys, robots.astype(np.int64) * self.many + neighbours)]
         return found
 
     @cached_property
     def back(self) -> Integers:
-        """For each link, the place of the link in the other direction."""
+        """For each link, the index of the link in the opposite direction."""
         return self.link(self.neighbours, segments(self.degrees)).astype(self.index)
 
     @cached_property
@@ -236,7 +237,7 @@ class ArrayLayout:
         return self.costs.of(given.charges[starts[:, None] + np.arange(size)])
 
     def _fill(self, group: RobotGroup, held: list[KnownConstraints]) -> None:
-        """Give the group its constraints."""
+        """Add the group's constraints to the group."""
         group.checks = np.zeros(group.many, np.int64)
         group.fixed = group.charges
         for one in held:
@@ -265,7 +266,7 @@ class ArrayLayout:
 
 
 def _largest(description: Description, held: list[KnownConstraints]) -> tuple[float, int]:
-    """Return the largest possible sum of a robot's costs, and of its broken constraints."""
+    """Return the largest possible sum of a robot's costs, and number of its violated constraints."""
     many = len(description.sizes)
     total, constraints = np.zeros(many), np.zeros(many, np.int64)
     if description.charges is not None and len(description.charges):

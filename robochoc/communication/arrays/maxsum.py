@@ -1,6 +1,6 @@
-"""Max-Sum for all robots at once: `protocols/inference/maxsum.py`, where the algorithm is explained.
+"""Max-Sum for all robots at once. `protocols/inference/maxsum.py` explains the algorithm.
 
-Sums are computed in the same order as by the objects, so that they are rounded alike.
+Sums are computed in the same order as for robots as objects, so that rounding is the same.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from robochoc.protocols.shared.cycles import CycleCount, Domain
 from robochoc.solver.errors import UnsupportedError
 
 _CHUNK = 1 << 20
-"""The number of table entries in one step: they fit into the processor's cache."""
+"""The number of table entries in one step, chosen to fit into the processor's cache."""
 
 
 @dataclass(frozen=True)
 class Factors:
-    """Function nodes of one shape (`protocols/inference/maxsum_factor.py`): each is a sum of constraints.
+    """Function nodes with one shape (`protocols/inference/maxsum_factor.py`). Each node is a sum of constraints.
 
-    `rows` are their robots, a column for each place, the holder last; `numbers` are their places among all functions of
-    the holder; `which` is the number of each one's table.
+    `rows` contains their robots, one column per position, with the holder last. `numbers` contains their indices among
+    all functions of the holder, `which` the index of each table.
     """
 
     rows: Integers
@@ -62,17 +62,17 @@ class Factors:
         return found
 
     def cost(self, values: Integers) -> float:
-        """Return the sum of all functions under these `values`."""
+        """Return the sum of all functions for these `values`."""
         return exact_sum(self.tables[(self.which, *(values[column] for column in self.rows.T))])
 
 
 def factors_of(layout: ArrayLayout) -> list[Factors]:
-    """Return the functions of a team. The lowest robot of a scope holds its function."""
+    """Return the functions of a team. The lowest robot in a scope holds the function."""
     return [found for held in layout.description.held if (found := _joined(layout, held)) is not None]
 
 
 def _joined(layout: ArrayLayout, held: KnownConstraints) -> Factors | None:
-    """Return the functions of the constraints in `held` whose owner is the lowest; None if there are none."""
+    """Return the functions for the constraints in `held` whose owner is the lowest robot; None if there are none."""
     if not held.others.shape[1]:
         return None
     kept = np.flatnonzero(held.owners > held.others.max(axis=1))
@@ -93,7 +93,7 @@ def _joined(layout: ArrayLayout, held: KnownConstraints) -> Factors | None:
 
 
 def _least(costs: Floats, axis: int) -> Floats:
-    """Return the minimum along `axis`; for a short axis, a loop is faster than numpy's."""
+    """Return the minimum along `axis`. For a short axis, a loop is faster than numpy's."""
     if costs.shape[axis] > FEW:
         return cast("Floats", costs.min(axis=axis))
     rows = np.moveaxis(costs, axis, 0)
@@ -105,10 +105,10 @@ def _least(costs: Floats, axis: int) -> Floats:
 
 @dataclass
 class Ports:
-    """The edges between functions and the variables of one group of robots: a row for each edge.
+    """The edges between functions and the variables in one group of robots, with one row per edge.
 
-    `r` and `q` are the last messages from and to the functions. `owners` are the robots (numbered in their group),
-    `slots` the edges of each robot, one robot after the other, in the order in which their costs are added up.
+    `r` and `q` are the last messages from and to the functions. `owners` are the robots (numbered within their group),
+    `slots` are the edges of each robot, robot by robot, in the order in which their costs are added.
     """
 
     group: RobotGroup
@@ -124,7 +124,7 @@ class Ports:
             yield lists, self.slots[places]
 
     def without(self, rows: Integers, preferred: Floats) -> Iterator[tuple[Integers, Floats]]:
-        """Yield edges of `rows`, with the sum of the costs of their values by all other functions."""
+        """Yield edges in `rows`, with the costs of their values summed over all other functions."""
         starts, lengths = (np.cumsum(self.lengths) - self.lengths)[rows], self.lengths[rows]
         for left_out in range(int(lengths.max(initial=0))):
             there = lengths > left_out
@@ -155,14 +155,14 @@ def ports_of(layout: ArrayLayout, factors: list[Factors]) -> tuple[list[Ports], 
 
 
 def _by_place(factors: Factors, sides: list[tuple[Ports, slice]]) -> list[tuple[Ports, slice]]:
-    """Return `sides`, which are sorted by size, in the order of the robots."""
+    """Return `sides` (sorted by size) in the order of the robots."""
     sizes = factors.tables.shape[1:]
     order = sorted(range(len(sizes)), key=lambda place: sizes[place])
     return [side for _, side in sorted(zip(order, sides, strict=True), key=lambda pair: pair[0])]
 
 
 def _ports(layout: ArrayLayout, group: RobotGroup, ends: list[tuple[Factors, int]]) -> tuple[Ports, list[slice]]:
-    """Return the ports of `group` at `ends`: functions with the places of their robots."""
+    """Return the ports of `group` at `ends`, which are functions with the positions of their robots."""
     owners = [one.rows[:, place] - group.first for one, place in ends]
     holders = [np.where(place == one.rows.shape[1] - 1, -1, layout.robots[one.rows[:, -1]]) for one, place in ends]
     bounds = np.cumsum([0, *(len(one.rows) for one, _ in ends)])
@@ -177,7 +177,7 @@ def _ports(layout: ArrayLayout, group: RobotGroup, ends: list[tuple[Factors, int
 
 
 _REST = len(encode(R([]))) - 1
-"""Bytes of a message without its list of rows."""
+"""The size of a message without its list of rows, in bytes."""
 _FLOAT = 9
 
 
@@ -235,7 +235,7 @@ class ArrayMaxSum(CycleRun):
     # Equations
 
     def _prefer(self, group: RobotGroup) -> Floats:
-        """Return the unary cost of each value, with its preference (gamma)."""
+        """Return the unary cost of each value, including its preference (gamma)."""
         rows = np.arange(group.first, group.first + group.active)
         preferred = np.zeros((group.many, group.size))
         preference = cast("MaxSumSettings", self.settings).preference
@@ -245,7 +245,7 @@ class ArrayMaxSum(CycleRun):
         return preferred if alone is None else alone + preferred
 
     def _send_r(self) -> None:
-        """Compute R of all functions (2)."""
+        """Compute R for all functions (2)."""
         for factors, sides in zip(self._factors, self._sides, strict=True):
             received = [ports.q[rows] for ports, rows in sides]
             for place, (ports, rows) in enumerate(sides):
@@ -268,7 +268,7 @@ class ArrayMaxSum(CycleRun):
         return found
 
     def _send_q(self, z: list[Floats]) -> None:
-        """Compute Q of all variables (1), normalised and damped."""
+        """Compute Q for all variables (1), normalised and damped."""
         damping = cast("MaxSumSettings", self.settings).damping
         for ports, preferred, costs in zip(self._ports, self._preferred, z, strict=True):
             fresh = _fresh(ports, preferred, costs)
@@ -287,7 +287,7 @@ class ArrayMaxSum(CycleRun):
         return np.where(broken > 0, INFINITE, paid.astype(np.float64))
 
     def _count_links(self) -> None:
-        """Count the robots above and below each robot, and the sizes of messages between two."""
+        """Count the robots above and below each robot, and the sizes of the messages between two robots."""
         layout = self.layout
         self._below = np.zeros(layout.many, np.int64)
         higher = np.zeros(len(layout.neighbours), bool)
@@ -303,7 +303,7 @@ class ArrayMaxSum(CycleRun):
         self._link_bytes: Integers = lengths[higher]
 
     def _count_tables(self) -> None:
-        """Count the checks of tables, once all domains are known."""
+        """Count the checks for the tables when all domains are known."""
         layout = self.layout
         alone = np.zeros(layout.many, np.int64)
         for held in layout.description.held:
@@ -324,7 +324,7 @@ class ArrayMaxSum(CycleRun):
             self.count_checks(np.where(layout.degrees > 0, made[layout.robots], 0))
 
     def _raise_clocks(self, *, below: bool) -> None:
-        """Raise clocks to those of the robots below, or above, that have sent a message."""
+        """Advance clocks to the clocks of the robots below, or above, that have sent a message."""
         if self.clocks is not None:
             clocks_after = self.clocks.copy()
             for (group, lists, neighbours, _), higher in zip(self.layout.links, self.layout.higher, strict=True):
@@ -335,7 +335,7 @@ class ArrayMaxSum(CycleRun):
 
 
 def _fresh(ports: Ports, preferred: Floats, costs: Floats) -> Floats:
-    """Return, for each edge, the cost of each value without its function, without subtraction from infinity."""
+    """Return, for each edge, the cost of each value without the edge's function. It subtracts nothing from infinity."""
     endless = np.flatnonzero(np.isinf(costs).any(axis=1))
     with np.errstate(invalid="ignore"):
         fresh: Floats = costs.take(ports.owners, axis=0) - ports.r

@@ -1,4 +1,4 @@
-"""MGM for all robots at once: `protocols/local_search/mgm.py`, where the algorithm is explained."""
+"""MGM for all robots at once. `protocols/local_search/mgm.py` explains the algorithm."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from robochoc.protocols.local_search.mgm import Gain
 from robochoc.protocols.message import encode
 
 _REST = len(encode(Gain(0, 0))) - 2
-"""Bytes of a gain without its two numbers."""
+"""The size of a gain message without its two numbers, in bytes."""
 
 
 class ArrayGainers(CycleRun):
@@ -21,7 +21,7 @@ class ArrayGainers(CycleRun):
         self.value_costs()
 
     def best_unilateral(self, found: list[Integers], of: Flags | None = None) -> tuple[Integers, Integers]:
-        """Return the best unilateral move of each row, and its gain: of all rows, or of those with a flag in `of`."""
+        """Return the best unilateral move and its gain for each row, or only for the rows with a flag in `of`."""
         targets, gains = self.values.copy(), np.zeros(self.layout.many, self.layout.costs.kind)
         for number, (group, value_costs) in enumerate(zip(self.layout.groups, found, strict=True)):
             lowest = least(value_costs)
@@ -36,13 +36,13 @@ class ArrayGainers(CycleRun):
         return targets, gains
 
     def send_gains(self, gains: Integers) -> None:
-        """Send all robots' gains to their neighbours."""
+        """Send the gains of all robots to their neighbours."""
         costs = self.layout.costs
         lengths = _REST + integer_bytes(costs.broken(gains)) + integer_bytes(costs.paid(gains))
         self.tally.add(Gain.__name__, lengths, self.layout.degrees)
 
     def wins(self, gains: Integers, partners: Integers | None = None) -> Flags:
-        """Return the robots that gain most among their neighbours but `partners`; ties go to the first in the order."""
+        """Return the robots that gain most among their neighbours except `partners`. The highest wins ties."""
         greatest = np.zeros(self.layout.many, gains.dtype)
         for (group, lists, neighbours, _), higher in zip(self.layout.links, self.layout.higher, strict=True):
             part = greatest[group.first : group.last]

@@ -1,4 +1,4 @@
-"""MGM-2 for all robots at once: `protocols/local_search/mgm2.py`, where the algorithm is explained."""
+"""MGM-2 for all robots at once. `protocols/local_search/mgm2.py` explains the algorithm."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from robochoc.protocols.shared.cycles import Domain
 
 @dataclass(frozen=True)
 class _Position:
-    """The constraints of a block, sorted by the link from their owner to the robot at one position.
+    """The constraints in a block, sorted by the link from their owner to the robot at one position.
 
-    The constraints of link n are at `starts[n]` to `starts[n + 1]`.
+    The constraints on link n are at the indices from `starts[n]` to `starts[n + 1]`.
     """
 
     starts: Integers
@@ -32,7 +32,7 @@ class _Position:
 
 
 class _Constraints:
-    """The constraints of a block: `rows` as in `Column`, and the robots at each position."""
+    """The constraints in a block: `rows` as in `Column`, and the robots at each position."""
 
     def __init__(self, layout: ArrayLayout, block: ConstraintBlock) -> None:
         held = block.held
@@ -50,14 +50,14 @@ class _Constraints:
             self.positions.append(_Position(starts.astype(layout.index), order, stride))
 
     def rows(self, values: Integers, constraints: Integers) -> Integers:
-        """Return the row of costs of each of `constraints` under these `values`."""
+        """Return the row of costs for each of `constraints` under these `values`."""
         others = values[self._others[constraints]].astype(np.int64)
         found: Integers = self._base[constraints] + others @ self._strides
         return found
 
 
 class _Meeting(NamedTuple):
-    """One constraint for each of some of the requested pairs (`pairs`, without duplicates)."""
+    """One constraint for each of those requested pairs that have one (`pairs`, without duplicates)."""
 
     pairs: Integers
     rows: Integers
@@ -66,14 +66,14 @@ class _Meeting(NamedTuple):
 
 
 class PairConstraints:
-    """The constraints of the robots of one group, by their other robots."""
+    """The constraints of the robots in one group, by the other robots in the scope."""
 
     def __init__(self, layout: ArrayLayout, group: RobotGroup) -> None:
         self._constraints = [_Constraints(layout, block) for block in group.blocks]
         self.size = group.size
 
     def count(self, links: Integers) -> Integers:
-        """Return, for each of `links`, the number of its owner's constraints over the neighbour."""
+        """Return, for each of `links`, the number of constraints that its owner has with the neighbour."""
         found = np.zeros(len(links), np.int64)
         for constraints in self._constraints:
             for position in constraints.positions:
@@ -82,16 +82,16 @@ class PairConstraints:
         return found
 
     def without(self, links: Integers, values: Integers, value_costs: Integers) -> Integers:
-        """Return `value_costs` (of each link's owner) without the constraints over the neighbour."""
+        """Return `value_costs` (of each link's owner) without the constraints with the neighbour."""
         left = value_costs.copy()
         for meeting in self._meetings(links, values):
             left[meeting.pairs] -= meeting.costs[meeting.rows]
         return left
 
     def with_any(self, links: Integers, values: Integers, value_costs: Integers, own: Integers, many: int) -> Integers:
-        """Return the `value_costs` of each link's owner for each of the `many` values that its neighbour may have.
+        """Return the `value_costs` of each link's owner for each of the `many` values that the neighbour may have.
 
-        `own` are the neighbours' present values.
+        `own` contains the neighbours' current values.
         """
         found = np.repeat(self.without(links, values, value_costs)[:, None, :], many, axis=1)
         for meeting in self._meetings(links, values):
@@ -116,12 +116,12 @@ def _span(position: _Position, links: Integers) -> tuple[Integers, Integers]:
 
 _NO_OFFER = len(encode(Offer(None)))
 _ACCEPT = len(encode(Accept(0, 0, 0))) - 3
-"""Bytes of an acceptance without its three numbers."""
+"""The size of an acceptance message without its three numbers, in bytes."""
 
 
 @dataclass
 class _Offers:
-    """The offers of one cycle: rows of makers and receivers, and links in both directions."""
+    """The offers in one cycle: the rows of makers and receivers, and the links in both directions."""
 
     makers: Integers
     receivers: Integers
@@ -131,9 +131,10 @@ class _Offers:
 
 @dataclass
 class _Joint:
-    """Offers between two groups whose receivers make no offer: the gain of each joint move, a row for each offer.
+    """Offers between two groups whose receivers make no offer: the gain of each joint move, with one row per offer.
 
-    `offers` are their numbers. A row lists, for each value of the receiver, the maker's values (`width`).
+    `offers` contains the indices of the offers. A row lists, for each value of the receiver, the maker's values
+    (`width`).
     """
 
     offers: Integers
@@ -154,7 +155,7 @@ class ArrayMGM2(ArrayGainers):
             self.send_values()
 
     def _step(self) -> None:
-        """Go through all phases of a cycle, from values to joint moves."""
+        """Run all phases of a cycle, from values to joint moves."""
         found = self.value_costs()
         self.receive()
         offers = self._offer()
@@ -208,14 +209,14 @@ class ArrayMGM2(ArrayGainers):
     def _offered_gains(
         self, offers: _Offers, chosen: Integers, number: int, value_costs: Integers, many: int
     ) -> Integers:
-        """Return the gains in the `chosen` offers, made by robots of the group `number`."""
+        """Return the gains in the `chosen` offers, which were made by robots in the group `number`."""
         group = self.layout.groups[number]
         makers, receivers = offers.makers[chosen] - group.first, self.values[offers.receivers[chosen]]
         rows = self._shared[number].with_any(offers.links[chosen], self.values, value_costs[makers], receivers, many)
         return self.present(number, value_costs)[makers][:, None, None] - rows
 
     def _joint(self, offers: _Offers, chosen: Integers, number: int, value_costs: Integers) -> Integers:
-        """Return the gains of receivers, of the group `number`, on constraints without the maker."""
+        """Return the gains of receivers in the group `number`, on constraints without the maker."""
         group = self.layout.groups[number]
         receivers = offers.receivers[chosen] - group.first
         left = self._shared[number].without(offers.back[chosen], self.values, value_costs[receivers])
@@ -245,10 +246,10 @@ class ArrayMGM2(ArrayGainers):
         return partners, targets, gains
 
     def _choose(self, offers: _Offers, best: Integers, ties: Integers) -> tuple[Integers, Integers]:
-        """Return the accepted offers, and for each the number of the chosen one among its best moves."""
+        """Return the accepted offers, and for each offer the index of the chosen move among its best moves."""
         making = self._flags(offers.makers)
         order = np.argsort(offers.back, kind="stable")
-        order = order[~making[offers.receivers[order]]]  # by receiver, and there in priority order
+        order = order[~making[offers.receivers[order]]]  # sorted by receiver, and then in priority order
         receivers = offers.receivers[order]
         starts = np.flatnonzero(np.diff(receivers, prepend=-1))
         if not len(starts):
@@ -265,7 +266,7 @@ class ArrayMGM2(ArrayGainers):
         return order[found], wanted - (sums[found] - counted[found])
 
     def _go(self, committed: Integers, partners: Integers, moves: Flags) -> None:
-        """Exchange between partners whether they gain most; both must (`MGM2._decide`, `MGM2._receive_go`)."""
+        """Exchange between partners whether each gains most; both must (`MGM2._decide`, `MGM2._receive_go`)."""
         self.tally.add(Go.__name__, len(encode(Go(True))), len(committed))
         if self.clocks is not None:
             self.clocks[committed] = np.maximum(self.clocks[committed], self.clocks[partners[committed]])
@@ -281,7 +282,7 @@ class ArrayMGM2(ArrayGainers):
         return total
 
     def _send_answers(self, offers: _Offers, makers: Integers, targets: Integers, gains: Integers) -> None:
-        """Count the answers, and raise the clocks of the makers of offers to them."""
+        """Count the answers, and advance the clocks of the offers' makers to the answers' clocks."""
         costs, offered = self.layout.costs, gains[makers]
         numbers = (
             integer_bytes(targets[makers]) + integer_bytes(costs.broken(offered)) + integer_bytes(costs.paid(offered))
@@ -294,7 +295,7 @@ class ArrayMGM2(ArrayGainers):
             self.clocks[offers.makers] = np.maximum(self.clocks[offers.makers], answered)
 
     def _joint_checks(self, offers: _Offers) -> Integers:
-        """Return the receivers' constraint checks: on all constraints without the maker, for each offer."""
+        """Return the constraint checks of the receivers: for each offer, on all constraints without the maker."""
         making = self._flags(offers.makers)
         checks = np.zeros(self.layout.many, np.int64)
         for number, shared in enumerate(self._shared):
@@ -336,7 +337,7 @@ class ArrayMGM2(ArrayGainers):
 
     @cached_property
     def _groups(self) -> Integers:
-        """The number of the group of each row."""
+        """The group index of each row."""
         return np.repeat(np.arange(len(self.layout.groups)), [group.many for group in self.layout.groups])
 
     @cached_property

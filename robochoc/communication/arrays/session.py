@@ -1,4 +1,4 @@
-"""The session of the runtime of arrays, in one thread: for the protocols in `array_runs.py`."""
+"""The session of the array runtime, in one thread. It supports the protocols in `array_runs.py`."""
 
 from __future__ import annotations
 
@@ -28,13 +28,13 @@ from robochoc.system.stopping import stop_requested
 
 
 class ArraysRun(Session):
-    """One team as arrays. Its problem cannot change.
+    """Runs one team as arrays. The team's problem cannot change.
 
     Args:
-        team: The team, compiled or not.
-        protocol: The protocol that its robots run.
+        team: The team, whether compiled or not.
+        protocol: The protocol of the robots.
         observer: Receives the robots' decisions, with the cycle as their time, and no messages.
-        progress: Receives the count of messages after each cycle, before its decisions.
+        progress: Receives the message count after each cycle, before the decisions in the cycle.
         parameters: The robots' parameters besides the problem.
 
     Raises:
@@ -67,7 +67,7 @@ class ArraysRun(Session):
         return True
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
-        """See `Session.search`; limits are checked after each cycle."""
+        """See `Session.search`. Limits are checked after each cycle."""
         began = time.monotonic()
         run = self._run
         verdict = Verdict.UNKNOWN
@@ -91,7 +91,7 @@ class ArraysRun(Session):
         )
 
     def _watched(self) -> None:
-        """Give the watch a snapshot, if it is due."""
+        """Pass a snapshot to the watch if it is due."""
         if self.watch is not None and self.watch.wants_snapshot(time.monotonic()):
             self.watch.receive(snapshot_of(self._assignments(), self._findings()))
 
@@ -108,7 +108,7 @@ class ArraysRun(Session):
 
     @property
     def costs(self) -> list[float]:
-        """The cost of the team's values in every cycle so far; `inf` if a hard constraint is broken."""
+        """The cost of the team's values in every cycle so far; `inf` if a hard constraint is violated."""
         return list(self._run.costs)
 
     @property
@@ -149,7 +149,7 @@ class ArraysRun(Session):
 
 
 def _laid_out(parts: Mapping[str, AgentProblem]) -> ArrayLayout:
-    """Return the team's arrays. Raises `UnsupportedError` if its costs or tables are too large."""
+    """Return the arrays of the team. Raises `UnsupportedError` if its costs or tables are too large."""
     try:
         return ArrayLayout(describe_team(parts))
     except UnsupportedError as large:

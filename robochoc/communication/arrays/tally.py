@@ -1,4 +1,4 @@
-"""The counts of messages in a run of arrays: messages by type, bytes, the largest size."""
+"""The message counts in an array run: messages by type, bytes, the largest size."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import numpy as np
 from robochoc.communication.arrays.array_types import Integers
 
 _SHORT_LIST, _LONG_LIST = 16, 65_536
-"""The lengths from which lists have longer heads in msgpack."""
+"""The lengths from which lists have longer headers in msgpack."""
 _LEAST_BYTE, _LARGEST_BYTE = -32, 127
-"""The range of integers of one byte."""
+"""The range of integers encoded in one byte."""
 _SIZES = ((-(2**31), 9), (-(2**15), 5), (-(2**7), 3), (-(2**5), 2), (128, 1), (256, 2), (65_536, 3), (2**32, 5))
 
 
@@ -21,7 +21,7 @@ class MessageTally:
         self.bytes = self.largest = 0
 
     def add(self, kind: str, sizes: Integers | int, copies: Integers | int) -> None:
-        """Count messages of `kind`: `copies` of each of `sizes` in bytes. A number stands for an array of it."""
+        """Count messages of type `kind`: `copies` messages with each of the `sizes` in bytes. Numbers apply to all."""
         many = int(np.sum(copies))
         if not many:
             return
@@ -32,7 +32,7 @@ class MessageTally:
 
 
 def integer_bytes(numbers: Integers) -> Integers:
-    """Return the bytes of each of `numbers` in msgpack."""
+    """Return the size of each of `numbers` in msgpack, in bytes."""
     if not numbers.size or (numbers.min() >= _LEAST_BYTE and numbers.max() <= _LARGEST_BYTE):
         return np.ones(numbers.shape, np.int64)
     bounds = np.array([bound for bound, _ in _SIZES])
@@ -42,6 +42,6 @@ def integer_bytes(numbers: Integers) -> Integers:
 
 
 def list_bytes(length: Integers | int) -> Integers:
-    """Return the bytes of the head of a list of this `length` in msgpack."""
+    """Return the size of the header of a list of this `length` in msgpack, in bytes."""
     lengths = np.asarray(length)
     return np.where(lengths < _SHORT_LIST, 1, np.where(lengths < _LONG_LIST, 3, 5))

@@ -1,1 +1,1 @@
-"""The default runtime: one operating system process per robot, joined by multiprocessing queues."""
+"""The default runtime: one operating system process per robot, connected by multiprocessing queues."""

@@ -15,10 +15,10 @@ from robochoc.solver.errors import UnsupportedError
 
 _DECODER = msgspec.msgpack.Decoder(FromParent)
 _ENCODER = msgspec.msgpack.Encoder()
-"""Built before the fork, once for all robots."""
+"""Built once, before the fork, for all robots."""
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 _TRUNCATED = int(socket.MSG_CTRUNC)
-"""A plain number, as combining enumeration members creates new ones."""
+"""A plain number, because combining enumeration members creates new members."""
 
 
 class ControlPipe:
@@ -33,16 +33,16 @@ class ControlPipe:
         self.ended = False
 
     def fileno(self) -> int:
-        """Return the descriptor, for a selector."""
+        """Return the descriptor, for use in a selector."""
         return self._socket.fileno()
 
     def send(self, message: FromRobot) -> bool:
-        """Send `message`; return False if a part of it has to wait until the pipe is writable."""
+        """Send `message`. Return False if a part of it must wait until the pipe is writable."""
         self._writer.put(_ENCODER.encode(message))
         return self._writer.flush()
 
     def flush(self) -> bool:
-        """Send waiting bytes; return False if some still have to wait."""
+        """Send waiting bytes. Return False if some bytes must still wait."""
         return self._writer.flush()
 
     def orders(self) -> list[FromParent]:
@@ -66,7 +66,7 @@ class ControlPipe:
         return [_DECODER.decode(body) for body in unpack(self._buffer)]
 
     def take_fd(self) -> int:
-        """Return the next queue end that was attached to the orders."""
+        """Return the next queue end attached to the orders."""
         return self._fds.popleft()
 
     def finish(self) -> None:

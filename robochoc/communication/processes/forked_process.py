@@ -1,7 +1,7 @@
 """A forked process that writes to as little inherited memory as possible.
 
-`multiprocessing.Process` checks all earlier processes whenever one is started, and each forked process destroys the
-inherited objects of all others. Both costs grow with the square of the team: 3 s and 2 GB for 1,000 robots.
+`multiprocessing.Process` checks all earlier processes whenever it starts one, and each forked process destroys the
+objects inherited for all other processes. Both costs grow with the square of the team: 3 s and 2 GB for 1,000 robots.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class ChildProcess(Protocol):
 
     @property
     def pid(self) -> int | None:
-        """The number of the process."""
+        """The process ID."""
 
     @property
     def sentinel(self) -> int:
@@ -30,30 +30,31 @@ class ChildProcess(Protocol):
 
     @property
     def exitcode(self) -> int | None:
-        """Its exit status, or the negative number of the signal that killed it. None: it is alive."""
+        """The exit status, or the negative number of the signal that killed the process. None: the process is alive."""
 
     def start(self) -> None:
-        """Start it. Raises `OSError` when the system does not allow it."""
+        """Start the process. Raises `OSError` if the system does not allow it."""
 
     def kill(self) -> None:
-        """End it by SIGKILL. Does nothing if it has ended."""
+        """Kill the process by SIGKILL. Has no effect if the process has ended."""
 
     def join(self) -> None:
-        """Wait for its end."""
+        """Wait for the end of the process."""
 
     def close(self) -> None:
-        """Release its resources. It has ended, or was never started."""
+        """Release the resources of the process. It must have ended, or never have been started."""
 
 
 class ForkedProcess:
-    """A process that runs `act`, once it is started, and ends. See `ChildProcess`.
+    """A process that runs `act` after it is started, and ends. See `ChildProcess`.
 
-    Its standard input is empty. An error of `act` is printed; then the status is 1, or that of `SystemExit`.
+    The standard input is empty. If `act` raises an error, it is printed and the status is 1, or the one of
+    `SystemExit`.
 
     Args:
         act: The function to run.
-        kept: Descriptors that it needs.
-        closed: Ranges of descriptors that it closes, except `kept`. They are read when it is started.
+        kept: The descriptors that `act` needs.
+        closed: Ranges of descriptors that the process closes, except `kept`. They are read at the start.
     """
 
     def __init__(self, act: Callable[[], None], kept: Iterable[int], closed: Sequence[range] = ()) -> None:
@@ -75,7 +76,7 @@ class ForkedProcess:
         os.close(self._its_end)
 
     def _run(self) -> NoReturn:
-        """Run in the forked process, and end it without any cleanup of the parent's objects."""
+        """Run `act` in the forked process, and end the process without cleaning up objects of the parent."""
         status = 1
         try:
             gc.freeze()  # a garbage collection would write to inherited memory
@@ -130,21 +131,21 @@ class ForkedProcess:
     def _wait(self, options: int) -> None:
         if self.pid is None:
             return
-        with suppress(ChildProcessError):  # other code has waited for this process
+        with suppress(ChildProcessError):  # other code has already waited for this process
             pid, status = os.waitpid(self.pid, options)
             if pid:
                 self._exitcode = os.waitstatus_to_exitcode(status)
 
 
 def _flush() -> None:
-    """Flush the standard streams, so that their content is not printed twice."""
+    """Flush the standard streams, so that buffered output is not printed twice."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError, ValueError):  # there is none, or it is closed
+        with suppress(AttributeError, ValueError):  # the stream does not exist, or is closed
             stream.flush()
 
 
 def ended_of(sentinels: Iterable[int], patience_s: float) -> list[int]:
-    """Wait at most `patience_s` seconds; return those of `sentinels` whose processes have ended."""
+    """Wait at most `patience_s` seconds, and return those `sentinels` whose processes have ended."""
     poll = select.poll()
     for sentinel in sentinels:
         poll.register(sentinel, select.POLLIN)
@@ -152,7 +153,7 @@ def ended_of(sentinels: Iterable[int], patience_s: float) -> list[int]:
 
 
 def ranges_of(descriptors: Iterable[int]) -> Iterator[range]:
-    """Yield `descriptors` as ranges, as few as possible."""
+    """Yield `descriptors` as the smallest number of ranges."""
     start = end = -1
     for fd in sorted(descriptors):
         if fd != end:

@@ -24,15 +24,15 @@ from robochoc.system.signals import signals_delayed
 StartMethod = Literal["fork", "forkserver"]
 STARTED_AT_ONCE = 16
 GRACE_S = 0.5
-"""The time that processes have to end by themselves before they are killed, in seconds."""
+"""The time for processes to end by themselves before they are killed, in seconds."""
 _FDS_PER_ROBOT = 4
 _FDS_SPARE = 128
 
 
 class ProcessPool:
-    """The processes of a team. `robots` contains the participating robots, by name.
+    """The processes of a team. `robots` contains the participating robots by name.
 
-    `ended` finds those that have died. A dismissed process ends by itself, soon.
+    `ended` finds the processes that have died. A dismissed process soon ends by itself.
     """
 
     def __init__(self, start_method: StartMethod) -> None:
@@ -51,10 +51,10 @@ class ProcessPool:
         allow_descriptors(robots * _FDS_PER_ROBOT + _FDS_SPARE)
 
     def start(self, starts: Sequence[RobotStart]) -> None:
-        """Start processes, at most `STARTED_AT_ONCE`. Raises `OSError` if the system allows no more.
+        """Start at most `STARTED_AT_ONCE` processes. Raises `OSError` if the system allows no more processes.
 
-        Signals are held until the processes have set their handlers and are registered here, but not during the whole
-        start of a large team.
+        Signals are delayed until the processes have set their handlers and are registered here, but not during the
+        whole start of a large team.
         """
         prepared: list[RobotLink] = []
         with signals_delayed(), ExitStack() as theirs:
@@ -64,7 +64,7 @@ class ProcessPool:
                 self._start(prepared)
 
     def _prepared(self, start: RobotStart, theirs: ExitStack) -> RobotLink:
-        """Return the robot with an unstarted process. `theirs` closes the process's ends of pipes."""
+        """Return the robot with a process that is not yet started. `theirs` closes the process's ends of pipes."""
         name = start.part.robot.name
         ours, control = socket.socketpair()
         theirs.enter_context(control)
@@ -75,7 +75,7 @@ class ProcessPool:
             raise
 
     def _start(self, prepared: Sequence[RobotLink]) -> None:
-        """Start the processes without other work between the forks, as memory that is written there is copied."""
+        """Start the processes without other work between the forks, because memory written between forks is copied."""
         started = 0
         self._inherited[:] = ranges_of(self._own_descriptors(prepared))
         try:
@@ -92,7 +92,7 @@ class ProcessPool:
                 self._ends.register(robot.process.sentinel, selectors.EVENT_READ, robot)
 
     def _process(self, start: RobotStart, control: socket.socket) -> ChildProcess:
-        """Return a process that runs the robot with its end of its control pipe."""
+        """Return a process that runs the robot. The process gets its end of the control pipe."""
         if self._start_method == "fork":
             return ForkedProcess(partial(robot_process, start, control), [control.fileno()], self._inherited)
         from multiprocessing.context import ForkServerContext  # noqa: PLC0415 - seldom needed
@@ -101,7 +101,7 @@ class ProcessPool:
         return ForkServerContext().Process(target=served_robot_process, name=name, args=(start, control), daemon=True)
 
     def _own_descriptors(self, prepared: Sequence[RobotLink]) -> Iterator[int]:
-        """Yield all ends of pipes: inherited copies would hide from other robots that an end is closed."""
+        """Yield all ends of pipes in this process. Inherited copies would hide that an end is closed."""
         for robot in [*self.robots.values(), *self._dismissed, *prepared]:
             if isinstance(robot.process, ForkedProcess):
                 yield robot.process.sentinel
@@ -118,16 +118,16 @@ class ProcessPool:
         return [key.data for key, _ in self._selector.select(patience_s) if key.data is not None]
 
     def receive(self, robot: RobotLink) -> list[FromRobot]:
-        """Return the messages of `robot`. A robot that has hung up will end soon, and its sentinel shows that."""
+        """Return the messages from `robot`. A robot that has hung up will soon end, which its sentinel shows."""
         if self.robots.get(robot.name) is not robot or robot.control not in self._selector.get_map():
-            return []  # dismissed, or ended, since it was found to be readable
+            return []  # the robot was dismissed or has ended since it was found readable
         messages = robot.receive()
         if robot.hung_up:
             self._selector.unregister(robot.control)
         return messages
 
     def ended(self) -> Iterator[tuple[RobotLink, list[FromRobot]]]:
-        """Yield robots whose processes have ended since the last call, with the last messages that they sent."""
+        """Yield the robots whose processes have ended since the last call, with the last messages that they sent."""
         for key, _ in self._ends.select(0):
             robot: RobotLink = key.data
             self._ends.unregister(robot.process.sentinel)
@@ -137,7 +137,7 @@ class ProcessPool:
             yield robot, messages
 
     def with_status(self, *statuses: ProcessStatus) -> dict[ProcessStatus, list[RobotLink]]:
-        """Return, for each of `statuses`, the robots whose processes have it."""
+        """Return, for each of `statuses`, the robots whose processes have this status."""
         found: dict[ProcessStatus, list[RobotLink]] = {status: [] for status in statuses}
         for robot in self.robots.values():
             if (status := robot.status) in found:
@@ -147,7 +147,7 @@ class ProcessPool:
     # Queues
 
     def open_queues(self, sender: RobotLink, receivers: Sequence[str]) -> None:
-        """Open queues: write ends go to `sender`, read ends to `receivers`. Raises `UnsupportedError`."""
+        """Open queues: write ends are sent to `sender`, read ends to `receivers`. Raises `UnsupportedError`."""
         with ExitStack() as copies:
             writers = []
             for name in receivers:
@@ -169,7 +169,7 @@ class ProcessPool:
     # Ending
 
     def dismiss(self, name: str, *, kill: bool = False) -> None:
-        """Remove the robot and close its control pipe. The process ends by itself, unless `kill` is set."""
+        """Remove the robot and close its control pipe. The process then ends by itself, unless `kill` is set."""
         robot = self.robots.pop(name)
         self._unwatch(robot)
         if robot.process.sentinel in self._ends.get_map():
@@ -187,9 +187,9 @@ class ProcessPool:
             robot.process.close()
 
     def end_all(self, reported: Callable[[str], bool]) -> None:
-        """End all processes. Robots that have `reported` may end by themselves for `GRACE_S`; others are killed.
+        """End all processes. Robots that have `reported` get `GRACE_S` to end by themselves; other robots are killed.
 
-        No result is lost, and on a busy machine a process needs long to end by itself.
+        Killing loses no result, and on a busy machine a process needs a long time to end by itself.
         """
         with signals_delayed():
             self._selector.close()
@@ -202,7 +202,7 @@ class ProcessPool:
             self.robots, self._dismissed = {}, []
             _await([robot.process.sentinel for robot in all_robots])
             for robot in all_robots:
-                # Kill also processes that seem to have ended: a process can close its sentinel, a pipe, and live on.
+                # Kill even processes that seem to have ended: a process can close its sentinel, a pipe, and live on.
                 robot.process.kill()
                 robot.process.join()
                 robot.process.close()

@@ -1,4 +1,4 @@
-"""The operating system's status of a process: running, stopped or dying, whether it computes, and how it ended."""
+"""The operating system's status of a process: running, stopped or dying, whether it computes, and why it ended."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from robochoc.communication.processes.forked_process import ChildProcess
 from robochoc.communication.resources import read_text
 
 REPORT_AFTER_S = 5.0
-"""Seconds after which a stopped robot is reported."""
+"""The time after which a stopped robot is reported, in seconds."""
 LONGEST_STEP_S = 1.0
-"""The most that is counted between two updates: this process may have been stopped as well, by the same Ctrl-Z."""
+"""The longest time counted between two updates: the same Ctrl-Z may have stopped this process too."""
 _EXIT_CODE_S, _DYING_S = 1.0, 60.0
 _EXIT_CODE_POLL_S = 0.001
 _PENDING_SIGNALS = re.compile(r"^SigPnd:\s*([0-9a-f]+)$", re.MULTILINE)
 _STOPPED = re.compile(r"^State:\s*T\b", re.MULTILINE)
-"""Stopped by a signal; a debugger's `t` is another state."""
+"""Stopped by a signal. The state `t` (stopped by a debugger) is different."""
 _SIGKILL_BIT = 1 << (signal.SIGKILL - 1)
 
 
@@ -32,10 +32,10 @@ class ProcessStatus(Enum):
 
 
 def process_status(pid: int | None) -> ProcessStatus:
-    """Return the state of a process (Linux; elsewhere it is always running).
+    """Return the state of a process (on Linux; on other systems it is always running).
 
-    A process is dying if SIGKILL is pending, or if it has no memory any more. A process with a high `nice` value ends
-    late on a busy machine: up to seconds after it was killed.
+    A process is dying if SIGKILL is pending, or if it no longer has memory. A process with a high `nice` value ends
+    late on a busy machine, up to seconds after it was killed.
     """
     status = read_text(f"/proc/{pid}/status")
     if not status:
@@ -47,7 +47,7 @@ def process_status(pid: int | None) -> ProcessStatus:
 
 
 def is_computing(pid: int | None) -> bool:
-    """Return whether a process uses the processor, or waits for it or for the disk (Linux)."""
+    """Return whether a process uses the processor, or waits for the processor or the disk (Linux)."""
     fields = read_text(f"/proc/{pid}/stat").rpartition(")")[2].split()
     return fields[:1] in (["R"], ["D"])
 
@@ -55,10 +55,10 @@ def is_computing(pid: int | None) -> bool:
 def describe_end(process: ChildProcess) -> str:
     """Describe the end of `process`. Its sentinel is ready; the exit code follows a moment later.
 
-    Where all cores are busy, that moment can be seconds for a process with a high `nice` value.
+    If all cores are busy, a process with a high `nice` value may need seconds for this.
     """
     began = time.monotonic()
-    # Not `join`, whose time limit ends with the sentinel: a process can close all its files and live on.
+    # Not `join`, whose time limit ends when the sentinel closes: a process can close all its files and continue to run.
     while (code := process.exitcode) is None:
         dying = process_status(process.pid) is ProcessStatus.DYING
         if time.monotonic() - began > (_DYING_S if dying else _EXIT_CODE_S):
@@ -70,7 +70,7 @@ def describe_end(process: ChildProcess) -> str:
 
 
 def _signal_name(number: int) -> str:
-    """Return the name of a signal, such as SIGKILL; real-time signals have only a number."""
+    """Return the name of a signal, such as SIGKILL. Real-time signals have only a number."""
     try:
         return signal.Signals(number).name
     except ValueError:
@@ -78,10 +78,10 @@ def _signal_name(number: int) -> str:
 
 
 class StoppedRobots:
-    """Counts how long robots have been stopped (SIGSTOP); after `patience_s` seconds (None: never) they are lost.
+    """Measures how long robots have been stopped (SIGSTOP). After `patience_s` seconds (None: never) they are lost.
 
-    Without it the team would wait in silence. A robot that computes for long is not stopped: the kernel distinguishes
-    the two.
+    Without this class, the team would wait in silence. A robot in a long computation is not stopped: the kernel
+    distinguishes the two states.
     """
 
     def __init__(self, patience_s: float | None = None) -> None:
@@ -91,9 +91,9 @@ class StoppedRobots:
         self._reported: set[str] = set()
 
     def update(self, stopped: Iterable[str], now: float) -> Mapping[str, str]:
-        """Record the robots that are `stopped` at the time `now` (seconds); return lost robots with the reasons.
+        """Record the robots that are `stopped` at the time `now` (seconds). Return the lost robots with the reasons.
 
-        Warns, by Python's `logging`, of a robot that has been stopped for long, and when it continues.
+        Logs a warning about a robot that has been stopped for a long time, and a message when it continues.
         """
         passed = 0.0 if self._updated is None else min(now - self._updated, LONGEST_STEP_S)
         self._updated = now

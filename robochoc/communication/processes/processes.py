@@ -1,11 +1,12 @@
-"""The default runtime: one OS process per robot, joined by multiprocessing queues, one for each directed edge.
+"""The default runtime: one OS process per robot, connected by multiprocessing queues, one queue per directed edge.
 
-The parent is the paper's master. It starts the processes, waits for the confirmation of all, orders the start, opens a
-queue for a robot's first message to another one, detects quiescence by four counters, and ends each epoch. Protocol
-messages go from robot to robot and never through the parent.
+The parent is the paper's master. It starts the processes, waits for the confirmation of all robots, orders the start,
+opens a queue for a robot's first message to another robot, detects quiescence by four counters, and ends each epoch.
+Protocol messages are sent from robot to robot, never through the parent.
 
-Crash detection: the parent watches every process's sentinel; a robot's control pipe ends with the parent. Why fork, why
-queues are opened on demand, and what was measured: docs/explanation/design/runtimes.md, "Processes".
+Crash detection: the parent watches every process's sentinel; a robot's control pipe ends when the parent ends.
+docs/explanation/design/runtimes.md, "Processes", explains why processes are forked and queues are opened on demand, and
+contains measurements.
 """
 
 from __future__ import annotations
@@ -46,29 +47,29 @@ from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.garbage import garbage_frozen
 
 CHECK_S = 0.001
-"""Seconds between two checks for lost processes, for each robot, so that the checks take a small share of the time."""
+"""The interval between checks for lost processes, in seconds per robot, so that checks take little time."""
 CROWD = 100
-"""The size of a team from which a rehearsal in the parent saves more time than it takes."""
+"""The team size from which a rehearsal in the parent saves more time than it takes."""
 REPORTS_S = 5.0
-"""The longest wait of the parent for reports after the end of an epoch, in seconds."""
+"""How long the parent waits for reports after the end of an epoch, in seconds."""
 BUSY_REPORTS_S = 60.0
-"""The same for robots that compute, or wait for the processor of a busy machine, after a verdict."""
+"""The same for robots that compute, or wait for the processor on a busy machine, after a verdict."""
 LATE_REPORTS_S = 0.5
-"""The same after the time limit. Robots that still compute then are not part of the metrics."""
+"""The same after the time limit. The metrics do not include robots that still compute then."""
 
 
 class ProcessesRun(Session, MasterLoop):
-    """One team, each robot in its own process. No process outlives `close`.
+    """Runs one team with each robot in its own process. No process outlives `close`.
 
     Args:
-        team: The team, compiled or not.
-        protocol: The protocol that its robots run.
+        team: The team, whether compiled or not.
+        protocol: The protocol of the robots.
         observer: Receives all events.
-        progress: Receives the count of messages now and then.
+        progress: Receives the message count from time to time.
         start_method: The start method of processes.
-        survive: The end of a robot's process ends the search, whose result names the lost robots. Otherwise it raises
-            `RobotsLostError`.
-        patience_s: Seconds after which a robot whose process is stopped (SIGSTOP) is lost. None: the team waits.
+        survive: Whether the end of a robot's process only ends the search, whose result names the lost robots.
+            Otherwise it raises `RobotsLostError`.
+        patience_s: The seconds after which a robot with a stopped process (SIGSTOP) is lost. None: the team waits.
         parameters: The robots' parameters besides the problem.
         bounds: Whether the observer receives lower bounds, too.
     """
@@ -99,7 +100,7 @@ class ProcessesRun(Session, MasterLoop):
         self._unstarted = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self._drops = parameters.message_loss > 0
         self._behind: set[str] = set()
-        """Robots that have not entered the present epoch: their events belong to a previous one."""
+        """Robots that have not yet started the current epoch: their events belong to a previous epoch."""
         self.state = self._new_state(0, self.compiled.team.order)
 
     @property
@@ -112,7 +113,7 @@ class ProcessesRun(Session, MasterLoop):
 
         Raises:
             RobotsLostError: if a robot's process ends or fails.
-            UnsupportedError: if a robot's problem is too much for this version or the system.
+            UnsupportedError: if this version or the system does not support a robot's problem.
         """
         began = time.monotonic()
         deadline = self._deadline = None if timeout is None else began + timeout
@@ -129,7 +130,7 @@ class ProcessesRun(Session, MasterLoop):
             raise
 
     def change(self, epoch: Epoch) -> None:
-        """See `Session.change`. Robots that are no longer in the team, or are restarted, are dismissed."""
+        """See `Session.change`. Robots that have left the team, or are restarted, are dismissed."""
         self.compiled = epoch.compiled
         before = self.state
         self._pool.reap()
@@ -145,7 +146,7 @@ class ProcessesRun(Session, MasterLoop):
             robot = self._pool.robots.get(name)
             if robot is None:
                 self._unstarted[name] = part
-            elif robot.ended:  # after its report, so the previous epoch was not affected
+            elif robot.ended:  # it ended after its report, so the previous epoch was not affected
                 self._lose(name, robot.describe_end())
             else:
                 self._send(robot, EpochChange(self.state.epoch, pack_change(part, epoch.invalidated), left))
@@ -157,7 +158,7 @@ class ProcessesRun(Session, MasterLoop):
         return state
 
     def kill(self, name: str) -> None:
-        """Kill the robot's process, if it has one."""
+        """Kill the process of the robot `name`, if it has one."""
         if name in self._pool.robots:
             self._pool.robots[name].process.kill()
 
@@ -168,14 +169,14 @@ class ProcessesRun(Session, MasterLoop):
     # The start
 
     def _launch(self, deadline: float | None) -> None:
-        """Start the processes until the deadline. Raises `UnsupportedError` if the system allows fewer."""
+        """Start the processes before the deadline. Raises `UnsupportedError` if the system allows fewer."""
         unstarted, self._unstarted = self._unstarted, {}
         if not unstarted:
             return
         robots = len(unstarted) + len(self._pool.robots)
         self._pool.make_room(robots)
         self.check_s = min(max(TICK_S, robots * CHECK_S), LONGEST_STEP_S)
-        message_decoder(self._protocol.messages)  # before the fork: once for all robots
+        message_decoder(self._protocol.messages)  # once for all robots, before the fork
         if robots >= CROWD:
             rehearse(self._protocol, unstarted.values())
         with garbage_frozen():
@@ -204,7 +205,7 @@ class ProcessesRun(Session, MasterLoop):
         for robot in self._pool.readable(patience_s):
             for message in self._pool.receive(robot):
                 self._handle(robot, message)
-            self._handle_ends()  # after each robot, as reading may take long
+            self._handle_ends()  # after each robot, because reading may take long
             if is_past(deadline):
                 return
         self._handle_ends()
@@ -231,11 +232,11 @@ class ProcessesRun(Session, MasterLoop):
         self._give_up(dead)
 
     def _give_up(self, dead: Collection[RobotLink]) -> None:
-        """Continue without `dead` robots, or end the run and raise `RobotsLostError`."""
+        """Continue without the robots in `dead`, or end the run and raise `RobotsLostError`."""
         if not dead:
             return
         if not self._survive:
-            # A killed process needs the processor to end; on a busy machine the other robots must release it.
+            # A killed process needs the processor to end, so on a busy machine the other robots must release it.
             for robot in self._pool.robots.values():
                 if robot not in dead:
                     robot.process.kill()
@@ -249,7 +250,7 @@ class ProcessesRun(Session, MasterLoop):
             self._lose(name, why)
 
     def _lose(self, name: str, why: str) -> None:
-        """Continue without the robot, and discard its report."""
+        """Continue without the robot `name`, and discard its report."""
         if name in self.state.lost:
             return
         self.state.lose(name, why)
@@ -259,7 +260,7 @@ class ProcessesRun(Session, MasterLoop):
     def _handle(self, robot: RobotLink, message: FromRobot) -> None:
         match message:
             case OpenQueues(epoch, receivers):
-                if epoch == self.state.epoch:  # else some receivers may be gone
+                if epoch == self.state.epoch:  # otherwise some receivers may be gone
                     self._open_queues(robot, receivers)
             case EpochMessage():
                 if fault := self.state.handle(robot.name, message):
@@ -303,11 +304,11 @@ class ProcessesRun(Session, MasterLoop):
         return self.state.result(wall_s)
 
     def _await_reports(self, *, late: bool) -> None:
-        """Wait for reports as long as some arrive, since in a large team many wait to be read.
+        """Wait for reports as long as reports arrive: in a large team, many reports are waiting to be read.
 
-        Without a verdict, a computing robot is awaited until the time limit; with a verdict, for `BUSY_REPORTS_S`. A
-        stopped robot is awaited until the patience is over. Robots are checked twice, as one that has just reported
-        does not compute either.
+        Without a verdict, the wait for a computing robot ends at the time limit; with a verdict, after
+        `BUSY_REPORTS_S`. The wait for a stopped robot ends after the patience. Robots are checked twice, since a robot
+        that has just reported does not compute either.
         """
         began = time.monotonic()
         before, idle = len(self._silent()), False
@@ -329,7 +330,7 @@ class ProcessesRun(Session, MasterLoop):
                 return
 
     def _silent(self) -> list[str]:
-        """Return the robots that have a process, and have not reported."""
+        """Return the robots that have a process and have not reported."""
         return [name for name in self._pool.robots if not self.state.has_reported(name)]
 
     # Helpers

@@ -1,10 +1,10 @@
-"""Queues between processes: one for each directed edge, with one writer and one reader.
+"""Queues between processes: one queue per directed edge, with one writer and one reader.
 
-Like `multiprocessing.SimpleQueue`, such a queue is a `multiprocessing.Pipe`, but a killed robot cannot block it: it has
-no lock that a dead process can hold, and each end is open in one process only, so that the other side sees the end of
-file at once. `put` never blocks (two robots that fill each other's pipes would wait for ever); bytes that do not fit
-wait in memory until the pipe is writable. The wire form is that of `multiprocessing.Connection.send_bytes`: the length,
-four bytes, network order, then the body.
+Like `multiprocessing.SimpleQueue`, such a queue is a `multiprocessing.Pipe`, but a killed robot cannot block it: there
+is no lock that a dead process could hold, and each end is open in only one process, so that the other side sees the end
+of file at once. `put` never blocks, since two robots that fill each other's pipes would wait forever; bytes that do not
+fit wait in memory until the pipe is writable. The format is that of `multiprocessing.Connection.send_bytes`: the length
+in four bytes in network order, then the body.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ _STAMPED = struct.Struct("!iIQ")
 _STAMP_BYTES = _STAMPED.size - _LENGTH.size
 READ_BYTES = 1 << 16
 LARGEST_BODY = 1 << 26
-"""64 MiB: larger than any message of ours, and a bound on the memory that an invalid length can allocate."""
+"""64 MiB. This is larger than any message of ours, and limits the memory that an invalid length can allocate."""
 
 
 class CorruptQueueError(RobochocError):
-    """The data is not a sequence of bodies, or one body is larger than `LARGEST_BODY`."""
+    """Raised if the data is not a sequence of bodies, or a body is larger than `LARGEST_BODY`."""
 
 
 class Stamped(NamedTuple):
-    """A protocol's message in transit: the epoch in which it was sent, the sender's clock, and the content."""
+    """A protocol message in transit: the epoch in which it was sent, the sender's clock, and the content."""
 
     epoch: int
     clock: int
@@ -37,9 +37,9 @@ class Stamped(NamedTuple):
 
 
 def unpack_stamped(data: bytes) -> tuple[list[Stamped], bytes]:
-    """Return the complete messages at the front of `data`, and the rest: the beginning of another message.
+    """Return the complete messages at the front of `data`, and the remaining bytes, the beginning of another message.
 
-    A faster `unpack` for many small messages, where each call and each copy counts.
+    This is a faster `unpack` for many small messages, for which each call and each copy counts.
 
     Raises `CorruptQueueError`.
     """
@@ -58,7 +58,7 @@ def unpack_stamped(data: bytes) -> tuple[list[Stamped], bytes]:
 
 
 def unpack(buffer: bytearray) -> Iterator[bytes]:
-    """Remove the complete bodies from the front of `buffer`, and yield them.
+    """Remove the complete bodies from the front of `buffer`, and yield these bodies.
 
     Raises `CorruptQueueError`.
     """
@@ -78,7 +78,7 @@ def unpack(buffer: bytearray) -> Iterator[bytes]:
 
 
 def _missing(beginning: bytes) -> int:
-    """Return the number of missing bytes of a message, or of its header, after this `beginning`."""
+    """Return the number of bytes that are missing after the `beginning` of a message or of its header."""
     if len(beginning) < _STAMPED.size:
         return _STAMPED.size - len(beginning)
     (length,) = _LENGTH.unpack_from(beginning)
@@ -86,7 +86,7 @@ def _missing(beginning: bytes) -> int:
 
 
 class QueueReader:
-    """The read end. `fd` is to be watched for readability; it is non-blocking, and owned by this object."""
+    """The read end. `fd` must be watched for readability; it is non-blocking, and owned by this object."""
 
     def __init__(self, fd: int) -> None:
         self.fd = fd
@@ -97,7 +97,7 @@ class QueueReader:
         os.set_blocking(fd, False)
 
     def get(self) -> list[bytes]:
-        """Return the bodies of one read (not more, so that a fast writer does not block other queues).
+        """Return the bodies from one read, and not more, so that a fast writer does not block other queues.
 
         Afterwards `ended` is true if the writer is gone.
         """
@@ -105,7 +105,7 @@ class QueueReader:
         return list(unpack(self._buffer))
 
     def get_stamped(self) -> list[Stamped]:
-        """Return the messages of one read. See `get`; a queue has either bodies or stamped messages."""
+        """Return the messages from one read. See `get`. A queue contains either bodies or stamped messages."""
         chunk = self._chunk()
         if self._left:
             self._left.append(chunk)
@@ -145,38 +145,38 @@ class QueueReader:
 
 
 class QueueWriter:
-    """The write end. Non-blocking: `put` stores bytes that the pipe does not accept, `flush` tries again.
+    """The write end. It is non-blocking: `put` stores bytes that the pipe does not accept, `flush` tries again.
 
-    `fd` is None until the queue is opened; bodies that are put before wait.
+    `fd` is None until the queue is opened. Bodies that are put before wait.
     """
 
     def __init__(self, fd: int | None = None) -> None:
         self.fd: int | None = None
         self.broken = False
-        """The reader is gone; further bodies are dropped."""
+        """Whether the reader is gone. Further bodies are then dropped."""
         self._waiting = bytearray()
         if fd is not None:
             self.open(fd)
 
     def open(self, fd: int) -> None:
-        """Start to write to `fd`, which this object owns from now on."""
+        """Start writing to `fd`, which is owned by this object from now on."""
         os.set_blocking(fd, False)
         self.fd = fd
 
     def put(self, body: bytes) -> None:
-        """Add a body, to be sent by the next `flush`."""
+        """Add a body to be sent by the next `flush`."""
         if not self.broken:
             self._waiting += _LENGTH.pack(len(body))
             self._waiting += body
 
     def put_stamped(self, epoch: int, clock: int, content: bytes) -> None:
-        """Add a protocol's message, to be sent by the next `flush` with all other waiting ones."""
+        """Add a protocol message to be sent by the next `flush`, together with all other waiting messages."""
         if not self.broken:
             self._waiting += _STAMPED.pack(_STAMP_BYTES + len(content), epoch, clock)
             self._waiting += content
 
     def flush(self) -> bool:
-        """Write as much as the pipe accepts; return True if nothing waits any more, or the queue is not open yet."""
+        """Write as much as the pipe accepts. Return True if nothing waits any more, or the queue is not yet open."""
         if self.fd is None:
             return True
         try:
@@ -190,7 +190,7 @@ class QueueWriter:
         return True
 
     def close(self) -> None:
-        """Close the write end; the reader sees the end of file after all written bytes."""
+        """Close the write end. The reader sees the end of file after all written bytes."""
         if self.fd is not None:
             os.close(self.fd)
             self.fd = None

@@ -1,4 +1,4 @@
-"""The parent's side of one robot: its process, and the control pipe to it."""
+"""The parent's side of the connection to one robot: its process and its control pipe."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ _UNRESPONSIVE_S = 10.0
 
 
 class RobotLink:
-    """The parent's side of the robot `name`: its process, and the parent's end of its control pipe.
+    """The parent's connection to the robot `name`: its process, and the parent's end of its control pipe.
 
-    `ended`: its process is known to have ended.
+    `ended`: the process is known to have ended.
     """
 
     def __init__(self, name: str, process: ChildProcess, control: socket.socket) -> None:
@@ -34,11 +34,11 @@ class RobotLink:
         self._reader = QueueReader(control.fileno())
 
     def receive(self) -> list[FromRobot]:
-        """Return the messages of one read of the control pipe. Afterwards `hung_up` is up to date."""
+        """Return the messages from one read of the control pipe. Afterwards `hung_up` is up to date."""
         return [_DECODER.decode(body) for body in self._reader.get()]
 
     def receive_rest(self) -> list[FromRobot]:
-        """Return all remaining messages in the control pipe of a process that has ended."""
+        """Return all remaining messages in the control pipe after the process has ended."""
         return [_DECODER.decode(body) for body in self._reader.get_all()]
 
     @property
@@ -49,7 +49,7 @@ class RobotLink:
     def send(self, order: FromParent, fds: Sequence[int] = ()) -> None:
         """Send `order` with attached queue ends, unless the robot is gone.
 
-        Raises `RobotsLostError` when the robot does not read for `_UNRESPONSIVE_S` seconds.
+        Raises `RobotsLostError` if the robot does not read for `_UNRESPONSIVE_S` seconds.
         """
         body = _ENCODER.encode(order)
         frame = len(body).to_bytes(4, "big") + body
@@ -60,7 +60,7 @@ class RobotLink:
             except (BrokenPipeError, ConnectionResetError):
                 return
             except OSError as error:
-                # Full, or too many descriptors are in transit for the kernel: the robot has to read first.
+                # The pipe is full, or too many descriptors are in transit for the kernel: the robot must read first.
                 if error.errno not in {errno.EAGAIN, errno.ETOOMANYREFS}:
                     raise
                 if time.monotonic() > deadline:

@@ -1,6 +1,6 @@
-"""A robot's process: its main function, and the robot that exchanges messages through queues.
+"""A robot's process: its main function, and the robot, which exchanges messages through queues.
 
-The process ends when the parent orders it, and at once when the parent is gone for any reason.
+The process ends when the parent orders it, or immediately when the parent is gone for any reason.
 """
 
 from __future__ import annotations
@@ -49,22 +49,22 @@ from robochoc.solver.local_problem import MIN_TABLE_VALUES
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 MOST_IDLE_S = 0.032
-"""The longest wait for a message, in seconds, before a robot reports its counters.
+"""The longest wait for a message before a robot reports its counters, in seconds.
 
-The wait begins with `IDLE_S` and doubles with each report of a search: if many robots share few cores, each waits for
-the processor, and early reports are soon outdated.
+The wait begins with `IDLE_S` and doubles with each report in a search: if many robots share few cores, each robot waits
+for the processor, and early reports are soon outdated.
 """
 Action = Callable[[list[Envelope]], None]
-"""The reaction to an event of a descriptor. Messages that it reads are added to the packet."""
+"""The reaction to an event on a descriptor. Messages that the action reads are added to the packet."""
 
 
 class QueueRobot(RobotLoop):
-    """The robot of `host`, in its own process, with queues to other robots and the control pipe `link`.
+    """Runs the robot of `host` in its own process, with queues to other robots and the control pipe `link`.
 
-    One loop waits for all events: messages, the parent's orders, a full pipe that is writable again, the parent's end.
-    All messages that wait when the loop wakes up are one packet. The robot ends when the pipe ends, or when one of the
-    descriptors `parent` is readable. If `measured`, it reports its private memory. Every message is stamped with its
-    epoch; outdated messages are dropped.
+    One loop waits for all events: messages, orders from the parent, a full pipe that is writable again, the end of the
+    parent. All messages waiting when the loop wakes up form one packet. The robot ends when the pipe ends, or when one
+    of the descriptors in `parent` is readable. If `measured`, the robot reports its private memory. Every message is
+    stamped with its epoch; outdated messages are dropped.
     """
 
     bundle_bytes = LARGEST_BODY // 4
@@ -137,13 +137,13 @@ class QueueRobot(RobotLoop):
 
     def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
         if self._readers.get(sender) is not reader:
-            return  # closed by an order in the same iteration
+            return  # an order in the same iteration has closed it
         for epoch, clock, content in reader.get_stamped():
             if epoch == self.epoch:
                 envelope = Envelope(sender, self._name, content, clock)
                 if self.admit(envelope):
                     packet.append(envelope)
-        if reader.ended:  # the sender is gone; the parent decides about the loss
+        if reader.ended:  # the sender is gone; the parent reacts to the loss
             self._close_reader(reader)
 
     # The parent
@@ -197,7 +197,7 @@ class QueueRobot(RobotLoop):
             self._send_to_master(EpochReport(self.epoch, assignment, metrics, findings))
 
     def _change(self, order: EpochChange) -> None:
-        """Enter the next epoch, with a changed problem and no message in transit."""
+        """Start the next epoch, with a changed problem and no messages in transit."""
         part, invalidated = unpack_change(order.change)
         for name in order.gone:
             if name in self._readers:
@@ -231,9 +231,10 @@ class QueueRobot(RobotLoop):
 
 
 class DescriptorWatch:
-    """Watched descriptors, each with an action.
+    """Watches descriptors, each of which has an action.
 
-    Simpler than `selectors`, as a robot waits after each message, and memory pages that it runs are copied for it.
+    It is simpler than `selectors`, because a robot waits after each message, and each robot copies the pages it
+    executes.
     """
 
     def __init__(self) -> None:
@@ -248,12 +249,12 @@ class DescriptorWatch:
         return fd in self._actions
 
     def add(self, fd: int, action: Action, *, write: bool = False) -> None:
-        """Watch `fd`, which is not watched yet, for reading, or with `write` for writing."""
+        """Watch `fd`, which is not yet watched, for reading, or with `write` for writing."""
         self._poll.register(fd, select.POLLOUT if write else select.POLLIN)
         self._actions[fd] = action
 
     def watch_writing(self, fd: int, wanted: bool) -> None:  # noqa: FBT001 - the only option
-        """Watch `fd`, which is watched for reading, also for writing, or no longer."""
+        """Start or stop watching `fd` for writing. It must already be watched for reading."""
         self._poll.modify(fd, select.POLLIN | (select.POLLOUT if wanted else 0))
 
     def remove(self, fd: int) -> None:
@@ -262,7 +263,7 @@ class DescriptorWatch:
         del self._actions[fd]
 
     def wait(self, patience_s: float | None) -> list[Action]:
-        """Wait for events; return their actions, or none after `patience_s` seconds (None: wait without limit).
+        """Wait for events and return their actions; empty after `patience_s` seconds (None: wait without limit).
 
         A closed end counts as readable and writable.
         """
@@ -276,15 +277,15 @@ class DescriptorWatch:
 
 LOWEST_NICE = 19
 MEASURED = 128
-"""The most robots of a team that measure their memory, evenly over the order: each measurement takes a millisecond."""
+"""The maximum number of robots that measure their memory, spread evenly over the order. A measurement takes 1 ms."""
 REHEARSED = 32
-"""The most robots in a rehearsal. Python 3.11 specializes a function from its 8th call on, and later more of it."""
+"""The maximum number of robots in a rehearsal. Python 3.11 specializes a function at its 8th call and later."""
 REHEARSAL_S = 0.05
 """The longest rehearsal, in seconds."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
 _prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
-"""Looked up before the fork: once for all robots."""
+"""Looked up once, before the fork, for all robots."""
 
 
 class RobotStart(NamedTuple):
@@ -292,9 +293,9 @@ class RobotStart(NamedTuple):
 
     Attributes:
         part: The robot's part of the problem.
-        protocol: The protocol that it runs.
+        protocol: The protocol of the robot.
         epoch: The number of the current epoch.
-        observed: Whether it reports events.
+        observed: Whether the robot reports events.
         bounds: Whether the events include lower bounds.
     """
 
@@ -306,16 +307,16 @@ class RobotStart(NamedTuple):
 
 
 def rehearse(protocol: type[Protocol], parts: Iterable[AgentProblem]) -> None:
-    """Build a few robots in the parent, and discard them, before all are forked.
+    """Build a few robots in the parent and discard them, before all robots are forked.
 
-    Python specializes the bytecode of its first calls. Bytecode that was specialized before the fork is not copied for
-    each robot. Users' protocols are excluded: their errors are to occur in a robot. So are large domains: they need
-    numpy, which can start threads, and take long.
+    Python specializes bytecode during its first calls. Bytecode specialized before the fork is not copied for each
+    robot. Users' protocols are excluded, because their errors must occur in a robot. Large domains are excluded too,
+    because they need numpy, which can start threads, and take a long time.
     """
     if not protocol.__module__.startswith("robochoc."):
         return
     until = time.monotonic() + REHEARSAL_S
-    with suppress(UnsupportedError):  # a robot will report it
+    with suppress(UnsupportedError):  # a robot will report this error
         for part in islice((part for part in parts if len(part.domain.values) < MIN_TABLE_VALUES), REHEARSED):
             Host.create(protocol, part)
             if time.monotonic() > until:
@@ -325,11 +326,11 @@ def rehearse(protocol: type[Protocol], parts: Iterable[AgentProblem]) -> None:
 def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[int] = ()) -> None:
     """Run one robot in this process until the run ends.
 
-    Ctrl-C reaches the whole process group, and is left to the parent.
+    Ctrl-C reaches the whole process group, and is handled by the parent.
 
     Args:
         start: The robot's arguments.
-        control: Its end of its control pipe.
+        control: The robot's end of its control pipe.
         parent: More descriptors that become readable when the parent is gone.
     """
     leave_ctrl_c_to_the_parent()
@@ -353,7 +354,7 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
 
 
 def served_robot_process(start: RobotStart, control: socket.socket) -> None:
-    """Run one robot in a process that a fork server has started: its parent is that server, not ours."""
+    """Run one robot in a process started by a fork server. The parent process is that server, not our process."""
     import multiprocessing  # noqa: PLC0415 - already imported by the fork server, and needed only here
 
     parent = multiprocessing.parent_process()
@@ -361,25 +362,25 @@ def served_robot_process(start: RobotStart, control: socket.socket) -> None:
 
 
 def _end_with_the_parent() -> None:
-    """Have the kernel kill this process when the parent dies (Linux).
+    """Let the kernel kill this process when the parent dies (Linux).
 
-    A waiting robot sees the end of its control pipe. A robot that computes, or waits for a busy processor, would see it
-    late. Strictly, the signal is sent when the parent's thread that runs the team ends.
+    A waiting robot sees the end of its control pipe. A robot that computes, or waits for a busy processor, would notice
+    the end late. Strictly, the signal is sent when the parent's thread that runs the team ends.
     """
     if _prctl is not None:
         _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _set_process_name(name: str) -> None:
-    """Show the robot's name (its first 15 letters) in lists of processes (Linux)."""
+    """Show the robot's name, shortened to 15 letters, in process lists (Linux)."""
     if _prctl is not None:
         _prctl(_PR_SET_NAME, name.encode())
 
 
 def _set_niceness(place: int, robots: int) -> None:
-    """Let the scheduler favour robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
+    """Let the scheduler prefer robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
 
-    Decisions from an outdated view waste the work of all robots below. On two cores this reduces the messages of 121
-    robots to a tenth (docs/explanation/design/runtimes.md, "Processes").
+    Decisions based on an outdated view waste the work of all lower robots. On two cores, this reduces the number of
+    messages of 121 robots to a tenth (docs/explanation/design/runtimes.md, "Processes").
     """
     os.nice(LOWEST_NICE * place // robots)
