@@ -1,4 +1,4 @@
-"""Read and write robots and teams as XML files. All mistakes of the files are reported together.
+"""Read and write robots and teams as XML files. All errors in the files are reported together.
 
 docs/reference/format.md; the paper, Figure 2.
 """

@@ -35,16 +35,16 @@ from robochoc.model.problem import (
 
 @dataclass(frozen=True)
 class ConstraintContext:
-    """The names that the constraints of a file can refer to.
+    """The names to which the constraints in a file can refer.
 
-    Invalid elements are listed too (`definitions` has None for them), so that references to them are not reported as
-    unknown.
+    Invalid elements are included (`definitions` maps their names to None), so that references to them are not reported
+    as unknown.
     """
 
     kind: ProblemKind
     units: CostUnits
     model: ConstraintModel
-    """The file's default for constraints that do not name theirs."""
+    """The default in the file for constraints that do not specify a model."""
     own: Collection[str]
     """The robot's own variables."""
     definitions: Mapping[str, Definition | None]
@@ -53,7 +53,7 @@ class ConstraintContext:
 
 
 def read_private(element: etree._Element, context: ConstraintContext) -> Constraint | None:
-    """Return a private constraint, over this robot's variables only. None and errors: as for `_read`."""
+    """Return a private constraint, over this robot's variables only. For None and errors see `_read`."""
     model = attribute(element, "model")
     refuse_private_part(ConstraintModel(model) if model else None)
     constraint = _read(element, context, ConstraintModel(model) if model else None)
@@ -63,7 +63,7 @@ def read_private(element: etree._Element, context: ConstraintContext) -> Constra
 
 
 def read_shared(element: etree._Element, context: ConstraintContext) -> Constraint | None:
-    """Return a constraint over variables of this robot and of neighbours. None and errors: as for `_read`."""
+    """Return a constraint over variables of this robot and its neighbours. For None and errors see `_read`."""
     model = attribute(element, "model")
     constraint = _read(element, context, ConstraintModel(model) if model else context.model)
     if constraint:

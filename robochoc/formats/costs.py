@@ -1,4 +1,4 @@
-"""Costs as users write them, `5`, `0.25`, `-3`, `infinity`, are converted to integers of a `CostUnits` without floats.
+"""Conversion of costs as written by users (`5`, `0.25`, `-3`, `infinity`) to integers of a `CostUnits`, without floats.
 
 docs/reference/format.md, "Costs".
 """
@@ -39,7 +39,7 @@ def read_cost(word: str, units: CostUnits) -> float:
 
 
 def cost_text(cost: float, units: CostUnits) -> str:
-    """Return the text of `cost`, an integer of `units` or `INFINITE`, for `read_cost`.
+    """Return the text of `cost`, an integer of `units` or `INFINITE`. `read_cost` reads it.
 
     Raises:
         ValueError: if the cost is not an integer.
@@ -57,7 +57,7 @@ def scale_text(places: int) -> str:
 
 
 def places_used(root: etree._Element) -> int:
-    """Return the largest number of decimal places of a cost in a file. Invalid costs are ignored."""
+    """Return the largest number of decimal places in the costs of a file. Invalid costs are ignored."""
     words = [attribute(element, "constant") for element in root.iterchildren("presentation")]
     words += [attribute(element, "defaultCost") for element in root.iterfind("relations/relation")]
     words += [attribute(element, "cost") for element in root.iter("constraint")]
@@ -69,7 +69,7 @@ def places_used(root: etree._Element) -> int:
 
 
 def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> CostUnits:
-    """Return the unit of the costs in a file, which have `places` decimal places. Raises `MistakeError`."""
+    """Return the unit of the costs in a file. The costs have `places` decimal places. Raises `MistakeError`."""
     units = CostUnits(attribute(presentation, "objective") == "maximize", _scale(presentation, places))
     constant = attribute(presentation, "constant")
     if constant:
@@ -91,14 +91,14 @@ def check_units(units: CostUnits, kind: ProblemKind) -> None:
 
 
 class CostConversion:
-    """Converts the costs of robots to the finer unit of their team: multiplies them by `factor`."""
+    """Converts the costs of robots to the finer unit of their team by multiplying them by `factor`."""
 
     def __init__(self, factor: int) -> None:
         self._factor = factor
         self._known: dict[int, tuple[Definition, Definition]] = {}
 
     def robot(self, robot: Robot) -> Robot:
-        """Return `robot` with its costs in the finer unit. Raises `MistakeError` if one then has too many digits."""
+        """Return `robot` with its costs in the finer unit. Raises `MistakeError` if a cost then has too many digits."""
         constant = int(self.cost(robot.costs.constant))
         places = robot.costs.places + len(str(self._factor)) - 1
         return replace(
@@ -131,7 +131,7 @@ class CostConversion:
         return {name: one and self.definition(one) for name, one in definitions.items()}
 
     def definition(self, definition: Definition) -> Definition:
-        """Return `definition` in the finer unit; the same object for the same definition. Raises `MistakeError`."""
+        """Return `definition` in the finer unit. Equal arguments give the same object. Raises `MistakeError`."""
         if not isinstance(definition, Relation) or definition.semantics != Semantics.SOFT:
             return definition
         if id(definition) not in self._known:

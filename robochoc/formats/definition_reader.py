@@ -31,23 +31,23 @@ _RANGE = re.compile(r"([+-]?[0-9]{1,18})(?:\.\.([+-]?[0-9]{1,18}))?")
 
 
 def read_integer(word: str) -> int:
-    """Return the integer in `word`. Raises `MistakeError`; digits are counted before Python converts them."""
+    """Return the integer in `word`. Raises `MistakeError`. Digits are counted before Python converts them."""
     if not _INTEGER.fullmatch(word):
         raise MistakeError(f"'{shortened(word)}' is not an integer", "write at most 18 digits, with or without a sign")
     return int(word)
 
 
 def check_count(element: etree._Element, name: str, found: int) -> None:
-    """Raise `MistakeError` if the attribute `name` states another number than `found`."""
+    """Raise `MistakeError` if the attribute `name` specifies a number other than `found`."""
     given = attribute(element, name)
     if given and int(given) != found:
         raise MistakeError(f"{name} is {given}, but there are {found}", f'write {name}="{found}" or leave it out')
 
 
 def read_domain(element: etree._Element, table: SymbolTable) -> Domain:
-    """Return a domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges, or from symbols.
+    """Return a domain from XCSP ranges (`1..4 7 9..12`), which become ascending ranges, or from symbols.
 
-    A symbolic domain gets the symbols that the `table` has so far. Raises `MistakeError`.
+    A symbolic domain gets the symbols that are in the `table` so far. Raises `MistakeError`.
     """
     name, words = attribute(element, "name"), (element.text or "").split()
     if attribute(element, "type") == "symbolic":
@@ -72,7 +72,7 @@ def _range(word: str) -> range:
 
 
 def read_relation(element: etree._Element, units: CostUnits, code: Callable[[str], int]) -> Relation:
-    """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`, with costs in `units`.
+    """Return a relation from its tuples: `1 2|2 3`, or for a soft relation `5:1 2|3:2 2`, with costs in `units`.
 
     A cost applies to all tuples up to the next cost. `code` returns the code of a symbol. Raises
     `MistakeError`.
@@ -95,7 +95,7 @@ def read_relation(element: etree._Element, units: CostUnits, code: Callable[[str
 
 
 def _values(row: list[str], symbolic: tuple[int, ...], code: Callable[[str], int]) -> tuple[int, ...]:
-    """Return a tuple's values; in `symbolic` columns the codes of symbols."""
+    """Return the values in a tuple: in `symbolic` columns, the codes of the symbols."""
     if not symbolic:
         return tuple([read_integer(word) for word in row])
     for place in symbolic:
@@ -106,7 +106,7 @@ def _values(row: list[str], symbolic: tuple[int, ...], code: Callable[[str], int
 
 
 def _priced(words: list[str], units: CostUnits) -> tuple[list[str], list[float]]:
-    """Return the tuples without their costs, and the cost of each."""
+    """Return the tuples without their costs, and the cost of each tuple."""
     tuples, costs = [], []
     cost: float | None = None
     for word in words:
@@ -130,7 +130,7 @@ def _default_cost(given: str, semantics: Semantics, units: CostUnits) -> float:
 
 
 def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
-    """Return the given arity, or the first tuple's. Raises `MistakeError` where there is neither."""
+    """Return the specified arity, or the length of the first tuple. Raises `MistakeError` if there is neither."""
     given = attribute(element, "arity")
     if not given and not tuples:
         raise MistakeError("a relation without tuples lacks its arity", 'write arity="2"')
@@ -154,7 +154,7 @@ def read_function(element: etree._Element, code: Callable[[str], int]) -> Functi
 
 
 def read_topic(element: etree._Element, variables: Collection[str], symbolic: Collection[str] = ()) -> Topic:
-    """Return a topic, whose `x`, `y` and `z` are expressions over the robot's own `variables`, the `symbolic` excepted.
+    """Return a topic. Its `x`, `y`, `z` are expressions over the robot's own `variables` except the `symbolic` ones.
 
     Raises `MistakeError`.
     """
@@ -178,7 +178,7 @@ def _no_symbol(word: str) -> int:
 def _read_intension(
     element: etree._Element, wanted: Type, code: Callable[[str], int]
 ) -> tuple[tuple[str, ...], Expression, tuple[str, ...]]:
-    """Return the formal parameters of a predicate or function, its body, and the parameters that are symbols."""
+    """Return the formal parameters of a predicate or function, its body, and the symbolic parameters."""
     parameters, symbolic = _read_parameters(element.findtext("parameters") or "")
 
     def known_code(word: str) -> int:
@@ -201,7 +201,7 @@ def _read_intension(
 
 
 def _read_parameters(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names in `int X symbol Y`, and those that are symbols. Raises `MistakeError`."""
+    """Return the names in `int X symbol Y`, and the symbolic ones among them. Raises `MistakeError`."""
     words = text.split()
     names = tuple(words[1::2])
     if len(words) % 2 or not {*words[::2]} <= {"int", "symbol"}:

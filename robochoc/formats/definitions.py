@@ -1,6 +1,6 @@
-"""Rules for domains, relations, predicates and topics of files and objects (docs/reference/format.md, "One robot").
+"""Rules for domains, relations, predicates and topics, in files and objects (docs/reference/format.md, "One robot").
 
-Expressions have no rules of their own here: a tree is written as text and parsed, so that the parser's rules apply.
+Expressions have no rules here: a tree is written as text and parsed again, so that the parser's rules apply.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from robochoc.model.problem import Domain, Function, Predicate, ProblemKind, Rel
 MAX_VALUES = 100_000
 """The maximum size of a domain."""
 MAX_TUPLES = 1_000_000
-"""The maximum number of tuples of a relation."""
+"""The maximum number of tuples in a relation."""
 
 _PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
 _OPERATORS = {"eq": "eq", "ne": "ne", "neq": "ne", "lt": "lt", "le": "le", "gt": "gt", "ge": "ge"}
@@ -36,7 +36,7 @@ _OPERATORS = {"eq": "eq", "ne": "ne", "neq": "ne", "lt": "lt", "le": "le", "gt":
 PREDEFINED: dict[str, Predicate] = {
     name: Predicate(name, ("X", "Y"), Apply(operator, (Name("X"), Name("Y")))) for name, operator in _OPERATORS.items()
 }
-"""Predicates on two terms that every file may refer to without defining them; `neq` is Figure 2's name for `ne`."""
+"""Predicates on two terms that every file may use without defining them. `neq` is the name of `ne` in Figure 2."""
 
 
 def check_domain(domain: Domain) -> None:
@@ -60,7 +60,7 @@ def check_domain(domain: Domain) -> None:
 
 
 def refuse_predefined(name: str) -> None:
-    """Raise `MistakeError` if `name` is that of a predefined predicate or of a global constraint."""
+    """Raise `MistakeError` if `name` is the name of a predefined predicate or a global constraint."""
     if name in PREDEFINED:
         raise MistakeError(f"'{shortened(name)}' is a predefined predicate", "rename your definition")
     if name.startswith("global:"):
@@ -68,7 +68,7 @@ def refuse_predefined(name: str) -> None:
 
 
 def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:
-    """Raise `MistakeError` if a robot of that `kind` cannot have relations with these semantics."""
+    """Raise `MistakeError` if a robot of that `kind` cannot have relations with this `semantics`."""
     if semantics == Semantics.SOFT and kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
         raise MistakeError("a soft relation in a DisCSP", hint)
@@ -101,7 +101,7 @@ def check_relation(relation: Relation) -> None:
 
 
 def check_tuple_count(number: int) -> None:
-    """Raise `MistakeError` when a relation has too many tuples."""
+    """Raise `MistakeError` if a relation has too many tuples."""
     if number > MAX_TUPLES:
         raise MistakeError(f"{number} tuples, more than {MAX_TUPLES}", "write a predicate instead")
 
@@ -124,7 +124,7 @@ def _check_tuples(relation: Relation) -> None:
 def check_body(definition: Predicate | Function, table: Sequence[str] = ()) -> None:
     """Raise `MistakeError` unless the body is a valid expression over the parameters.
 
-    It is Boolean in a predicate, and an integer in a function. The `table` contains the symbols.
+    The body of a predicate must be Boolean, and that of a function an integer. The `table` contains the symbols.
     """
     wanted = Type.BOOLEAN if isinstance(definition, Predicate) else Type.INTEGER
     check_parameter_names(definition.parameters)
@@ -162,10 +162,10 @@ def check_expression(
     wanted: Type,
     symbols: tuple[Sequence[str], Sequence[str]] = ((), ()),
 ) -> None:
-    """Raise `MistakeError` unless the text of `expression` can be parsed, to an equal expression.
+    """Raise `MistakeError` unless the text of `expression` can be parsed, and the result is equal to `expression`.
 
     Args:
-        what: The expression in messages.
+        what: The name of the expression in messages.
         expression: The expression.
         names: The names that it may contain.
         wanted: The type of its value.
@@ -187,12 +187,12 @@ def check_expression(
 
 @lru_cache(maxsize=256)
 def parse_once(written: str, names: tuple[str, ...], wanted: Type) -> Expression:
-    """Return the expression in a text. Equal texts, which robots of a team often have, are parsed once."""
+    """Parse the expression in a text. Equal texts, which are common in a team's robots, are parsed only once."""
     return parse(written, names, wanted)
 
 
 def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
-    """Return `error`, which is in the expression of `what` in that `line`, as a mistake of the file."""
+    """Return `error`, which occurred in the expression of `what` in that `line`, as an error in the file."""
     message = f"{what}: {error.message}, at character {error.position + 1}"
     return MistakeError(
         message, error.hint or "see 'Functional expressions' on the page Format of the documentation", line
@@ -200,7 +200,7 @@ def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> Mist
 
 
 def _check_size(expression: object) -> None:
-    """Raise `ExpressionError` for a tree that is too large to be written, or has nodes of other types."""
+    """Raise `ExpressionError` for a tree that is too large for a text, or has nodes of other types."""
     waiting: list[tuple[object, int]] = [(expression, 1)]
     nodes = 0
     while waiting:
@@ -223,5 +223,5 @@ def _check_size(expression: object) -> None:
 
 
 def terms_text(terms: Sequence[Term]) -> str:
-    """Return a scope or a tuple as text for a message."""
+    """Return the text of a scope or a tuple for a message."""
     return shortened(" ".join(map(in_short, terms)))

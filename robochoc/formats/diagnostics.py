@@ -1,4 +1,4 @@
-"""Diagnostics of inputs: all mistakes at once, each in a line, with its place and the next step."""
+"""Diagnostics of inputs: all errors are reported together, one per line, with a location and a suggestion."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100
-"""The maximum number of mistakes of one file that are reported."""
+"""The maximum number of errors reported for a file."""
 
 
 @dataclass(frozen=True, slots=True)
 class Diagnostic:
-    """One mistake: `line` is 0 where no line is to blame, `hint` is the next step."""
+    """One error. `line` is 0 if no single line is wrong, `hint` is a suggestion to the user."""
 
     file: str
     line: int
@@ -32,7 +32,7 @@ class Diagnostic:
 
 
 class InvalidInputError(RobochocError):
-    """An input that cannot be used. `diagnostics` holds every mistake found, ordered by file and line."""
+    """Raised for an invalid input. `diagnostics` contains every error found, sorted by file and line."""
 
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(sorted(diagnostics, key=_place))
@@ -40,12 +40,12 @@ class InvalidInputError(RobochocError):
 
 
 def invalid_input(path: Path | str, message: str, hint: str, line: int = 0) -> InvalidInputError:
-    """Return the error for one mistake in the file `path`, or in an input of this name."""
+    """Return an exception with a single error in the file `path`, or in an input with this name."""
     return InvalidInputError([Diagnostic(encodable(str(path)), line, message, hint)])
 
 
 class MistakeError(RobochocError):
-    """A mistake in one element, on its way to the `DiagnosticCollector` that knows the file and the line."""
+    """Raised for an error in one element. `DiagnosticCollector`, which knows the file and the line, catches it."""
 
     def __init__(self, message: str, hint: str, line: int = 0) -> None:
         super().__init__(message)
@@ -55,14 +55,14 @@ class MistakeError(RobochocError):
 
 
 class DiagnosticCollector:
-    """The mistakes of one file, collected while it is read."""
+    """Collects the errors in a file while it is read."""
 
     def __init__(self, file: str) -> None:
         self.file = file
         self._found: list[Diagnostic] = []
 
     def add(self, line: int, message: str, hint: str) -> None:
-        """Add a mistake. Raises `InvalidInputError` when the limit on mistakes is reached."""
+        """Add an error. Raises `InvalidInputError` when the limit on errors is reached."""
         if len(self._found) == MAX_PER_FILE:
             self._found.append(Diagnostic(self.file, line, "more mistakes from here on", "fix those above first"))
             raise InvalidInputError(self._found)
@@ -70,20 +70,20 @@ class DiagnosticCollector:
 
     @contextmanager
     def at(self, line: int) -> Iterator[None]:
-        """Add a `MistakeError` raised inside, and continue after the block: the next element may have others."""
+        """Add a `MistakeError` raised inside, and continue after the block: the next element may have errors, too."""
         try:
             yield
         except MistakeError as mistake:
             self.add(mistake.line or line, mistake.message, mistake.hint)
 
     def finish(self) -> None:
-        """Raise `InvalidInputError` when anything was found."""
+        """Raise `InvalidInputError` if any error was added."""
         if self._found:
             raise InvalidInputError(self._found)
 
 
 def suggestion(word: str, known: Collection[str], what: str) -> str:
-    """Return a hint for an unknown name: the most similar known name, or all known names; `what` is their plural."""
+    """Return a hint for an unknown name: the most similar known name, or all of them. `what` is the plural noun."""
     if not known:
         return f"there are no {what}"
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
@@ -94,15 +94,15 @@ def suggestion(word: str, known: Collection[str], what: str) -> str:
 
 
 def shortened(text: str) -> str:
-    """Return `text`, cut off if it is too long for a message."""
+    """Return `text`, truncated if it is too long for a message."""
     return text if len(text) <= 60 else f"{text[:57]}..."  # noqa: PLR2004 - characters
 
 
 def _place(diagnostic: Diagnostic) -> tuple[object, int]:
-    """Return a sort key: file and line. Longer paths than 4096 characters could have numbers too long for `int`."""
+    """Return a sort key: file and line. Paths of more than 4096 characters could contain numbers too long for `int`."""
     return natural_key(diagnostic.file[:4096]), diagnostic.line
 
 
 def encodable(path: str) -> str:
-    """Return `path` as text that can be encoded in UTF-8: names of files need not be valid UTF-8."""
+    """Return `path` as text that can be encoded in UTF-8, because file names need not be valid UTF-8."""
     return os.fsencode(path).decode("utf-8", "replace")

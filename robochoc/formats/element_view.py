@@ -1,7 +1,7 @@
-"""XML elements that record which of their parts were read: an unread part is an error.
+"""Views of XML elements that record which parts were read. An unread part is an error.
 
-`open_xml` is the only way to a view. When its block ends, the whole tree is checked: each element, attribute and text
-that was not read becomes a diagnostic with its line. So a reader cannot forget to refuse a part that it does not know.
+`open_xml` is the only way to get a view. When its block ends, the whole tree is checked: each element, attribute and
+text that was not read becomes a diagnostic with its line. So a reader cannot overlook a part that it does not support.
 """
 
 # ruff: noqa: SLF001 - a view and the views of its children share one record
@@ -18,15 +18,15 @@ from robochoc.formats.diagnostics import suggestion as suggested_name
 from robochoc.formats.xml import BLANKS, line, read_tree
 
 MAX_DEPTH = 40
-"""The maximum depth of elements: readers that recurse through views cannot exceed Python's stack."""
+"""The maximum depth of elements, so that readers that recurse through views cannot overflow Python's stack."""
 
 _ABOUT_THE_DOCUMENT = ("{http://www.w3.org/2001/XMLSchema-instance}", "{http://www.w3.org/XML/1998/namespace}")
-"""Namespaces of attributes that describe the XML document instead of its contents: `xsi:schemaLocation`, `xml:id`."""
+"""Namespaces of attributes that describe the XML document, not its contents: `xsi:schemaLocation`, `xml:id`."""
 
 
 @contextmanager
 def open_xml(path: Path, most: int, *, long_texts: bool = False) -> Iterator[ElementView]:
-    """Provide the root element of the XML file `path`, of at most `most` bytes, as a view.
+    """Provide a view of the root element of the XML file `path`, which may have at most `most` bytes.
 
     Args:
         path: The file. Its contents are not trusted.
@@ -34,8 +34,8 @@ def open_xml(path: Path, most: int, *, long_texts: bool = False) -> Iterator[Ele
         long_texts: Whether a text may have more than 10 million characters.
 
     Raises:
-        InvalidInputError: if the file is not valid XML; when the block ends, with every mistake that was noted in it,
-            or with every part that was not read in it.
+        InvalidInputError: if the file is not valid XML; or, when the block ends, with every error reported in it, or
+            with every part that was not read in it.
     """
     report = DiagnosticCollector(encodable(str(path)))
     with viewing(read_tree(path, most, long_texts=long_texts), report) as root:
@@ -44,7 +44,7 @@ def open_xml(path: Path, most: int, *, long_texts: bool = False) -> Iterator[Ele
 
 @contextmanager
 def viewing(element: etree._Element, report: DiagnosticCollector) -> Iterator[ElementView]:
-    """Provide a view of `element`, the root of a tree that is in memory. See `open_xml`."""
+    """Provide a view of `element`, the root of a tree in memory. See `open_xml`."""
     root = ElementView(element, report)
     with root.guard():
         yield root
@@ -53,12 +53,12 @@ def viewing(element: etree._Element, report: DiagnosticCollector) -> Iterator[El
 
 
 class ElementView:
-    """One element of an XML document, whose parts count as read once they were asked for.
+    """A view of one element in an XML document. Parts of the element count as read after they were requested.
 
     Attributes:
         tag: The name of the element.
-        line: The line where it starts.
-        report: The mistakes of the document.
+        line: The line where the element starts.
+        report: Collects the errors in the document.
     """
 
     __slots__ = ("_asked", "_asked_attributes", "_children", "_depth", "_element", "_is_read", "_is_text_read",
@@ -80,7 +80,7 @@ class ElementView:
     # Attributes
 
     def attribute(self, name: str) -> str:
-        """Return the text of an attribute without blanks around it; empty where it is left out."""
+        """Return the text of an attribute, stripped of blanks; empty if the attribute is missing."""
         self._asked_attributes.add(name)
         return (self._element.get(name) or "").strip(BLANKS)
 
@@ -98,7 +98,7 @@ class ElementView:
         return (self._element.text or "").strip(BLANKS)
 
     def mixed(self) -> Iterator[str | ElementView]:
-        """Yield texts and child elements in their order, for an element that has both. All of them count as read."""
+        """Yield texts and child elements in document order, for an element that has both. All of them count as read."""
         self._is_text_read = True
         yield self._element.text or ""
         for child in self._views():
@@ -107,7 +107,7 @@ class ElementView:
             yield child._element.tail or ""
 
     def all_text(self) -> str:
-        """Return the text of the element and of everything in it. It does not count as read."""
+        """Return the text of the element and of all its descendants. The text does not count as read."""
         return "".join(str(part) for part in self._element.itertext())
 
     # Child elements
@@ -118,19 +118,19 @@ class ElementView:
         return len(self._element) > 0
 
     def has(self, name: str) -> bool:
-        """Return whether there is a child element of this name. It does not count as read."""
+        """Return whether there is a child element called `name`. The child does not count as read."""
         self._asked.add(name)
         return self._element.find(name) is not None
 
     def child(self, name: str) -> ElementView | None:
-        """Return the child element of this name; None where it is missing. Raises `MistakeError` for a second one."""
+        """Return the child element called `name`, or None. Raises `MistakeError` if there are several."""
         found = self.children(name)
         if len(found) > 1:
             raise found[1].mistake(f"a second <{name}> in <{self.tag}>", "write one of them")
         return found[0] if found else None
 
     def required(self, name: str) -> ElementView:
-        """Return the child element of this name. Raises `MistakeError` where it is missing, or for a second one."""
+        """Return the child element called `name`. Raises `MistakeError` unless there is exactly one."""
         found = self.child(name)
         if found is None:
             unread = [child.tag for child in self._views() if not child._is_read and child.tag not in self._asked]
@@ -138,7 +138,7 @@ class ElementView:
         return found
 
     def one_of(self, *names: str) -> ElementView:
-        """Return the only child element with one of these names. Raises `MistakeError` unless there is exactly one."""
+        """Return the only child element with one of the `names`. Raises `MistakeError` unless there is exactly one."""
         found = self.children(*names)
         if len(found) == 1:
             return found[0]
@@ -150,7 +150,7 @@ class ElementView:
         raise self.mistake(f"an element is missing in <{self.tag}>", suggested_name("", names, "elements"))
 
     def children(self, *names: str) -> list[ElementView]:
-        """Return the child elements of these names, in the order of the document."""
+        """Return the child elements with these `names`, in document order."""
         self._asked.update(names)
         found = [child for child in self._views() if child.tag in names]
         for child in found:
@@ -158,11 +158,11 @@ class ElementView:
         return found
 
     def ignore(self, *names: str) -> None:
-        """Ignore child elements of these names, with everything in them."""
+        """Ignore child elements with these `names`, including their contents."""
         for child in self.children(*names):
             child._is_unchecked = True
 
-    # Mistakes
+    # Errors
 
     def mistake(self, message: str, hint: str) -> MistakeError:
         """Return an error in this element."""
@@ -183,7 +183,7 @@ class ElementView:
     # Private
 
     def _views(self) -> list[ElementView]:
-        """Return views of all child elements. Raises `MistakeError` where elements are nested too deeply."""
+        """Return views of all child elements. Raises `MistakeError` if elements are nested too deeply."""
         if self._children is None:
             if self._depth == MAX_DEPTH and len(self._element):
                 raise self.mistake(f"elements nested deeper than {MAX_DEPTH} levels", "write fewer levels")
@@ -191,7 +191,7 @@ class ElementView:
         return self._children
 
     def _attributes(self) -> list[str]:
-        """Return the names of the attributes that are about the contents of the document."""
+        """Return the names of the attributes that belong to the contents of the document."""
         return [str(name) for name in self._element.attrib if not str(name).startswith(_ABOUT_THE_DOCUMENT)]
 
     def _report_unread(self) -> None:

@@ -1,7 +1,7 @@
 """Checks that Python objects have the field types of their dataclasses: an `int` for an `int`, no list for a tuple.
 
-Python does not check annotations. Objects from readers of files are right by construction; objects that a program
-builds need not be, and all other code relies on hashable, immutable values.
+Python does not check annotations. Objects created by readers of files have the right types; objects built by a program
+may not, and all other code relies on hashable, immutable values.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from robochoc.model.expression import Apply, Constant, Name
 from robochoc.system.errors import RobochocError
 
 _LEAVES = (Apply, Constant, Name)
-"""Classes of expressions: they may be too deep for recursion, and have a check of their own."""
+"""Classes of expressions. They may be too deep for recursion, and have a separate check."""
 
 FIELD_TYPES_HINT = "give each field the type that its class declares"
 """The hint for a `FieldTypeError`."""
@@ -27,7 +27,7 @@ _Check = Callable[[object], None]
 
 
 class FieldTypeError(RobochocError, TypeError):
-    """A part of an object has the wrong type; `path` leads to it."""
+    """Raised if a part of an object has the wrong type. `path` leads to the part."""
 
     def __init__(self, value: object, expected: str) -> None:
         self.path = ""
@@ -36,18 +36,18 @@ class FieldTypeError(RobochocError, TypeError):
 
     @property
     def explanation(self) -> str:
-        """Return the path of the part, and the error."""
+        """Return the path to the part, and the error."""
         where = self.path.lstrip(".")
         return f"{where}: {self}" if where else str(self)
 
     def inside(self, step: str) -> FieldTypeError:
-        """Return this error with `step` before its path."""
+        """Return this error with `step` prepended to its path."""
         self.path = f"{step}{self.path}"
         return self
 
 
 def check_field_types(value: object, kind: type) -> None:
-    """Raise `FieldTypeError` unless `value` and its parts have the types that the dataclass `kind` declares."""
+    """Raise `FieldTypeError` unless `value` and its parts have the types declared by the dataclass `kind`."""
     _check(kind)(value)
 
 
@@ -65,7 +65,7 @@ def _check(hint: Any) -> _Check:  # noqa: ANN401 - an annotation
 
 
 def _exactly(expected: str, *kinds: type) -> _Check:
-    """Return a check for numbers. It rejects True, which is an `int` but is not written as a number."""
+    """Return a check for numbers. It rejects True, which is an `int` but cannot be written as a number."""
 
     def check(value: object) -> None:
         if type(value) not in kinds:
@@ -116,7 +116,7 @@ def _tuple_of(item: Any) -> _Check:  # noqa: ANN401 - an annotation
 
 
 class _FieldsCheck:
-    """A check for a dataclass and all its fields."""
+    """Checks a dataclass and all its fields."""
 
     def __init__(self, kind: Any) -> None:  # noqa: ANN401 - a dataclass
         self._kind = kind

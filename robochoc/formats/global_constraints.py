@@ -1,7 +1,7 @@
 """Read and write the global constraints of XCSP 2.1: `allDifferent`, `weightedSum`, `element`, `cumulative`.
 
-Each gets an equivalent expression as its body, and keeps its written form. Roussel and Lecoutre, "XML Representation of
-Constraint Networks: Format XCSP 2.1", 2009; docs/reference/format.md, "Global constraints".
+Each constraint gets an equivalent expression as its body, and keeps its written form. Roussel and Lecoutre, "XML
+Representation of Constraint Networks: Format XCSP 2.1", 2009; docs/reference/format.md, "Global constraints".
 """
 
 from __future__ import annotations
@@ -29,11 +29,11 @@ _SPLIT = "split it into several"
 
 
 def read_global(reference: str, parameters: etree._Element | None, scope: Sequence[Term]) -> GlobalPredicate:
-    """Return the global constraint in a file, over formal parameters. Raises `MistakeError`.
+    """Return the global constraint in a file, with formal parameters. Raises `MistakeError`.
 
     Args:
-        reference: Its name, with `global:`.
-        parameters: The element of its parameters. None: the terms of the `scope`, which only allDifferent allows.
+        reference: The name of the constraint, with `global:`.
+        parameters: The element with its parameters. None: the terms in `scope`, which only allDifferent allows.
         scope: The terms of the constraint's scope.
     """
     text = "" if parameters is None else parameters.text or ""
@@ -48,7 +48,7 @@ def read_global(reference: str, parameters: etree._Element | None, scope: Sequen
 
 
 def variables_of(parameters: etree._Element | None, scope: Sequence[Term]) -> tuple[Term, ...]:
-    """Return the variables in the parameters of a global constraint, in the order of its formal parameters."""
+    """Return the variables in the parameters of a global constraint, in the order of the formal parameters."""
     if parameters is None:
         return tuple(dict.fromkeys(term for term in scope if isinstance(term, str)))
     text = " ".join([parameters.text or "", *(child.tail or "" for child in parameters)])
@@ -56,7 +56,7 @@ def variables_of(parameters: etree._Element | None, scope: Sequence[Term]) -> tu
 
 
 def write_global(element: etree._Element, predicate: GlobalPredicate, terms: Sequence[Term]) -> None:
-    """Write the form of a global constraint into `element`, with `terms` in place of its formal parameters."""
+    """Write the form of a global constraint to `element`, with `terms` instead of the formal parameters."""
     actual = dict(zip(predicate.parameters, map(str, terms), strict=True))
     text, last = "", None
     for word in predicate.form.split():
@@ -80,12 +80,12 @@ def check_global(predicate: GlobalPredicate) -> None:
 
 
 def read_form(reference: str, form: str) -> GlobalPredicate:
-    """Return a global constraint over formal parameters `X0`, `X1`, ... from its `form`: `[ X0 X1 X2 ]`.
+    """Return a global constraint with formal parameters `X0`, `X1`, ... from its `form`: `[ X0 X1 X2 ]`.
 
     Args:
-        reference: Its name, with `global:`.
-        form: Its parameters as XCSP 2.1 writes them, with formal parameters for variables, in the order of their
-            numbers.
+        reference: The name of the constraint, with `global:`.
+        form: Its parameters in the syntax of XCSP 2.1, with formal parameters instead of variables, in the order of
+            their numbers.
 
     Raises:
         MistakeError: if the global constraint is unknown, or its parameters are invalid.
@@ -94,7 +94,7 @@ def read_form(reference: str, form: str) -> GlobalPredicate:
 
 
 def is_global(reference: str) -> bool:
-    """Return whether `reference` names a global constraint."""
+    """Return whether `reference` is the name of a global constraint."""
     return reference.startswith(PREFIX)
 
 
@@ -120,7 +120,7 @@ def _expanded(reference: str, form: Sequence[str]) -> GlobalPredicate:
 
 
 class _WordReader:
-    """Reads the words of a form, one after the other."""
+    """Reads the words in a form, one after the other."""
 
     def __init__(self, reference: str, words: Sequence[str]) -> None:
         self._reference = reference
@@ -164,7 +164,7 @@ class _WordReader:
         raise self.error(" or ".join(f"<{word}/>" for word in allowed))
 
     def check_number(self, number: int, most: int, items: str) -> None:
-        """Raise `MistakeError` if there are so many items that the expression would be too long."""
+        """Raise `MistakeError` if the number of items would make the expression too long."""
         if number > most:
             raise MistakeError(f"{self._reference} with {number} {items}", f"{most} are allowed: {_SPLIT}")
 
@@ -173,7 +173,7 @@ class _WordReader:
             raise self.error("the end")
 
     def error(self, wanted: str) -> MistakeError:
-        """Return the error for another next word than expected."""
+        """Return the error for an unexpected next word."""
         found = f"'{shortened(self._words[self._next])}'" if self._next < len(self._words) else "the end"
         hint = f"write {_EXAMPLES[self._reference.removeprefix(PREFIX)]}"
         return MistakeError(f"the parameters of {self._reference}: {found} instead of {wanted}", hint)
@@ -205,7 +205,7 @@ def _weighted_sum(words: _WordReader) -> Expression:
 
 
 def _element(words: _WordReader) -> Expression:
-    """Return `items[index] = value`; the index counts from 1."""
+    """Return `items[index] = value`. The index starts at 1."""
     outer = words.skip("[")
     index = words.term()
     items = list(words.read_list("[", words.term, "]"))
@@ -223,7 +223,7 @@ def _element(words: _WordReader) -> Expression:
 
 
 class _Task:
-    """A task of cumulative: at least two of origin, duration and end; and its height."""
+    """A task in a cumulative constraint: at least two of origin, duration and end, and the height."""
 
     def __init__(self, words: _WordReader) -> None:
         words.expect("{")
@@ -232,7 +232,7 @@ class _Task:
             given.append(None if words.skip(_NIL) else words.term())
         origin, duration, end, height = self._parts(given, words)
         self.conditions = [Apply("ge", (part, Constant(0))) for part in (duration, height) if isinstance(part, Name)]
-        """The conditions on this task alone."""
+        """The conditions on this task only."""
         for part in (duration, height):
             if isinstance(part, Constant) and part.value < 0:
                 raise words.error("tasks with durations and heights of 0 or more")
@@ -265,7 +265,7 @@ class _Task:
 
 
 def _cumulative(words: _WordReader) -> Expression:
-    """Compare the load with the limit where a task starts: the load grows nowhere else."""
+    """Compare the load with the limit at the start of each task, since the load increases at no other time."""
     words.expect("[")
     tasks = []
     while not words.skip("]"):

@@ -9,11 +9,11 @@ from robochoc.model.outcome import Outcome, Verdict
 def describe_outcome(
     outcome: Outcome, total: int, *, flying: int | None = None, noun: str = "robot", weighted: bool | None = None
 ) -> str:
-    """Return the outcome in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
+    """Describe the outcome in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
 
     Args:
         outcome: The outcome of the run.
-        total: The number of robots in the run. If the outcome has epochs, the robots of the last epoch are counted.
+        total: The number of robots in the run. If the outcome has epochs, the robots in the last epoch are counted.
         flying: The number of `total` that have a place, if drones are counted and a robot decides about several.
         noun: The noun for the counted robots or drones, in the singular.
         weighted: Whether robots differ in weight, so that a maximum is one of weight instead of number. None: unknown,

@@ -1,4 +1,4 @@
-"""The locations of a robot's parts, for messages: lines of its file, or names of its objects."""
+"""The locations of a robot's parts, for messages: lines in its file, or names of its objects."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.model.problem import Child, Constraint, Parent
 
 
 class Location(NamedTuple):
-    """A file and a line in it (0: the whole file); or an object, by its kind and name."""
+    """A line in a file (0: the whole file), or an object given by its kind and name."""
 
     file: str
     line: int = 0
@@ -39,15 +39,15 @@ class Locations(Protocol):
         """Return the location of a constraint of the robot."""
 
     def neighbour(self, neighbour: Parent | Child) -> Location:
-        """Return the location of the entry of a neighbour."""
+        """Return the location of a neighbour's entry."""
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return the message and the hint for a neighbour that the team lacks."""
+        """Return the message and the hint for a neighbour that is missing in the team."""
 
 
 @dataclass(frozen=True)
 class FileLocations:
-    """The locations of a robot in the XML file `file`: its presentation in `line`, its variables in `lines`."""
+    """The locations of a robot in the XML file `file`: its presentation is in `line`, its variables are in `lines`."""
 
     file: str
     line: int
@@ -62,22 +62,22 @@ class FileLocations:
         return Location(self.file, self.lines.get(name, self.line))
 
     def constraint(self, constraint: Constraint) -> Location:
-        """Return the line that the constraint was read from."""
+        """Return the line of a constraint."""
         return Location(self.file, constraint.line)
 
     def neighbour(self, neighbour: Parent | Child) -> Location:
-        """Return the line that the neighbour was read from."""
+        """Return the line of a neighbour's entry."""
         return Location(self.file, neighbour.line)
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return the message that the file of the neighbour is missing, and the hint."""
+        """Return the message that the neighbour's file is missing, and the hint."""
         missing = Path(self.file).parent / name
         return f"has no file: there is no {missing}.xml", "write that file or delete this agent"
 
 
 @dataclass(frozen=True)
 class ObjectLocations:
-    """The locations of a robot that was built in Python, by names. Lines of a file are ignored."""
+    """The locations of a robot built in Python, given by names. Line numbers are ignored."""
 
     name: str
 
@@ -103,7 +103,7 @@ class ObjectLocations:
         return self._part(what, name)
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return the message that the team lacks the robot, and the hint."""
+        """Return the message that the robot is missing in the team, and the hint."""
         return f"is not in the team: there is no robot '{name}'", "add that robot or leave this neighbour out"
 
     def _part(self, what: str, name: str) -> Location:

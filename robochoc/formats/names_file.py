@@ -1,4 +1,4 @@
-"""`names.json` in a team's folder: the original names of robots and variables, from the files of another tool."""
+"""`names.json` in a team's folder: the original names of robots and variables in the files of another tool."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ MAX_BYTES = 64 * 1024 * 1024
 
 
 def names_json(dialect: str, names: Mapping[str, str]) -> bytes:
-    """Return the content of the file.
+    """Return the content of the file `names.json`.
 
     Args:
         dialect: The name of the dialect.
-        names: The original names, by those of the team, where they differ.
+        names: Maps names in the team to the original names, where these differ.
     """
     import msgspec  # noqa: PLC0415 - start-up
 
@@ -26,10 +26,10 @@ def names_json(dialect: str, names: Mapping[str, str]) -> bytes:
 
 
 def original_names(folder: Path) -> Mapping[str, str]:
-    """Return the original names from the file in `folder`; none if it has no such file.
+    """Return the original names from the file in `folder`; empty if the folder has no such file.
 
     Raises:
-        InvalidInputError: if the file does not have the form that `names_json` writes.
+        InvalidInputError: if the file does not have the form written by `names_json`.
     """
     import msgspec  # noqa: PLC0415 - start-up
 

@@ -14,10 +14,10 @@ _MISSING_SHOWN = 10
 
 
 def read_order(path: Path, team: Team, names: Mapping[str, str] = {}) -> tuple[str, ...]:
-    """Return the order in the file `path`, of all robots of `team`. The file may use their original `names`.
+    """Return the order of all robots in `team`, from the file `path`. The file may use the robots' original `names`.
 
     Raises:
-        InvalidInputError: with every mistake.
+        InvalidInputError: with every error in the file.
     """
     report = DiagnosticCollector(str(path))
     lines = _text(path).splitlines()

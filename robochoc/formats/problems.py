@@ -1,4 +1,4 @@
-"""Read a problem from a team's folder, or from a file of another tool."""
+"""Read a problem from a team's folder, or from another tool's file."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ class ReadProblem(NamedTuple):
     Attributes:
         team: The team.
         names: The original names of its robots and variables.
-        foreign: Whether it was read from a file of another tool, whose user knows only the original names.
-        notes: The changes that were made as such a file was read.
-        bound: The sum of costs that its format takes for no solution; see `ImportResult`.
+        foreign: Whether it was read from another tool's file, whose user knows only the original names.
+        notes: The changes made while reading such a file.
+        bound: The sum of costs that counts as no solution in the file's format; see `ImportResult`.
     """
 
     team: Team
@@ -42,18 +42,18 @@ def read_problem(
     owner: str | None = None,
     allow_code: bool = False,
 ) -> ReadProblem:
-    """Return the team in the folder `place`, or in the file `place` of another tool.
+    """Return the team in the folder `place`, or in another tool's file `place`.
 
     Args:
         place: The folder, or the file.
         *more: Further files of the problem in that file.
-        dialect: The name of the format of a file. None: it is recognised.
-        infinity: For files: the smallest cost that forbids; see `ImportOptions`.
+        dialect: The name of a file's format. None: the format is detected.
+        infinity: For files: the smallest cost that means forbidden; see `ImportOptions`.
         owner: For files: a regular expression that matches variables of one robot; see `ImportOptions`.
-        allow_code: For files: whether Python files that they name may be executed.
+        allow_code: For files: whether Python files named in them may be executed.
 
     Raises:
-        InvalidInputError: with the mistakes of the files, or if such options are given for a folder.
+        InvalidInputError: if the files have errors, or if such options are specified for a folder.
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
     from robochoc.formats.dialects.registry import read_foreign, recognise, recognise_or_raise  # noqa: PLC0415 - as above

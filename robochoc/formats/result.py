@@ -1,11 +1,11 @@
 """The JSON result: one object for one team and run (docs/reference/result.md).
 
-It is written from, and read into, the types of `model/outcome.py`; no field is declared here. The object differs from
-an `Outcome` in these points only:
+It is converted from and to the types in `model/outcome.py`; no field is declared here. The object differs from an
+`Outcome` only in these points:
 
-* Fields of an answer with their default value are left out, except `_FIRST`.
+* Fields of an answer with their default value are omitted, except those in `_FIRST`.
 * Values of symbolic variables are their symbols.
-* `metrics` has the number of `messages`, and `messages_by_type`. Those of an epoch are in the epoch's object itself.
+* `metrics` has the number of `messages`, and `messages_by_type`. The metrics of an epoch are in the epoch's object.
 * `at_s` is called `seconds`. Measured seconds have six decimal places.
 * `names`, `places` and `values` are added by the caller.
 """
@@ -31,19 +31,19 @@ Json = dict[str, Any]
 
 
 class ResultError(RobochocError, ValueError):
-    """The text is not a valid JSON result."""
+    """Raised if the text is not a valid JSON result."""
 
 
 _FIRST = (
     *("team", "protocol", "runtime", "seed", "verdict", "opened_by", "robots"),
     *("assignment", "cost", "withdrawn", "epochs", "metrics", "verified"),
 )
-"""The first keys of an answer, in this order; they are never left out."""
+"""The first keys of an answer, in this order. They are never omitted."""
 _MEASURED = frozenset({"at_s", "wall_s", "compile_s"})
 _DIGITS_S = 6
-"""The number of decimal places of seconds that were measured."""
+"""The number of decimal places for measured seconds."""
 _MOST_DIGITS = 10_000
-"""The maximum number of digits of a number: 1e999999999 as an integer would take all memory."""
+"""The maximum number of digits in a number: 1e999999999 as an integer would exhaust the memory."""
 _ENCODER = msgspec.json.Encoder(decimal_format="number")
 
 
@@ -53,13 +53,13 @@ def result_json(
     places: Mapping[str, tuple[float, ...]] = MappingProxyType({}),
     values: Mapping[str, Value] = MappingProxyType({}),
 ) -> bytes:
-    """Return `outcome` as one line of JSON, without the line's end.
+    """Return `outcome` as one line of JSON, without the line break.
 
     Args:
         outcome: The outcome.
-        names: The original names of robots and variables, by the names in `outcome`.
-        places: The positions on a map of the values of variables, in metres.
-        values: The user's values of variables, where they differ from the integers in the assignment.
+        names: The original names of robots and variables, by their names in `outcome`.
+        places: The positions, in metres on a map, that the values of variables mean.
+        values: The user's values of variables, if they differ from the integers in the assignment.
     """
     added = {"names": names, "places": places, "values": values}
     result = _answer(outcome, outcome) | {key: dict(one) for key, one in added.items() if one}
@@ -68,7 +68,7 @@ def result_json(
 
 def _answer(answer: Answer, outcome: Outcome) -> Json:
     """Return an answer as an object: `outcome`, or one of its epochs."""
-    known = {one.name: one for one in fields(answer) if one.compare}  # others are derived, as in `Solution`
+    known = {one.name: one for one in fields(answer) if one.compare}  # the other fields are derived, as in `Solution`
     result: Json = {}
     for name in (*_FIRST, *known):
         if name in known and name not in result:
@@ -85,7 +85,7 @@ def _default(one: Field[Any]) -> object:
 
 
 def _in_json(name: str, value: Any, outcome: Outcome) -> Any:  # noqa: ANN401, C901, PLR0911 - any field
-    """Return the value of the field `name` of `outcome`, or of a part of it, as JSON."""
+    """Return the JSON value of the field `name` in `outcome`, or in a part of it."""
     match value:
         case Answer():
             return _answer(value, outcome)
@@ -120,7 +120,7 @@ def read_result(content: bytes) -> Outcome:
     """Return the outcome in a JSON result.
 
     Raises:
-        ResultError: if it is invalid, with the key and the expected value.
+        ResultError: if the result is invalid. The message contains the key and the expected value.
     """
     try:
         result = _LOADS.decode(content.decode())
@@ -159,7 +159,7 @@ _LOADS = json.JSONDecoder(parse_float=_decimal, parse_int=_integer, parse_consta
 class _Symbols:
     """The symbols in a JSON result, and the symbolic variables.
 
-    Results of earlier versions do not list the symbols: these get codes in the order of their first use.
+    Results of earlier versions do not list the symbols. Then symbols get codes in the order of their first use.
     """
 
     def __init__(self, result: Json) -> None:
@@ -167,7 +167,7 @@ class _Symbols:
         self.variables = dict.fromkeys(_texts(result, "symbolic"))
 
     def codes_of(self, assignment: Any) -> Any:  # noqa: ANN401 - JSON; anything invalid is refused later
-        """Return an assignment in codes."""
+        """Return an assignment with codes instead of symbols."""
         if not isinstance(assignment, dict):
             return assignment
         return {name: self._code(name, value) for name, value in assignment.items()}
@@ -179,8 +179,8 @@ class _Symbols:
         return self.codes.setdefault(value, len(self.codes))
 
 
-# The functions below return the fields of a type of `model/outcome.py`. Anything invalid stays as it is: `convert`
-# refuses it, and names its place.
+# The functions below return the fields of a type in `model/outcome.py`. Invalid values stay unchanged: `convert`
+# refuses them, and names their position.
 
 
 def _outcome_fields(result: Any) -> Any:  # noqa: ANN401 - JSON
@@ -195,7 +195,7 @@ def _outcome_fields(result: Any) -> Any:  # noqa: ANN401 - JSON
         ]
     if "metrics" in result:
         found["metrics"] = _metrics_fields(result["metrics"])
-    return found | {"symbols": [*symbols.codes], "symbolic": [*symbols.variables]}  # when all values were read
+    return found | {"symbols": [*symbols.codes], "symbolic": [*symbols.variables]}  # after all values were read
 
 
 def _answer_fields(answer: Json, symbols: _Symbols) -> Json:

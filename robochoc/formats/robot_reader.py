@@ -1,4 +1,4 @@
-"""Read the file of one robot: its schema was checked in `xml`, its meaning is checked here.
+"""Read the file of one robot. `xml` has checked the file against its schema; this module checks its meaning.
 
 docs/reference/format.md, "One robot"; the paper, Figure 2.
 """
@@ -64,17 +64,17 @@ from robochoc.model.symbols import with_table
 
 @dataclass(frozen=True, kw_only=True)
 class RobotFile(TeamMember):
-    """A robot, and data of its file that only the checks of the team need."""
+    """A robot, and data in its file that only the checks of the team need."""
 
     context: ConstraintContext
-    """The names that constraints of a scenario can refer to."""
+    """The names to which constraints in a scenario can refer."""
 
     def with_table(self, names: tuple[str, ...]) -> RobotFile:
         """Return the file with `names` as the table of symbols."""
         return replace(self, robot=with_table(self.robot, names)) if names else self
 
     def in_places(self, places: int) -> RobotFile:
-        """Return the file with costs in the unit of `places` decimal places, at least as many as now.
+        """Return the file with costs in the unit of `places` decimal places, which must be at least as many as now.
 
         Raises:
             InvalidInputError: if a cost then has too many digits.
@@ -95,12 +95,12 @@ class RobotFile(TeamMember):
 
 
 def read_robot(path: Path | str) -> Robot:
-    """Return the robot in the XML file `path`. The stem of the file is its name.
+    """Return the robot in the XML file `path`. The stem of the file name is the robot's name.
 
     The files of its neighbours are not checked: see `read_team`.
 
     Raises:
-        InvalidInputError: with all mistakes of the file.
+        InvalidInputError: with all errors in the file.
     """
     table = SymbolTable()
     return with_table(read_robot_file(Path(path), table).robot, table.names)
@@ -111,11 +111,11 @@ def read_robot_again(path: Path, symbols: tuple[str, ...], units: CostUnits) -> 
 
     Args:
         path: The file. It may have changed.
-        symbols: The symbols of the team: those in the file get the same codes.
+        symbols: The symbols of the team. Symbols in the file get the same codes.
         units: The units of the team's costs.
 
     Raises:
-        InvalidInputError: with all mistakes of the file; or if it has symbols, decimal places or an objective that the
+        InvalidInputError: with all errors in the file; or if it has symbols, decimal places or an objective that the
             team does not have.
     """
     table = SymbolTable(symbols)
@@ -146,10 +146,10 @@ def read_robot_file(path: Path, table: SymbolTable) -> RobotFile:
 
 
 def robot_in(content: bytes, name: str) -> Robot:
-    """Return the robot called `name` from the `content` of its XML file. The same limits apply as for a file.
+    """Return the robot called `name` from the `content` of its XML file. The limits are the same as for a file.
 
     Raises:
-        InvalidInputError: with all mistakes. Messages use the file name `NAME.xml`.
+        InvalidInputError: with all errors. Messages use the file name `NAME.xml`.
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)
@@ -158,7 +158,7 @@ def robot_in(content: bytes, name: str) -> Robot:
 
 
 def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
-    """Return further mistakes of a file that its schema `refused`, in lines where the schema finds none."""
+    """Return further errors in a file that its schema `refused`, in lines where the schema finds no error."""
     if len(refused.diagnostics) > MAX_PER_FILE:
         return []  # the file was not read to its end
     tree = without_schema_errors(refused.tree, schema_for("instance"))
@@ -173,7 +173,7 @@ def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
 
 
 def _check_name(name: str, path: Path) -> None:
-    """Raise `InvalidInputError` unless `name`, from the file at `path`, can be a robot's name."""
+    """Raise `InvalidInputError` unless `name`, from the file at `path`, is a valid robot name."""
     try:
         check_robot_name(name, "rename the file")
     except MistakeError as mistake:
@@ -181,7 +181,7 @@ def _check_name(name: str, path: Path) -> None:
 
 
 class _RobotReader:
-    """Reads one `instance` that is valid by its schema, and collects all mistakes in one report."""
+    """Reads an `instance` that its schema accepts, and collects all errors in one report."""
 
     def __init__(self, path: Path, instance: etree._Element, table: SymbolTable) -> None:
         self._table = table
@@ -215,7 +215,7 @@ class _RobotReader:
         return RobotFile(robot, places, copies, implied_children, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
-        """Yield the elements of a section of the instance, and check their number."""
+        """Yield the elements in a section of the instance, and check their number."""
         for container in self._instance.iterchildren(section):
             with self._report.at(line(container)):
                 check_count(container, count, len(container))
@@ -245,7 +245,7 @@ class _RobotReader:
         if not self._own:
             with self._report.at(line(next(self._instance.iterchildren("variables")))):
                 refuse_no_variables(self._own)
-            self._report.finish()  # other mistakes may only follow from this one
+            self._report.finish()  # further errors may be consequences of this one
         return tuple(variables)
 
     def _topics(self, symbolic: Collection[str]) -> tuple[Topic, ...]:
@@ -317,7 +317,7 @@ class _RobotReader:
             yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
 
     def _children(self, context: ConstraintContext, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
-        """Yield the children with this robot's parts of PKCs. Copies of TKCs are added to `copies` too."""
+        """Yield the children with this robot's parts of PKCs. Copies of TKCs are added to `copies`."""
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
             listed = self._constraints(agent, context, read_shared)

@@ -1,8 +1,8 @@
 """Rules for a robot's constraints and neighbours (docs/reference/format.md, "One robot").
 
-`names`, `definitions`, `symbols` and this module contain all rules for one robot. Readers of files apply them to each
-element, `robot_validation` applies them to the objects of a robot that was built in Python. Rules for several robots
-are in `team_consistency`; rules for files only (XML, schema, counts, references) are in the readers.
+`names`, `definitions`, `symbols` and this module contain all rules for one robot. Readers of files apply the rules to
+each element, `robot_validation` applies them to the objects of a robot built in Python. Rules on several robots are in
+`team_consistency`; rules on files only (XML, schema, counts, references) are in the readers.
 """
 
 from __future__ import annotations
@@ -34,11 +34,11 @@ from robochoc.model.problem import (
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
 """The hint for `repeated_neighbours`."""
 NO_ROBOTS_LEFT = ("all robots have left after this event", "keep one, or add another")
-"""The message and the hint for an event of a scenario after which the team is empty."""
+"""The message and the hint for a scenario event after which the team is empty."""
 
 
 def check_terms(terms: Sequence[Term]) -> None:
-    """Raise `MistakeError` unless each of a scope's `terms` can be a variable's name or an integer."""
+    """Raise `MistakeError` unless each of the `terms` in a scope is a valid variable name or an integer."""
     for term in terms:
         if isinstance(term, int):
             check_integer(term)
@@ -69,11 +69,11 @@ def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits
 
 
 _PARTIAL = ("div", "mod", "pow")
-"""The operators that are undefined for some arguments, however small these are."""
+"""Operators that are undefined for some arguments, even small ones."""
 
 
 def _refuse_undefined(predicate: Predicate) -> None:
-    """Raise `MistakeError` for a predicate that may be undefined, if violating it is rewarded."""
+    """Raise `MistakeError` for a predicate that may be undefined if a violation of it is rewarded."""
     waiting: list[Expression] = [predicate.body]
     while waiting:
         node = waiting.pop()
@@ -85,7 +85,7 @@ def _refuse_undefined(predicate: Predicate) -> None:
 
 
 def refuse_private_part(model: ConstraintModel | None) -> None:
-    """Raise `MistakeError` for a private constraint with the model PKC, of which a neighbour would know a part."""
+    """Raise `MistakeError` for a private constraint with the model PKC, since a neighbour would have to know a part."""
     if model == ConstraintModel.PKC:
         raise MistakeError("a private constraint with model PKC", "delete the model: only shared constraints have one")
 
@@ -100,7 +100,7 @@ def check_private(constraint: Constraint, own: Collection[str]) -> None:
 
 
 def refuse_no_model(model: ConstraintModel | str | None) -> None:
-    """Raise `MistakeError` for a shared constraint without a model: TKC or PKC."""
+    """Raise `MistakeError` for a shared constraint without a model (TKC or PKC)."""
     if not model:
         raise MistakeError("a shared constraint lacks its model", 'write model="TKC" or model="PKC"')
 
@@ -117,7 +117,7 @@ def check_shared(constraint: Constraint, own: Collection[str]) -> None:
 
 
 def _check_application(definition: Definition, scope: tuple[Term, ...], parameters: tuple[Term, ...]) -> None:
-    """Raise `MistakeError` unless the definition has as many parameters, and scope and parameters have equal terms."""
+    """Raise `MistakeError` unless the number of parameters is right, and scope and parameters have equal terms."""
     if isinstance(definition, Relation) and parameters != scope:
         raise MistakeError(
             f"parameters '{terms_text(parameters)}' differ from the scope '{terms_text(scope)}'",
@@ -152,7 +152,7 @@ def refuse_no_variables(variables: Collection[object]) -> None:
 
 
 def check_shown_variables(shown: Sequence[str], own: Collection[str]) -> None:
-    """Raise `MistakeError` unless the variables `shown` to a child are `own` variables, each listed once."""
+    """Raise `MistakeError` unless the variables `shown` to a child are `own` variables, without duplicates."""
     seen: set[str] = set()
     for variable in shown:
         if variable not in own:
@@ -167,7 +167,7 @@ def check_shown_variables(shown: Sequence[str], own: Collection[str]) -> None:
 def repeated_neighbours(
     name: str, parents: Sequence[Parent], children: Sequence[Child]
 ) -> Iterator[tuple[Parent | Child, str]]:
-    """Yield neighbours of the robot `name` that are listed twice or are the robot itself, each with a message."""
+    """Yield neighbours of the robot `name` that are listed twice, or equal to the robot, each with a message."""
     seen = {name: "the robot itself"}
     for role, neighbours in (("parent", parents), ("child", children)):
         for neighbour in neighbours:

@@ -1,4 +1,4 @@
-"""Validate a robot that was built in Python: the same rules as for a file, with names instead of lines."""
+"""Validate a robot built in Python by the same rules as a file, with names instead of line numbers."""
 
 from __future__ import annotations
 
@@ -55,19 +55,19 @@ Defined = Domain | Definition
 
 
 class RobotValidator:
-    """Validates robots one after the other. Domains and definitions that they share are checked once."""
+    """Validates robots one after the other. Domains and definitions common to several robots are checked once."""
 
     def __init__(self) -> None:
         self._known: dict[int, tuple[Defined, bool]] = {}
-        """By `id`: the object, stored so that its `id` is not reused, and whether it is valid."""
+        """By `id`: the object, which is stored so that its `id` is not reused, and whether it is valid."""
         self._invalid: list[Defined] = []
-        """The invalid definitions of the current robot. In a file, equal ones are written once."""
+        """The invalid definitions of the current robot. In a file, equal definitions are written once."""
         self._found: list[Diagnostic] = []
         self._table: tuple[str, ...] = ()
         """The symbols of the current robot."""
 
     def mistakes(self, robot: Robot) -> list[Diagnostic]:
-        """Return the mistakes of `robot` that can be found without its neighbours."""
+        """Return the errors in `robot` that can be found without its neighbours."""
         self._found, self._invalid = [], []
         if self._has_valid_types(robot):
             for _ in self._check_parts(robot, ObjectLocations(robot.name)):
@@ -78,7 +78,7 @@ class RobotValidator:
         return self._found
 
     def mistakes_of_constraint(self, constraint: Constraint, robot: Robot) -> list[Diagnostic]:
-        """Return the mistakes of a shared constraint that `robot` will get."""
+        """Return the errors in a shared constraint that `robot` will get."""
         self._found, self._invalid = [], []
         own = dict.fromkeys(variable.name for variable in robot.variables)
         self._table = robot.symbol_table
@@ -95,7 +95,7 @@ class RobotValidator:
         return True
 
     def _check_parts(self, robot: Robot, places: ObjectLocations) -> Iterator[None]:
-        """Check one part after the other, and yield in between, so that the caller can stop."""
+        """Check one part after the other. It yields after each part, so that the caller can stop."""
         own = dict.fromkeys(variable.name for variable in robot.variables)
         with self._at(places.robot):
             check_robot_name(robot.name)
@@ -107,7 +107,7 @@ class RobotValidator:
         self._table = robot.symbol_table
         yield from self._variables(robot, places)
         if not own:
-            return  # other mistakes may only follow from this one
+            return  # further errors may be consequences of this one
         yield from self._topics(robot, own, places)
         for constraint in robot.private:
             self._private(constraint, own, robot, places)
@@ -200,7 +200,7 @@ class RobotValidator:
         return is_valid
 
     def _check_defined(self, thing: Defined, places: ObjectLocations) -> bool:
-        """Return whether a domain or a definition is valid. Its mistake is added for the first robot that has it."""
+        """Return whether a domain or a definition is valid. Its error is reported for the first robot that uses it."""
         known = self._known.get(id(thing))
         if known is None:
             known = self._known[id(thing)] = (thing, self._is_valid(thing, places))
@@ -219,7 +219,7 @@ class RobotValidator:
 
     @contextmanager
     def _at(self, place: Callable[..., Location], *part: object) -> Iterator[None]:
-        """Add a `MistakeError` raised inside. The `place` of the `part` is computed only then."""
+        """Add a `MistakeError` raised inside. The `place` of the `part` is computed only in this case."""
         try:
             yield
         except MistakeError as mistake:
@@ -250,7 +250,7 @@ def _check_defined(thing: Defined, table: tuple[str, ...]) -> None:
 
 
 def repeated_robots(robots: Iterable[Robot]) -> Iterator[Diagnostic]:
-    """Yield robots whose name another robot has."""
+    """Yield robots with the name of another robot."""
     seen: set[str] = set()
     for robot in robots:
         if robot.name in seen:

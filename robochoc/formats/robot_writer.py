@@ -1,4 +1,4 @@
-"""Write the XML file of a robot in the form of the paper's Figure 2: order of elements, counts, two spaces a level."""
+"""Write a robot's XML file in the form of the paper's Figure 2: order of elements, counts, two spaces per level."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def robot_xml(robot: Robot) -> bytes:
     If two different domains or definitions have the same name, one of them is renamed.
 
     Raises:
-        ValueError: if a cost is not an integer, or a name has characters that XML does not allow.
+        ValueError: if a cost is not an integer, or a name contains characters that XML does not allow.
     """
     robot = with_distinct_names(robot)
     instance = etree.Element("instance")
@@ -199,9 +199,9 @@ def _terms(terms: Sequence[Term]) -> str:
 
 
 def with_distinct_names(robot: Robot) -> Robot:
-    """Return `robot` with distinct names for different domains, and for different definitions.
+    """Return `robot` with different names for different domains, and for different definitions.
 
-    The first keeps its name, the others of that name are called NAME.2, NAME.3, ...
+    The first object keeps its name; others with the same name are renamed to NAME.2, NAME.3, ...
     """
     domains = _names(variable.domain for variable in robot.variables)
     definitions = _names(
@@ -220,7 +220,7 @@ def _constraints(robot: Robot) -> Iterable[Constraint]:
 
 
 def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> dict[_Named, str] | None:
-    """Return new names for the `things` with ambiguous names. None if all names are distinct."""
+    """Return new names for those `things` whose names are ambiguous, or None if all names are distinct."""
     first: dict[str, _Named] = dict(predefined)
     names: dict[_Named, str] = {}
     for thing in things:

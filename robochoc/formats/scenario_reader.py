@@ -39,7 +39,7 @@ from robochoc.model.team_edits import ChangeError
 from robochoc.system.files import resolved
 
 SCENARIO = "scenario.xml"
-"""The only XML file in a team's folder that is not a robot's."""
+"""The only XML file in a team's folder that does not describe a robot."""
 
 
 def has_scenario(folder: Path) -> bool:
@@ -50,22 +50,22 @@ def has_scenario(folder: Path) -> bool:
 def read_scenario(
     folder: Path, team: Team | None, files: Mapping[str, RobotFile], table: SymbolTable
 ) -> tuple[ScenarioEvent, ...]:
-    """Return the events of the scenario in `folder`. Each must be possible for the team at that time.
+    """Return the events of the scenario in `folder`. Each event must be possible for the team at that time.
 
     Args:
         folder: The team's folder. Files of added robots are in it or below.
-        team: The team. None if the files of the robots have mistakes: then only the scenario itself is checked.
+        team: The team. None if the robots' files have errors: then only the scenario itself is checked.
         files: The robots' files.
-        table: The symbols of the team, to which those of the scenario are added.
+        table: The symbols of the team. Those in the scenario are added to it.
 
     Raises:
-        InvalidInputError: with all mistakes.
+        InvalidInputError: with all errors.
     """
     return _ScenarioReader(folder, team, files, table).events()
 
 
 def places_of_scenario(folder: Path) -> int:
-    """Return the largest number of decimal places of a cost in the scenario in `folder`, or of an added robot."""
+    """Return the largest number of decimal places in the costs of the scenario in `folder`, or of an added robot."""
     try:
         root = read_xml(folder / SCENARIO, "scenario")
     except InvalidInputError:
@@ -79,9 +79,9 @@ def places_of_scenario(folder: Path) -> int:
 
 
 class _ScenarioReader:
-    """Reads the events in order, and applies each to the team.
+    """Reads the events in order, and applies each event to the team.
 
-    An impossible change is reported and left out. Names that it would have added are not reported afterwards.
+    An impossible change is reported and skipped. Later uses of names that it would have added are not reported.
     """
 
     def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile], table: SymbolTable) -> None:
@@ -95,7 +95,7 @@ class _ScenarioReader:
         self._robot_mistakes: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
         self._has_unread_file = False
-        """True if a file of an added robot could not be read. Its contents are then unknown."""
+        """Whether a file of an added robot could not be read. Its contents are then unknown."""
         self._not_added: set[str] = set()
         """Robots, variables and constraints that could not be added."""
 
@@ -125,7 +125,7 @@ class _ScenarioReader:
         return ScenarioEvent(tuple(changes), None if after == "solved" else int(after.split()[0]))
 
     def _changes(self, element: etree._Element) -> Iterator[tuple[int, Change]]:
-        """Yield the changes in `element`, each with its line."""
+        """Yield the changes in `element`, with their line numbers."""
         if element.tag == "add_constraint":
             yield from self._added_constraints(element)
         elif element.tag == "add_agent":
@@ -136,7 +136,7 @@ class _ScenarioReader:
             yield line(element), self._change(element)
 
     def _change(self, element: etree._Element) -> Change:
-        """Return the change in an element that refers to no other file."""
+        """Return the change in an element that does not refer to another file."""
         match element.tag:
             case "remove_agent":
                 return RemoveAgent(attribute(element, "name"))
@@ -158,7 +158,7 @@ class _ScenarioReader:
         return read_integer(word)
 
     def _read_added_robot(self, name: str) -> Robot | None:
-        """Return the robot in the file `name`; None if the file has mistakes, which are added to the report."""
+        """Return the robot in the file `name`, or None if the file has errors. The errors are added to the report."""
         if not _inside(self._folder, name).is_file():
             self._not_added.add(Path(name).stem)
             self._has_unread_file = True
@@ -214,13 +214,13 @@ class _ScenarioReader:
             return
 
     def _report_in_robot_file(self, robot: Robot, bad: ChangeError, place: int) -> None:
-        """Add a mistake in an added robot's file. The robot joins without the wrong part."""
+        """Add an error in an added robot's file. The robot joins without the invalid part."""
         if not self._is_consequence(bad):
             message = f"{bad.message}, when {SCENARIO}:{place} adds this robot"
             self._robot_mistakes.append(Diagnostic(robot.file, bad.line, message, bad.hint))
 
     def _is_consequence(self, bad: ChangeError) -> bool:
-        """Return whether `bad` may only follow from a mistake that was reported before."""
+        """Return whether `bad` may be a consequence of an error that was reported before."""
         return bool(bad.missing) and (self._has_unread_file or bad.missing in self._not_added)
 
 

@@ -25,7 +25,7 @@ from robochoc.model.problem import (
 def team_files(team: Team) -> dict[str, bytes]:
     """Return the contents of the files of a valid team, by path: its robots, and its scenario if it has one.
 
-    The definitions of constraints that an event adds are in the file of the robot that gets the constraint.
+    The definitions of constraints added by an event are in the file of the robot that gets the constraint.
 
     Raises:
         ValueError: if a robot cannot be written (`robot_xml`).
@@ -56,18 +56,18 @@ def team_files(team: Team) -> dict[str, bytes]:
 
 
 class _File:
-    """The file of a robot, with the definitions of constraints that events add."""
+    """The file of a robot, including the definitions of constraints added by events."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
         self._added: list[tuple[Constraint, etree._Element]] = []
 
     def add(self, constraint: Constraint, holder: etree._Element) -> None:
-        """Add a constraint of an event, whose element belongs into `holder`."""
+        """Add a constraint from an event. Its element belongs in `holder`."""
         self._added.append((constraint, holder))
 
     def content(self) -> bytes:
-        """Return the contents of the file, and move the elements of the added constraints into their events.
+        """Return the contents of the file, after moving the elements of the added constraints to their events.
 
         The added constraints are first written as private ones, so that their definitions are written too.
         """
@@ -116,7 +116,7 @@ def _element(change: RemoveAgent | RemoveValue | AddValue | RemoveConstraint, te
 
 
 def _free_path(name: str, taken: Mapping[str, object]) -> str:
-    """Return a free path for the file of a robot that joins, perhaps several times."""
+    """Return an unused path for the file of a joining robot, which may join several times."""
     path, number = f"late/{name}.xml", 1
     while path in taken:
         number += 1

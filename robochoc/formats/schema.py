@@ -1,4 +1,4 @@
-"""Validate XML files by their XSD schemas, with libxml2's messages in plain words."""
+"""Validate XML files against their XSD schemas, and report libxml2's messages in plain words."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from lxml.etree import _Element
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened
 
 _LIBXML2 = Lock()
-"""The lock for every use of a schema: robots of one machine may read their files in threads.
+"""The lock for every use of a schema, because robots on one machine may read their files in threads.
 
-libxml2 initialises the types of all schemas while it compiles the first one, and two threads at a time would corrupt
-memory. And a schema has one error log in lxml, for all threads.
+libxml2 initialises the types of all schemas while it compiles the first schema, and two threads at a time would corrupt
+memory. Besides, in lxml a schema has a single error log for all threads.
 """
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "functions", "constraints"}
-"""The optional elements among those that libxml2 names where one is missing."""
+"""The optional elements among those that libxml2 lists when an element is missing."""
 
 _PARTS = (
     re.compile(r"Element '(?P<element>[^']*)'(?:, attribute '(?P<attribute>[^']*)')?: "),
@@ -49,7 +49,7 @@ _PHRASES = (
     ("Character content", "text inside <{element}>, where no text is allowed", "delete it"),
     ("", "{message}", "see the schemas in xsd/"),
 )
-"""A part of libxml2's message, the message in plain words, and the next step. The first match counts."""
+"""A part of libxml2's message, the message in plain words, and a suggestion. The first match counts."""
 
 _PATTERNS = {
     "'[A-Za-z][A-Za-z0-9_.]*'": "a name: a letter, then letters, digits, '.' and '_'",
@@ -63,7 +63,7 @@ _PATTERNS = {
 
 
 class SchemaError(InvalidInputError):
-    """An XML file that its schema refuses. It may have other mistakes too.
+    """Raised for an XML file that its schema refuses. The file may also have other errors.
 
     Attributes:
         tree: The parsed file.
@@ -97,7 +97,7 @@ def entries(error_log: object) -> list[LogEntry]:
 
 @cache
 def schema_for(root: str) -> etree.XMLSchema:
-    """Return the schema of files with that root element. It is compiled when the first of them is read.
+    """Return the schema for files with the root element `root`. It is compiled when the first such file is read.
 
     Schemas are in the package of a wheel, or at the top of a checkout.
     """
@@ -108,7 +108,7 @@ def schema_for(root: str) -> etree.XMLSchema:
 
 
 def refused_by(schema: etree.XMLSchema, tree: etree._Element) -> list[LogEntry]:
-    """Return the errors of `tree` by `schema`; none if it is valid."""
+    """Return the errors that `schema` finds in `tree`; empty if it is valid."""
     with _LIBXML2:
         return [] if schema.validate(tree) else entries(schema.error_log)
 
@@ -125,7 +125,7 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
     for entry in refused:
         parts = _parts(entry)
         if difflib.get_close_matches(parts["missing"], unknown.get(entry.path, [])):
-            continue  # one misspelt attribute is one mistake: `typ` is unknown, and so `type` is missing
+            continue  # one misspelt attribute is one error: `typ` is unknown, and therefore `type` is missing
         if parts["attribute"]:
             unknown.setdefault(entry.path, []).append(parts["attribute"])
         message, hint = next(phrase for sign, *phrase in _PHRASES if sign in parts["message"])
@@ -161,7 +161,7 @@ def _parts(entry: LogEntry) -> dict[str, str]:
 
 _REMOVABLE = {"constraint", "topic", "agent"}
 _ROUNDS = 2
-"""An element may lack an attribute after a misspelt one was removed: a second round finds that."""
+"""The number of rounds. The second round finds attributes that are missing after a misspelt one was removed."""
 
 _ATTRIBUTE = re.compile(r", attribute '([^']*)'")
 _LACKS_ATTRIBUTE = "is required but missing"
@@ -170,10 +170,10 @@ _TEXT = "Character content"
 
 
 def without_schema_errors(tree: etree._Element, schema: etree.XMLSchema) -> etree._Element | None:
-    """Remove invalid parts from `tree` and return it. None: too much would have to be removed.
+    """Remove the invalid parts of `tree` and return it, or return None if too much would have to be removed.
 
     Only parts to which nothing else refers are removed: attributes, unknown elements, constraints, topics, neighbours.
-    Otherwise one mistake would be reported several times. So mistakes of other layers can be reported as well.
+    Otherwise one error would be reported several times. The removal lets other layers report their errors as well.
     """
     for _ in range(_ROUNDS):
         mistakes = refused_by(schema, tree)
@@ -189,13 +189,13 @@ def without_schema_errors(tree: etree._Element, schema: etree.XMLSchema) -> etre
 def _element(document: etree._ElementTree, path: str | None) -> etree._Element | None:
     try:
         found = document.xpath(path) if path else []
-    except etree.XPathEvalError:  # a prefix that the file has not declared
+    except etree.XPathEvalError:  # the file has not declared this prefix
         return None
     return found[0] if isinstance(found, list) and len(found) == 1 and isinstance(found[0], _Element) else None
 
 
 def _repair(element: etree._Element, message: str) -> bool:
-    """Remove the part of `element` that the `message` of the schema is about. Return False if it cannot be removed."""
+    """Remove the part of `element` named in the schema's `message`. Return False if it cannot be removed."""
     attribute = _ATTRIBUTE.search(message)
     if attribute:
         element.attrib.pop(attribute[1], "")
@@ -213,7 +213,7 @@ def _repair(element: etree._Element, message: str) -> bool:
 
 
 def _remove(element: etree._Element) -> bool:
-    """Remove `element`, and the number of elements that its parent states."""
+    """Remove `element`, and the element count stated by its parent."""
     parent = element.getparent()
     if parent is None:
         return False

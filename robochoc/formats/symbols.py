@@ -23,17 +23,17 @@ _NUMBER = re.compile(r"[-+.0-9]+")
 
 
 class SymbolTable:
-    """The symbols in the files of a team, in the order of their first use: the index of a symbol is its code."""
+    """The symbols in a team's files, in the order of their first use. The index of a symbol is its code."""
 
     def __init__(self, known: Sequence[str] = ()) -> None:
-        """Start with the symbols `known`, whose codes are their indices."""
+        """Start with the symbols `known`. Their codes are their indices."""
         self._codes = {name: code for code, name in enumerate(known)}
         self._declared: set[str] = set()
         self._mentioned: dict[str, tuple[str, int]] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
-        """All symbols so far, by their codes."""
+        """All symbols so far, in the order of their codes."""
         return tuple(self._codes)
 
     def declare(self, word: str) -> int:
@@ -43,13 +43,13 @@ class SymbolTable:
         return code
 
     def mention(self, word: str, file: str, line: int) -> int:
-        """Return the code of a symbol that is used elsewhere, in that `line` of a file. Raises `MistakeError`."""
+        """Return the code of a symbol used outside a domain, in that `line` of a file. Raises `MistakeError`."""
         code = self._code(word)
         self._mentioned.setdefault(word, (file, line))
         return code
 
     def undeclared(self) -> Iterator[Diagnostic]:
-        """Yield the symbols that are in no domain of any file."""
+        """Yield the symbols that do not occur in any domain of any file."""
         for word, (file, line) in self._mentioned.items():
             if word not in self._declared:
                 hint = suggestion(word, sorted(self._declared), "symbols")
@@ -66,7 +66,7 @@ class SymbolTable:
 
 
 def check_symbol(word: str) -> None:
-    """Raise `MistakeError` unless `word` can be a symbol."""
+    """Raise `MistakeError` unless `word` is a valid symbol."""
     if not _SYMBOL.fullmatch(word) or _NUMBER.fullmatch(word):
         hint = f"expected a name of at most {MAX_SYMBOL} characters: no number, no blank, none of | : ' \" < > &"
         raise MistakeError(f"'{shortened(word)}' cannot be a symbol", hint)
@@ -84,7 +84,7 @@ def check_symbolic_domain(domain: Domain) -> None:
 
 
 def check_table(names: Sequence[str]) -> None:
-    """Raise `MistakeError` unless `names` can be the symbols of a team."""
+    """Raise `MistakeError` unless `names` are valid symbols of a team."""
     if len(names) > MAX_VALUES:
         raise MistakeError(f"more than {MAX_VALUES} symbols", "use fewer")
     for word in names:
@@ -103,7 +103,7 @@ def check_one_table(robot: Robot) -> None:
 
 
 def check_symbolic_definition(definition: Definition, table: Sequence[str]) -> None:
-    """Raise `MistakeError` unless symbolic parameters or columns of a definition exist, and codes are in `table`."""
+    """Raise `MistakeError` unless a definition's symbolic parameters or columns exist, and codes are in `table`."""
     if not isinstance(definition, Relation):
         unknown = [name for name in definition.symbolic if name not in definition.parameters]
         if unknown:
@@ -137,7 +137,7 @@ def check_argument_types(constraint: Constraint, symbolic: Mapping[str, bool]) -
             message = f"{name} expects {_TYPES[bool(wanted)]}, but '{term}' is {_TYPES[bool(kind)]}"
             raise MistakeError(message, "write symbol X or int X among its parameters, like the argument")
     if isinstance(constraint.definition, Relation):
-        return  # a column of a relation without tuples fits any domain
+        return  # a column in a relation without tuples fits any domain
     loose = {
         kind: term for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True) if wanted is None
     }
@@ -162,7 +162,7 @@ def mistyped_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def different_tables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots, built in Python, whose symbols have other codes than those of the first robot with symbols."""
+    """Yield robots built in Python whose symbols have other codes than in the first robot with symbols."""
     first: Robot | None = None
     for robot in members.robots:
         if robot.symbol_table:
@@ -182,7 +182,7 @@ _ONE_TABLE = "use one table in all domains of a team; the ranges of a domain sel
 
 
 def _kinds(definition: Definition) -> list[bool | None]:
-    """Return for each parameter whether it is a symbol; None if both are possible."""
+    """Return, for each parameter, whether it is a symbol, or None if both are possible."""
     if isinstance(definition, Relation):
         known = bool(definition.tuples or definition.symbolic)
         return [place in definition.symbolic if known else None for place in range(definition.arity)]
@@ -192,7 +192,7 @@ def _kinds(definition: Definition) -> list[bool | None]:
 
 
 def codes_of(words: Collection[str], table: SymbolTable) -> list[int]:
-    """Return the codes of the symbols of a domain, in ascending order. Raises `MistakeError`."""
+    """Return the codes of the symbols in a domain, in ascending order. Raises `MistakeError`."""
     codes: set[int] = set()
     for word in words:
         code = table.declare(word)

@@ -1,4 +1,4 @@
-"""Check the robots of a team against each other: their neighbours, costs, variables and shared constraints.
+"""Check that the robots of a team are consistent: their neighbours, costs, variables and shared constraints.
 
 docs/reference/format.md, "The team", and "One robot" on n-ary constraints.
 """
@@ -18,11 +18,11 @@ from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Constraint, ConstraintModel, Parent, Robot
 
 MAX_BETWEEN = 1000
-"""The maximum number of mistakes between the robots of one team that are reported."""
+"""The maximum number of reported errors between the robots of a team."""
 
 
 def check_between_robots(members: TeamMembers) -> list[Diagnostic]:
-    """Return the mistakes between the robots of a team."""
+    """Return the errors between the robots of a team."""
     return list(islice(_between(members), MAX_BETWEEN))
 
 
@@ -45,7 +45,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield neighbours that the team lacks."""
+    """Yield neighbours that are missing in the team."""
     known = dict.fromkeys([*members.files, *sorted(members.broken)])
     for entry in members.entries.values():
         if entry.other not in known:
@@ -56,7 +56,7 @@ def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield pairs of neighbours that do not agree which of them is the parent."""
+    """Yield pairs of neighbours that disagree about which of them is the parent."""
     for entry in members.entries.values():
         name, other = entry.robot.name, entry.other
         answer = members.entries.get((other, name))
@@ -70,7 +70,7 @@ def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield cycles of parents. No two of them have a link in common."""
+    """Yield cycles of parents. No two cycles have a common link."""
     parents = {name: set(agreed) for name, agreed in members.agreed.items()}
     while True:
         try:
@@ -88,7 +88,7 @@ def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots that differ from most others in being a DisCSP or a DisWCSP."""
+    """Yield robots whose kind of problem (DisCSP or DisWCSP) differs from that of most other robots."""
     usual = Counter(robot.kind for robot in members.robots).most_common(1)
     for robot in members.robots:
         if robot.kind is not usual[0][0]:
@@ -99,7 +99,7 @@ def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def mixed_costs(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots whose objective, or unit of costs, differs from that of most others."""
+    """Yield robots whose objective or unit of costs differs from that of most other robots."""
     usual = Counter((robot.costs.maximize, robot.costs.places) for robot in members.robots).most_common(1)
     for robot in members.robots:
         maximize, places = robot.costs.maximize, robot.costs.places
@@ -129,10 +129,10 @@ def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield robots that precede one of their parents in the order of a team that was built in Python."""
+    """Yield robots that precede one of their parents in the order of a team built in Python."""
     rank = {name: place for place, name in enumerate(members.order)}
     if not members.ranks:
-        return  # the links themselves have a mistake
+        return  # the links themselves are invalid
     for name, parents in members.agreed.items() if rank else ():
         late = next((parent for parent in parents if rank[parent] > rank[name]), None)
         if late is not None:
@@ -142,7 +142,7 @@ def out_of_order(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield constraints with parents that are listed under the wrong robot or parent."""
+    """Yield constraints listed under the wrong robot or under the wrong parent."""
     for robot in members.robots:
         if members.has_all_parents(robot.name):
             near = {robot.name, *members.agreed[robot.name]}
@@ -157,7 +157,7 @@ def misplaced_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
 def _unrelated_variable(
     members: TeamMembers, near: set[str], parent: Parent, constraint: Constraint
 ) -> tuple[str, str] | None:
-    """Return the mistake if a variable of the scope belongs to no robot in `near`: the robot and its parents."""
+    """Return the error if a variable in the scope belongs to no robot in `near`, the robot and its parents."""
     for name in constraint.variables:
         owners = members.owners.get(name, [])
         if not owners and not members.broken:
@@ -172,10 +172,10 @@ def _unrelated_variable(
 
 
 def _wrong_parent(members: TeamMembers, robot: Robot, parent: Parent, constraint: Constraint) -> tuple[str, str] | None:
-    """Return the mistake if the constraint does not belong under `parent`."""
+    """Return the error if the constraint does not belong under `parent`."""
     found = [members.owners.get(name, []) for name in constraint.variables]
     if any(len(owners) != 1 for owners in found):
-        return None  # reported as another mistake
+        return None  # reported as another error
     others = {owners[0] for owners in found} - {robot.name}
     if parent.name not in others:
         message = f"the scope has no variable of the parent '{parent.name}', under which the constraint is listed"
@@ -203,7 +203,7 @@ def misplaced_parts(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def _third_variable(members: TeamMembers, robot: Robot, child: str, part: Constraint) -> tuple[str, str] | None:
-    """Return the mistake if a variable of the part belongs to neither of the two robots."""
+    """Return the error if a variable in the part belongs to neither of the two robots."""
     own, others = members.own[robot.name], members.own[child]
     for name in part.variables:
         if name not in own and name not in others:
@@ -213,7 +213,7 @@ def _third_variable(members: TeamMembers, robot: Robot, child: str, part: Constr
 
 
 def _hidden_variable(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
-    """Return the mistake if the parent's part has a variable that `child` shows to no robot."""
+    """Return the error if the parent's part contains a variable that `child` shows to no robot."""
     if members.broken:
         return None
     robot = members.files[child].robot
@@ -227,7 +227,7 @@ def _hidden_variable(members: TeamMembers, child: str, part: Constraint) -> tupl
 
 
 def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield variables that a child's constraints need, but its parent's file does not list for it."""
+    """Yield variables that a child's constraints need but the parent's file does not list for the child."""
     for robot in members.robots:
         for child in robot.children:
             if (

@@ -1,4 +1,4 @@
-"""The robots of a team, from files or built in Python, with data that the checks of the team share."""
+"""The robots of a team, from files or built in Python, with data used by several checks of the team."""
 
 from __future__ import annotations
 
@@ -20,25 +20,25 @@ class NeighbourRole(StrEnum):
 
     @property
     def opposite(self) -> NeighbourRole:
-        """Return the role that the robot has for this neighbour."""
+        """Return the robot's role from the neighbour's point of view."""
         return NeighbourRole.CHILD if self == NeighbourRole.PARENT else NeighbourRole.PARENT
 
 
 @dataclass(frozen=True)
 class TeamMember:
-    """A robot with the locations of its parts, and further contents of its file."""
+    """A robot with the locations of its parts, and further data from its file."""
 
     robot: Robot
     places: Locations
     copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
-    """By child: copies of its TKC constraints, which the original platform's files list with the parent."""
+    """By child: copies of its TKC constraints, which the original platform's files also list with the parent."""
     implied_children: frozenset[str] = frozenset()
-    """The children without the attribute `variable`: the variables that they must know follow from the scopes."""
+    """Children without the attribute `variable`. The variables that they must know follow from the scopes."""
 
 
 @dataclass(frozen=True)
 class NeighbourEntry:
-    """The entry of a neighbour: a line of a robot's file, or an object."""
+    """The entry of a neighbour: a line in a robot's file, or an object."""
 
     robot: Robot
     other: str
@@ -50,9 +50,9 @@ class NeighbourEntry:
 class TeamMembers:
     """The valid robots of a team.
 
-    `broken` names the robots that have mistakes of their own. Checks that would need them are left out, so that no
-    mistake is reported twice. `order` is the order of the robots of a team that was built in Python; without it, the
-    order follows from the links.
+    `broken` contains the robots that are invalid by themselves. Checks that need these robots are skipped, so that no
+    error is reported twice. `order` is the order of the robots in a team built in Python; without it, the order follows
+    from the links.
     """
 
     files: Mapping[str, TeamMember]
@@ -87,7 +87,7 @@ class TeamMembers:
 
     @cached_property
     def agreed(self) -> dict[str, list[str]]:
-        """The parents of each robot that list it as a child."""
+        """The parents of each robot, limited to parents that list it as a child."""
         return {
             robot.name: [parent.name for parent in robot.parents if self.is_parent(parent.name, robot.name)]
             for robot in self.robots
@@ -99,7 +99,7 @@ class TeamMembers:
 
     @cached_property
     def owners(self) -> dict[str, list[str]]:
-        """The robots that own each variable: one, unless that is a mistake."""
+        """The robots that own each variable. More than one owner is an error."""
         owners: dict[str, list[str]] = {}
         for robot in self.robots:
             for variable in robot.variables:
@@ -108,9 +108,9 @@ class TeamMembers:
 
     @cached_property
     def ranks(self) -> tuple[Mapping[str, int], ...]:
-        """Each robot's place in the priority order; empty if mistakes leave the order unknown.
+        """Each robot's index in the priority order; empty if errors leave the order unknown.
 
-        Several orders may respect the links: the first is the one that readers of files compute, the second `order`.
+        Several orders may respect the links. The first is the one computed by readers of files, the second is `order`.
         """
         if self.broken or not all(self.has_all_parents(name) for name in self.files):
             return ()
@@ -127,7 +127,7 @@ class TeamMembers:
 
     @cached_property
     def _used(self) -> dict[str, dict[str, Constraint]]:
-        """For each robot the variables in its shared constraints, with the first constraint that uses each."""
+        """For each robot, the variables in its shared constraints, each with the first constraint that uses it."""
         used: dict[str, dict[str, Constraint]] = {}
         for robot in self.robots:
             first = used[robot.name] = {}
@@ -137,7 +137,7 @@ class TeamMembers:
         return used
 
     def needed(self, parent: str, child: str) -> dict[str, Constraint]:
-        """Return the variables of `parent` in shared constraints of `child`, with the first that uses each."""
+        """Return the variables of `parent` in shared constraints of `child`, each with the first such constraint."""
         used = self._used[child]
         return {variable: used[variable] for variable in self.own[parent] if variable in used}
 

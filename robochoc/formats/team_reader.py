@@ -1,4 +1,4 @@
-"""Find and read teams: folders with one XML file per robot. The robots are also checked against each other."""
+"""Find and read teams: folders with one XML file per robot. The robots are also checked for consistency."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate quee
 def find_teams(path: Path | str) -> list[Path]:
     """Return the folders of teams at `path` or below, in natural order.
 
-    A folder with XML files is a team, and is not searched; other folders are, except hidden ones and symbolic links.
+    A folder with XML files is a team, and is not searched. Other folders are searched, except hidden ones and links.
 
     Raises:
         InvalidInputError: if there is no team, or a folder cannot be read.
@@ -44,7 +44,7 @@ def read_team(folder: Path | str) -> Team:
         folder: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time.
 
     Raises:
-        InvalidInputError: with all mistakes of the files, and between them.
+        InvalidInputError: with all errors in the files, and between them.
     """
     folder = Path(folder)
     paths = [folder / name for name in _xml_files(_listing(folder)) if name != SCENARIO]
@@ -81,7 +81,7 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
     """Return the names of the robots whose files are in `folder`, in natural order. No file is opened.
 
     Raises:
-        InvalidInputError: if the folder cannot be read, or has no robot.
+        InvalidInputError: if the folder cannot be read, or contains no robot.
     """
     names = tuple(Path(name).stem for name in _xml_files(_listing(Path(folder))) if name != SCENARIO)
     if not names:
@@ -90,7 +90,7 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
 
 
 def _in_one_unit(folder: Path, files: dict[str, RobotFile], found: list[Diagnostic]) -> dict[str, RobotFile]:
-    """Return `files` with costs in their finest unit, that of the scenario included. Mistakes are added to `found`."""
+    """Return `files` with costs in their finest unit, which includes the scenario. Errors are added to `found`."""
     if not any(file.robot.kind == ProblemKind.DISWCSP for file in files.values()):
         return files
     places = max(file.robot.costs.places for file in files.values())
@@ -111,7 +111,7 @@ def _assembled(folder: Path, members: TeamMembers) -> Team:
 
 
 def _with_implied_variables(members: TeamMembers, name: str) -> Robot:
-    """Return the robot `name`, with the variables that its children must know, also where its file implies them."""
+    """Return the robot `name` with the variables that its children must know, even if its file only implies them."""
     file = members.files[name]
     children = []
     for child in file.robot.children:
@@ -135,7 +135,7 @@ def _teams(top: Path) -> Iterator[Path]:
 
 
 def _xml_files(entries: Iterable[os.DirEntry[str]]) -> Iterator[str]:
-    """Return the names of files that end in .xml and are not hidden. Their contents are not checked."""
+    """Yield the names of files that end in .xml and are not hidden. Their contents are not checked."""
     return (entry.name for entry in entries if entry.name.endswith(".xml") and not entry.name.startswith("."))
 
 

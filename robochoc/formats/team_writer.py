@@ -1,4 +1,4 @@
-"""Write a team as a folder of XML files: completely, or not at all."""
+"""Write a team as a folder of XML files, either completely or not at all."""
 
 from __future__ import annotations
 
@@ -17,28 +17,28 @@ from robochoc.model.problem import Team
 from robochoc.system.files import errors_naming, resolved
 
 SKETCH_FILE = "sketch.json"
-"""The file in a team's folder in which `robochoc app` saves the drawing of the team."""
+"""The file in a team's folder where `robochoc app` saves the drawing of the team."""
 GROUND_FILE = "map.json"
-"""The file in a team's folder with the places of its robots on a map, and blocked cells: `robochoc fly --map`."""
+"""The file in a team's folder with the robots' positions on a map, and blocked cells: `robochoc fly --map`."""
 _ALWAYS_READABLE = 1024 * 1024
-"""A file of a valid robot that is not larger, in bytes, is within the limits of its reader."""
+"""The file size in bytes up to which a valid robot's file is certainly within the limits of its reader."""
 
 
 def write_team(
     team: Team, folder: Path, *, replace: bool = False, extra_files: Mapping[str, bytes] = MappingProxyType({})
 ) -> None:
-    """Write the XML files of the robots of `team`, and its scenario. The folder is then complete, or does not exist.
+    """Write the XML files of the robots in `team`, and its scenario. The folder is then complete, or does not exist.
 
     Args:
         team: A valid team.
         folder: The folder to be written.
-        replace: Whether an existing folder of a team is replaced. It may only contain XML files, and files that an
-            import, the application or a problem on a map writes.
+        replace: Whether an existing folder of a team is replaced. It may contain only XML files, and files written by
+            an import, the application or a problem on a map.
         extra_files: The contents of further files in the folder, by name.
 
     Raises:
         InvalidInputError: if the team is invalid, files cannot express it, or the folder exists and is not replaced.
-        OSError: if it cannot be written.
+        OSError: if the folder cannot be written.
     """
     import secrets  # noqa: PLC0415 - start-up: only to write a team
     import shutil  # noqa: PLC0415 - the same
@@ -70,7 +70,7 @@ def write_team(
 
 
 def _check_size(path: str, content: bytes) -> None:
-    """Raise `InvalidInputError` if a robot's file would be rejected by its reader, as too large."""
+    """Raise `InvalidInputError` if the reader would reject a robot's file as too large."""
     if len(content) > _ALWAYS_READABLE and path != SCENARIO:
         robot_in(content, Path(path).stem)
 

@@ -1,7 +1,7 @@
-"""Check copies of TKC constraints: the original platform's files list these with the child and with the parent.
+"""Check copies of TKC constraints: the original platform's files list them with both the child and the parent.
 
-For each set of variables, all constraints on it are compared together: by their definitions and, where these differ, by
-trying every tuple.
+For each set of variables, all constraints on the set are compared together: first by their definitions, and if these
+differ, by trying every tuple.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def _by_variables(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], li
 
 
 def _content(group: Iterable[Constraint]) -> Counter[Hashable]:
-    """Return the contents of the constraints without their names and the names of their definitions."""
+    """Return the contents of the constraints without the names of constraints and definitions."""
     contents: Counter[Hashable] = Counter()
     for constraint in group:
         definition = constraint.definition
@@ -96,9 +96,9 @@ def _difference(
     domains: Mapping[str, Domain],
     units: CostUnits,
 ) -> str:
-    """Return the first difference between the two groups in words; empty if there is none. Costs are in `units`."""
+    """Return the first difference between the two groups in words; empty if they are equal. Costs are in `units`."""
     if any(variable not in domains for variable in variables):
-        return ""  # of a robot whose file is broken
+        return ""  # variables of a robot whose file is invalid
     if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
         return (
             "has another definition than the child's constraint, and its tuples are too many to compare"

@@ -1,6 +1,6 @@
-"""Read TOML with bounds: the time and memory of `tomllib` grow with the square of the length of a dotted key.
+"""Read TOML with limits: the time and memory of `tomllib` grow with the square of the length of a dotted key.
 
-The tables of `tomllib` have no line numbers: these are found in the text when an error is reported.
+The tables of `tomllib` have no line numbers, so lines are searched in the text when an error is reported.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from robochoc.system.decode_errors import describe_decode_error, place_of
 
 _Kind = TypeVar("_Kind")
 MAX_PARTS = 16
-"""The maximum number of parts of a dotted key. No file of robochoc needs more than three."""
+"""The maximum number of parts in a dotted key. No file of robochoc needs more than three."""
 _HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
 _STEP = re.compile(r"\[(\d+)\]$")
 _PART = r"""(?:[\w-]++|"(?:[^"\\\n]|\\.)*+"|'[^'\n]*+')[ \t]*+"""
@@ -46,11 +46,11 @@ def convert(tables: object, kind: type[_Kind], text: str, hint: str, table: str 
         tables: The decoded TOML.
         kind: The struct.
         text: The text of the file.
-        hint: The next step after an error.
-        table: The name of the table in the file. Empty: `tables` are the whole file.
+        hint: A suggestion to the user in case of an error.
+        table: The name of the table in the file. Empty: `tables` contains the whole file.
 
     Raises:
-        MistakeError: if the tables do not fit the fields of the struct; with the line.
+        MistakeError: if the tables do not fit the fields of the struct. It contains the line.
     """
     try:
         return msgspec.convert(tables, kind)
@@ -70,7 +70,7 @@ def line_of(text: str, table: str, key: str = "", number: int = 0) -> int:
         text: The text of the file.
         table: The name of the table. Empty: keys before all tables.
         key: The key. Empty: the table itself.
-        number: Which of several tables of that name, from 0.
+        number: The index among several tables with that name, from 0.
 
     Returns:
         The line of the key, or of the table if the key is not found in it; 0 if neither is found.
@@ -96,6 +96,6 @@ def line_of(text: str, table: str, key: str = "", number: int = 0) -> int:
 
 
 def _line_of_value(text: str, name: str) -> int:
-    """Return the line of a value, by its dotted name."""
+    """Return the line of a value. `name` is its dotted name."""
     table, _, key = name.rpartition(".")
     return line_of(text, table, key) if key else 0

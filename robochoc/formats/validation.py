@@ -1,8 +1,8 @@
 """Validate teams by the rules of docs/reference/format.md.
 
-The reader of a team has applied the same rules. A team that was built in Python, by hand, by a generator or by a
-change, is validated before it is solved or written. Valid teams are remembered for as long as the objects exist: teams
-are immutable, and `dataclasses.replace` creates another object.
+The reader of a team has already applied the same rules. A team built in Python, by hand, by a generator or by a
+change, is validated before it is solved or written. Valid teams are cached for as long as the objects exist: teams are
+immutable, and `dataclasses.replace` creates another object.
 """
 
 from __future__ import annotations
@@ -35,14 +35,14 @@ _NO_CHANGES = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
 
 _valid: dict[int, weakref.ref[Team]] = {}
-"""The teams that are known to be valid, by `id`: hashing a team would take as long as validating it."""
+"""The teams known to be valid, by `id`, since hashing a team would take as long as validating it."""
 
 
 def check_team(team: Team) -> None:
-    """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (docs/reference/format.md).
+    """Raise `InvalidInputError` with every error in `team`, unless it is valid (docs/reference/format.md).
 
-    The messages are those for files, with the robot and its part instead of the file and the line. A team that was
-    found valid before is not validated again.
+    The messages are those for files, but contain the robot and its part instead of the file and the line. A team that
+    is known to be valid is not validated again.
     """
     if is_known_valid(team):
         return
@@ -55,7 +55,7 @@ def check_team(team: Team) -> None:
 def check_writable(team: Team) -> None:
     """Raise `InvalidInputError` unless `team` is valid, and files can express it.
 
-    Files have no order but that of the links, and no `Robot.shown`, which some changes of a team set.
+    Files determine the order only by links, and do not contain `Robot.shown`, which is set by some changes of a team.
     """
     check_team(team)
     found = [
@@ -76,16 +76,16 @@ def check_writable(team: Team) -> None:
 
 
 def check_robot(robot: Robot) -> None:
-    """Raise `InvalidInputError` if `robot` has mistakes that can be found without its neighbours."""
+    """Raise `InvalidInputError` if `robot` has errors that can be found without its neighbours."""
     found = RobotValidator().mistakes(robot)
     if found:
         raise InvalidInputError(_numbered(found))
 
 
 def check_event(team: Team, event: ScenarioEvent) -> None:
-    """Raise `InvalidInputError` if `event`, for `team`, contains invalid robots, constraints or values.
+    """Raise `InvalidInputError` if `event`, intended for `team`, contains invalid robots, constraints or values.
 
-    Changes that are impossible for this team are allowed: the team may have lost the robots that they concern.
+    Changes that are impossible for this team are allowed, because the team may have lost the affected robots.
     """
     place = Location("an event")
     found = list(_type_mistakes(event, ScenarioEvent, place)) or [
@@ -110,7 +110,7 @@ def _excessive_changes(team: Team, changes: Iterable[Change], place: Location) -
 def with_checked_events(
     environment: Callable[[Team, _Ended, float | None], ScenarioEvent | None],
 ) -> Callable[..., ScenarioEvent | None]:
-    """Return `environment`, whose events are validated before they happen."""
+    """Return `environment` with its events validated before they happen."""
 
     def checked(team: Team, ended: _Ended, left_s: float | None) -> ScenarioEvent | None:
         event = environment(team, ended, left_s)
@@ -122,19 +122,19 @@ def with_checked_events(
 
 
 def note_valid(team: Team) -> None:
-    """Remember that `team` is valid: it has been validated here, or by its reader."""
+    """Record that `team` is valid, after its validation here or by its reader."""
     key = id(team)
     _valid[key] = weakref.ref(team, lambda _: _valid.pop(key, None))
 
 
 def is_known_valid(team: Team) -> bool:
-    """Return whether this object was found valid before."""
+    """Return whether this object is already known to be valid."""
     known = _valid.get(id(team))
     return known is not None and known() is team
 
 
 def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
-    """Yield `found`, with numbers for equal diagnostics: two objects may have the same name and scope."""
+    """Yield `found`, with numbers added to equal diagnostics, since two objects may have the same name and scope."""
     seen: Counter[Diagnostic] = Counter()
     for mistake in found:
         seen[mistake] += 1
@@ -142,7 +142,7 @@ def _numbered(found: Iterable[Diagnostic]) -> Iterator[Diagnostic]:
 
 
 def _team_mistakes(team: Team) -> list[Diagnostic]:
-    """Return the mistakes that prevent further checks: no robots, or objects of other types."""
+    """Return the errors that prevent further checks: no robots, or objects of wrong types."""
     given: object = team
     place = Location("the team")
     found = list(_type_mistakes(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
@@ -194,7 +194,7 @@ def _robot_mistakes(team: Team) -> list[Diagnostic]:
 
 
 def _scenario_mistakes(team: Team) -> Iterator[Diagnostic]:
-    """Yield all mistakes of the first invalid event. Later ones might only follow from it."""
+    """Yield all errors in the first invalid event. Errors in later events might only be consequences."""
     now = replace(team, scenario=()) if team.scenario else team
     for number, event in enumerate(team.scenario, start=1):
         place = Location(f"event {number} of the scenario")
@@ -224,7 +224,7 @@ def _time_mistakes(event: ScenarioEvent, place: Location) -> Iterator[Diagnostic
 
 
 def _robots(team: Team, event: ScenarioEvent = _NO_CHANGES) -> dict[str, Robot]:
-    """Return the robots of `team`, and those that `event` adds, by name."""
+    """Return the robots in `team` and the robots added by `event`, by name."""
     coming = [change.robot for change in event.changes if isinstance(change, AddAgent)]
     return {robot.name: robot for robot in (*team.robots, *coming)}
 
@@ -239,7 +239,7 @@ def _check_symbol(variable: str, value: int, robots: Mapping[str, Robot]) -> Non
 
 
 def _check_same_places(robot: Robot, robots: Mapping[str, Robot]) -> None:
-    """Raise `MistakeError` unless a robot that joins has the same unit of costs as the robots of the team."""
+    """Raise `MistakeError` unless a joining robot has the same unit of costs as the robots in the team."""
     for other in robots.values():
         if other.costs.places != robot.costs.places:
             message = f"'{shortened(robot.name)}' has costs with {robot.costs.places} decimal places"
@@ -247,7 +247,7 @@ def _check_same_places(robot: Robot, robots: Mapping[str, Robot]) -> None:
 
 
 def _change_mistakes(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
-    """Yield mistakes of a change that do not depend on the rest of the team."""
+    """Yield errors in a change that do not depend on the rest of the team."""
     try:
         match change:
             case AddAgent(robot):

@@ -1,6 +1,6 @@
-"""Read XML files, which are not trusted: they must be well-formed, and valid by their schema.
+"""Read untrusted XML files. They must be well-formed, and valid against their schema.
 
-No entities, no DTD, no access to the network, a limited size, and regular files only.
+There are no entities, no DTD and no network access, the size is limited, and only regular files are read.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _SMALL = 64 * 1024
 _CHUNK = 1024
 
 BLANKS = " \t\r\n"
-"""The characters that XML counts as blanks."""
+"""The characters that count as blanks in XML."""
 _DOCTYPE = re.compile(rb"(?>\xef\xbb\xbf)?(?>[ \t\r\n]|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _HINTS = {
     etree.ErrorTypes.ERR_ATTRIBUTE_NOT_STARTED: 'write name="value"',
@@ -39,14 +39,14 @@ _HINTS = {
     etree.ErrorTypes.ERR_TAG_NOT_FINISHED: "close every element by its own end tag; is the file complete?",
     etree.ErrorTypes.ERR_UNDECLARED_ENTITY: "write the character itself: only &lt; &gt; &amp; &quot; &apos; are known",
 }
-"""The hints for libxml2's more frequent messages."""
+"""Hints for libxml2's frequent messages."""
 
 
 def read_xml(path: Path, root: str) -> etree._Element:
-    """Return the root element of the XML file `path`, which must be a `root` and valid by its schema.
+    """Return the root element of the XML file `path`. It must be a `root` element, valid against its schema.
 
     Raises:
-        InvalidInputError: if it is not well-formed, or with all errors by its schema.
+        InvalidInputError: if the file is not well-formed, or with all errors found by its schema.
     """
     try:
         content = _bytes(path, MAX_BYTES)
@@ -56,7 +56,7 @@ def read_xml(path: Path, root: str) -> etree._Element:
 
 
 def read_tree(path: Path, most: int, *, long_texts: bool = False) -> etree._Element:
-    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError`, as `read_xml`.
+    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError`, like `read_xml`.
 
     With `long_texts`, a text may have more than libxml2's usual limit of 10 million characters.
     """
@@ -68,7 +68,7 @@ def read_tree(path: Path, most: int, *, long_texts: bool = False) -> etree._Elem
 
 
 def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
-    """Return the root element of `content`, as `read_xml` does for a file at `path`. The content is not trusted."""
+    """Return the root element of the untrusted `content`, like `read_xml` for a file at `path`."""
     tree = parsed_tree(content, path, MAX_BYTES)
     if tree.tag != root:
         what = f"the root element is <{etree.QName(tree).localname}>"
@@ -83,10 +83,10 @@ def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
 
 
 def parsed_tree(content: bytes, path: Path, most: int, *, long_texts: bool = False) -> etree._Element:
-    """Return the root element of `content`, which is not trusted: no entities, no DTD, at most `most` bytes.
+    """Return the root element of the untrusted `content`, without entities and DTD, of at most `most` bytes.
 
     Raises:
-        InvalidInputError: if it is not valid. Messages use `path`.
+        InvalidInputError: if the content is invalid. Messages use `path`.
     """
     _check_text(content, path, most)
     doctype = _DOCTYPE.match(content)
@@ -100,7 +100,7 @@ def parsed_tree(content: bytes, path: Path, most: int, *, long_texts: bool = Fal
 
 
 def attribute(element: etree._Element, name: str) -> str:
-    """Return an attribute's text without blanks around it; empty where it is left out."""
+    """Return the text of an attribute, stripped of blanks; empty if the attribute is missing."""
     return (element.get(name) or "").strip(BLANKS)
 
 
@@ -112,7 +112,7 @@ def line(element: etree._Element) -> int:
 def _parser(
     schema: etree.XMLSchema | None = None, *, recover: bool = False, long_texts: bool = False
 ) -> etree.XMLParser:
-    """Return a parser that ignores comments and processing instructions, and reads UTF-8 whatever the file declares."""
+    """Return a parser that ignores comments and processing instructions, and always reads UTF-8."""
     return etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
@@ -127,10 +127,10 @@ def _parser(
 
 
 def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSchema) -> etree._Element:
-    """Return `tree`, cut off after the last mistake that is reported.
+    """Return `tree`, truncated after the last error that will be reported.
 
-    For each mistake lxml counts the preceding siblings, which takes hours for a million mistakes. A parser that
-    validates while it reads is fast, but has no line numbers: it only finds the place to cut.
+    For each error, lxml counts the preceding siblings, which takes hours for a million errors. A parser that validates
+    while it reads is fast, but has no line numbers, so it is used only to find where to truncate.
     """
     counting = _parser(schema)
     for start in range(0, len(content), _CHUNK):
@@ -164,7 +164,7 @@ def _bytes(path: Path, most: int) -> bytes:
 
 
 def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInputError:
-    """Return the first of the parser's messages as a diagnostic: the others follow from it."""
+    """Return the first of the parser's messages as a diagnostic. The other messages are consequences of it."""
     for first in entries(parser.error_log):
         what = re.split(r", (?:use|try) XML_PARSE_HUGE", first.message.strip())[0]
         return _invalid(

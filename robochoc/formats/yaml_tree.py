@@ -1,7 +1,7 @@
-"""Read YAML 1.1 as a tree with line numbers, with the values that pyDCOP's loader reads. Nothing is executed.
+"""Read YAML 1.1 as a tree with line numbers. The values are those of pyDCOP's loader. Nothing is executed.
 
-PyYAML only parses the events. The tree is built from them here, so that its depth and its size (aliases counted in
-full) are limited before it exists.
+PyYAML only parses the events. This module builds the tree, so that the depth and the size (with aliases counted in
+full) are limited before the tree exists.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import yaml  # noqa: TID251 - here, and nowhere else
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 
 MAX_BYTES = 64 * 1024 * 1024
-"""The maximum size of all files together."""
+"""The maximum size of all files together, in bytes."""
 MAX_DEPTH = 32
 """The maximum depth of nested lists and mappings."""
 MAX_NODES = 2_000_000
-"""The maximum number of values. Values of aliases count each time."""
+"""The maximum number of values. Values repeated by aliases count each time."""
 
 Scalar = None | bool | int | Fraction | float | str
-"""A single value. Floats of YAML are exact fractions; only infinities are floats."""
+"""A single value. YAML floats are exact fractions; only infinities are floats."""
 
 _LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CORE = "tag:yaml.org,2002:"
@@ -37,20 +37,20 @@ _MERGE = _CORE + "merge"
 Read = TypeVar("Read")
 _NOTHING_ASKED: frozenset[Scalar] = frozenset()
 _ALIKE = 0.75
-"""Keys with a higher similarity count as misspellings of each other."""
+"""Keys with a higher similarity are treated as misspellings of each other."""
 _Path = tuple["_Path", str | int] | None
-"""The path from the root to a value: the path to its parent, and its key or number there."""
+"""The path from the root to a value: the path to its parent, and the value's key or index in the parent."""
 
 
 class Node:
-    """A value of the file, with a record of the parts that a reader has used.
+    """A value in the file, with a record of the parts that a reader has used.
 
-    Readers have access to the parts only by `scalar`, `items`, `get` and `named`. Each marks its results as read, and
-    `read_yaml` rejects a file with a part that was not read. `skip` marks everything below as ignored on purpose.
+    Readers access the parts only by `scalar`, `items`, `get` and `named`. Each of these marks its results as read, and
+    `read_yaml` rejects a file with unread parts. `skip` marks everything below a value as ignored on purpose.
 
     Attributes:
-        line: The line of its beginning, from 1 on.
-        size: The number of values in it.
+        line: The line where the value begins, from 1.
+        size: The number of values it contains.
         is_named: Whether it has an anchor that an alias refers to.
     """
 
@@ -87,7 +87,7 @@ class Node:
 
     @property
     def scalar(self) -> Scalar:
-        """Return a single value; None for an empty one, a list or a mapping."""
+        """Return a single value, or None for an empty value, a list or a mapping."""
         if isinstance(self._value, (list, dict)):
             return None
         self._is_read = True
@@ -95,14 +95,14 @@ class Node:
 
     @property
     def items(self) -> list[Node] | None:
-        """Return the values of a list; None for anything else."""
+        """Return the values in a list, or None for anything else."""
         if not isinstance(self._value, list):
             return None
         self._is_read = True
         return self._value
 
     def get(self, key: str) -> Node | None:
-        """Return the value of a key; None if it is missing, or this is not a mapping."""
+        """Return the value of a key, or None if it is missing or this value is not a mapping."""
         if not isinstance(self._value, dict):
             return None
         self._is_read = True
@@ -119,7 +119,7 @@ class Node:
             yield from self._value.items()
 
     def skip(self) -> None:
-        """Ignore this value and everything in it."""
+        """Ignore this value and everything below it."""
         self._is_read = self._is_skipped = True
 
     def key_line(self, key: Scalar) -> int:
@@ -132,7 +132,7 @@ class Node:
         Args:
             key: The key.
             owner: The name of the mapping in messages.
-            hint: The next step.
+            hint: A suggestion to the user.
 
         Raises:
             MistakeError: if the key is missing. The message names a key that may be a misspelling.
@@ -154,11 +154,11 @@ class Node:
 
     @property
     def is_done(self) -> bool:
-        """Return whether it is a single value that a reader has used."""
+        """Return whether this is a single value that a reader has used."""
         return self._is_read and self.is_scalar
 
     def unread(self, path: _Path) -> Iterator[MistakeError | tuple[Node, _Path]]:
-        """Yield an error for each part that no reader has used, and the other parts, which are still to be checked.
+        """Yield an error for each part that no reader has used, and the remaining parts, which must still be checked.
 
         Args:
             path: The path to this value.
@@ -175,7 +175,7 @@ class Node:
                 if key in self._asked:
                     if not one.is_done:
                         yield one, (path, scalar_text(key))
-                elif not one.is_named:  # a part that is repeated by an alias need not be read here
+                elif not one.is_named:  # a part repeated by an alias need not be read here
                     yield self._unknown(key, path)
 
     def _unused(self, path: _Path) -> MistakeError:
@@ -199,7 +199,7 @@ class Node:
             self._value.append(node)
 
     def enter(self, key: Scalar, node: Node, line: int) -> bool:
-        """Add a key and its value to a mapping. Return whether the key is new there; merged ones do not count."""
+        """Add a key and its value to a mapping. Return whether the key is new there; merged keys do not count."""
         if isinstance(self._value, dict):
             self._value[key] = node
         if self._key_lines is None:
@@ -209,7 +209,7 @@ class Node:
         return is_new
 
     def merge(self, entries: Mapping[Scalar, Node]) -> None:
-        """Add the keys of another mapping that are not there yet."""
+        """Add those keys of another mapping that are not yet present."""
         if isinstance(self._value, dict):
             self._value.update({key: one for key, one in entries.items() if key not in self._value})
 
@@ -224,7 +224,7 @@ def _written(path: _Path) -> str:
 
 _PROBLEM = "a problem has a name, an objective, domains, variables and constraints"
 Repeated = Callable[[int, str], None]
-"""A function that handles a duplicate key, called with the line and the key. The later value counts."""
+"""A function called for each duplicate key, with the line and the key. The later value counts."""
 
 
 def read_yaml(
@@ -239,7 +239,8 @@ def read_yaml(
         repeated: Called for each duplicate key. None: duplicate keys are errors.
 
     Raises:
-        MistakeError: if the text is empty, is not valid YAML, or has a part that `read` did not use; with the line.
+        MistakeError: if the text is empty, is not valid YAML, or has a part that `read` did not use. It contains the
+            line.
     """
     root = _tree(text, expected, repeated or _refuse_repeated)
     found = read(root)
@@ -249,7 +250,7 @@ def read_yaml(
 
 
 def unread_parts(root: Node) -> list[MistakeError]:
-    """Return a mistake for each part below `root`, at any depth, that no reader has used."""
+    """Return an error for each part below `root`, at any depth, that no reader has used."""
     found: list[MistakeError] = []
     left: deque[tuple[Node, _Path]] = deque([(root, None)])
     while left:
@@ -263,7 +264,7 @@ def unread_parts(root: Node) -> list[MistakeError]:
 
 
 def root_keys(text: str) -> set[str]:
-    """Return the keys of the root mapping in `text`, which may be only the beginning of a file."""
+    """Return the keys of the root mapping in `text`, which may be just the beginning of a file."""
     keys, depth, is_key = set(), 0, True
     try:
         for event in yaml.parse(text, Loader=_LOADER):
@@ -280,7 +281,7 @@ def root_keys(text: str) -> set[str]:
             if depth > MAX_DEPTH:
                 break
     except (yaml.YAMLError, ValueError):
-        pass  # reported when the whole file is read
+        pass  # the error is reported when the whole file is read
     return keys
 
 
@@ -300,7 +301,7 @@ def _tree(text: str, expected: str, repeated: Repeated) -> Node:
 
 
 class _Composer:
-    """Builds the tree from events, with an explicit stack instead of recursion."""
+    """Builds the tree from events. It uses an explicit stack instead of recursion."""
 
     def __init__(self, expected: str, repeated: Repeated) -> None:
         self._expected = expected
@@ -361,7 +362,7 @@ class _Composer:
         return node
 
     def _add(self, node: Node, event: Any = None) -> None:  # noqa: ANN401 - an event, where it is a scalar's
-        """Put a finished value where it belongs."""
+        """Add a finished value to the list or mapping that contains it."""
         if not self._open:
             self._root = node
             return
@@ -419,7 +420,7 @@ class _Composer:
         return value if math.isinf(value) else Fraction(repr(value))
 
     def _constructed(self, tag: str, text: str) -> bool | int | float | str | None:
-        """Return a scalar with the value that PyYAML's safe loader constructs."""
+        """Return the value that PyYAML's safe loader constructs for a scalar."""
         node = yaml.ScalarNode(tag, text)
         match tag.removeprefix(_CORE):
             case "null":
@@ -436,7 +437,7 @@ class _Composer:
 
 @dataclass(slots=True)
 class _Open:
-    """A list or a mapping that is not complete yet, and the key whose value is next."""
+    """An incomplete list or mapping, and the key of the next value."""
 
     node: Node
     anchor: str | None
@@ -445,7 +446,7 @@ class _Open:
 
 
 def scalar_text(value: Scalar) -> str:
-    """Return `value` as Python's `str` does: pyDCOP compares this text with the words of a table."""
+    """Return `value` formatted like Python's `str`, because pyDCOP compares this text with the words in a table."""
     return repr(float(value)) if isinstance(value, Fraction) else str(value)
 
 

@@ -15,14 +15,14 @@ COLUMNS = (
     *("run", "epoch", "event", "t", "robot", "other", "type", "content", "bytes", "clock", "checks", "cost"),
     *("assignment", "verdict"),
 )
-"""The keys of all rows, in this order."""
+"""The keys of each row, in this order."""
 
 Row = dict[str, Any]
-"""An event as texts and numbers by key. Values that its kind lacks are None."""
+"""An event as texts and numbers by key. Values that do not exist for this kind of event are None."""
 
 
 def rows(path: Path | str) -> list[Row]:
-    """Return the events of a journal in order, one row each.
+    """Return the events in a journal in order, one row per event.
 
     All rows have the same keys: the number of the `run` and its `epoch`, the kind of `event` (`Sent`, `Received`,
     `Settled`, `Decided`, ...), its time `t`, the acting `robot`, the `other` robot of a message, the message's `type`,
@@ -30,11 +30,11 @@ def rows(path: Path | str) -> list[Row]:
     journal is damaged, a warning contains the place, and the rows before it are returned.
 
     Args:
-        path: The journal's file, as written by `--journal`.
+        path: The journal file, as written by `--journal`.
 
     Raises:
         JournalError: if the file is not a journal.
-        OSError: if it cannot be read.
+        OSError: if the file cannot be read.
     """
     journal = read_journal(Path(path).read_bytes())
     if journal.damage:
@@ -49,7 +49,7 @@ def rows(path: Path | str) -> list[Row]:
 
 
 def by_column(path: Path | str) -> dict[str, list[Any]]:
-    """Return the events of a journal as columns, with the keys of `rows`."""
+    """Return the events in a journal as columns, with the keys of `rows`."""
     found = rows(path)
     return {name: [row[name] for row in found] for name in COLUMNS}
 

@@ -1,4 +1,4 @@
-"""The frame of a journal: blocks in a chain of checksums, which detects missing, duplicate, moved and altered blocks.
+"""The frame of a journal: blocks chained by checksums, which reveal missing, duplicate, moved and altered blocks.
 
 docs/guides/journal.md describes every byte. The checksum is BLAKE2b (RFC 7693), the compression zlib (RFC 1950).
 """
@@ -13,32 +13,32 @@ from robochoc.journal.entries import JournalError
 from robochoc.system.errors import RobochocError
 
 MAGIC = b"\x89RJL\r\n\x1a\n"
-"""The first bytes of a journal. Like PNG's (RFC 2083), they are destroyed by transfers as text."""
+"""The first bytes of a journal. Like those of PNG (RFC 2083), they are destroyed by transfers in text mode."""
 FORMAT = 1
-"""The version of the frame, and of the columns within."""
+"""The version of the frame, and of the columns inside."""
 MAX_BLOCK_BYTES = 64 * 2**20
-"""The most uncompressed bytes of a block."""
+"""The maximum number of uncompressed bytes in a block."""
 LEVEL = 4
-"""zlib's level. Level 1 makes ABT messages 7 to 13 % longer at half the cost, 6 them 3 to 7 % shorter at twice."""
+"""The compression level of zlib. Level 1 makes ABT messages 7-13 % longer at half the cost, 6 makes 3-7 % at twice."""
 _PREAMBLE = struct.Struct("<8sHH")
 _FRAME = struct.Struct("<II16s")
 _DIGEST = 16
 _LARGEST_PACKED = MAX_BLOCK_BYTES + MAX_BLOCK_BYTES // 1000 + 64
-"""An upper bound for the compressed size of the largest block."""
+"""An upper bound on the compressed size of the largest block."""
 
 PREAMBLE = _PREAMBLE.pack(MAGIC, FORMAT, 0)
 
 
 class JournalDamagedError(RobochocError):
-    """The journal is unreadable from some place on. The message contains the place and the reason."""
+    """Raised if the journal cannot be read beyond some position. The message contains the position and the reason."""
 
 
 class JournalTruncatedError(JournalDamagedError):
-    """Only the end of the journal is missing. The rest is undamaged."""
+    """Raised if only the end of the journal is missing. The rest is undamaged."""
 
 
 def _digest(before: bytes, packed: bytes, size: int) -> bytes:
-    """Return the checksum of a block, over the previous checksum, the block's lengths, and its content."""
+    """Return the checksum of a block, computed from the previous checksum, the block's lengths, and its content."""
     lengths = struct.pack("<II", len(packed), size)
     return blake2b(before + lengths + packed, digest_size=_DIGEST).digest()
 
@@ -48,9 +48,9 @@ BEGINNING = blake2b(PREAMBLE, digest_size=_DIGEST).digest()
 
 
 def frame_block(content: bytes, before: bytes) -> tuple[bytes, bytes]:
-    """Return the block with `content`, of up to `MAX_BLOCK_BYTES` bytes, and its checksum.
+    """Return the block with `content`, of at most `MAX_BLOCK_BYTES` bytes, and its checksum.
 
-    `before` is the checksum of the previous block, `BEGINNING` for the first.
+    `before` is the checksum of the previous block, or `BEGINNING` for the first block.
     """
     packed = zlib.compress(content, LEVEL)
     digest = _digest(before, packed, len(content))
@@ -71,19 +71,19 @@ class BlockReader:
 
     @property
     def rest(self) -> str:
-        """The damage if no more bytes follow; empty if there is none."""
+        """The damage if no more bytes follow; empty if there is no damage."""
         return f"byte {self._place:,}: it ends within a block" if self._buffer or not self._before else ""
 
     @property
     def place(self) -> str:
-        """The beginning of the next block, in words."""
+        """The start of the next block, in words."""
         return f"byte {self._place:,}"
 
     def next(self) -> bytes | None:
-        """Return the content of the next block; None if it is not complete yet.
+        """Return the content of the next block, or None if the block is not yet complete.
 
         Raises:
-            JournalError: if it is not a journal of this version.
+            JournalError: if the bytes are not a journal of this version.
             JournalDamagedError: if a block is damaged.
         """
         if not self._before and not self._read_preamble():

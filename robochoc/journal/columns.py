@@ -1,7 +1,7 @@
-"""The content of a journal's block: its entries in columns, as msgpack (docs/guides/journal.md).
+"""The content of a block in a journal: its entries in columns, as msgpack (docs/guides/journal.md).
 
-Most entries are of four kinds. The values of each of their fields are stored together, which compresses best; other
-entries are stored one by one. Each block can be read without the previous ones.
+Most entries belong to four kinds. For each of their fields, the values are stored together, which compresses best.
+Other entries are stored one by one. Each block can be read without the previous blocks.
 """
 
 from __future__ import annotations
@@ -30,14 +30,15 @@ _Index = Annotated[int, Meta(ge=0)]
 
 
 class BlockError(RobochocError, ValueError):
-    """The content of a block cannot be decoded as entries."""
+    """Raised if the content of a block cannot be decoded to entries."""
 
 
 class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen=True, kw_only=True):
     """Columns, each in the order of the entries. Texts are stored once, in `words`, and referred to by their index.
 
-    A shape is a message's type and the names of its fields; their `values` are stored one after the other. `actors` are
-    the robots of the entries (senders or receivers), `partners` the other robots of messages, `says` their shapes.
+    A shape is a message's type with the names of its fields. The `values` are stored one after the other. `actors` are
+    the robots of the entries (senders or receivers), `partners` the other robots of messages, `says` the messages'
+    shapes.
     """
 
     words: list[str]
@@ -69,7 +70,7 @@ _json = msgspec.json.Encoder(decimal_format="number").encode
 
 
 def columns_of(entries: Iterable[JournalEntry], *, exact: bool) -> bytes:
-    """Return the content of a block of `entries`. Unless `exact`, times are rounded to the nanosecond, as of clocks.
+    """Return the content of a block with `entries`. Unless `exact`, times are rounded to nanoseconds, like clocks.
 
     Raises `TypeError`, `ValueError`, `OverflowError` or `RecursionError` for entries that `entries_of` would reject:
     robots on other machines may report anything, and later entries must not be lost with them.
@@ -99,7 +100,7 @@ class _Columns:
         self.others: list[JournalEntry] = []
 
     def add(self, entries: Iterable[JournalEntry]) -> None:
-        """Add `entries`. This loop is the cost of a journal in a run, so it compares exact types, and has few calls."""
+        """Add `entries`. This loop dominates the cost of a journal, so it compares exact types and makes few calls."""
         kinds, times, clocks, actors = self.kinds.append, self.times.append, self.clocks.append, self.actors.append
         partners, says, words, shapes = self.partners.append, self.says.append, self.words, self.shapes
         values, sizes = self.values.extend, self.sizes.append
@@ -136,7 +137,7 @@ class _Columns:
             clocks(entry.clock)
 
     def check(self) -> None:
-        """Raise an exception if the entries could not be read again."""
+        """Raise an exception if the entries could not be read back."""
         _json(self.values)
         _int64s(self.clocks)
         _int64s(self.checked)
@@ -167,7 +168,7 @@ class _Columns:
 
 
 def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000_000_000], list[int] | bytes]:
-    """Return times as a scale and the differences between integers of 1 / scale, or with scale 0 as doubles."""
+    """Return times as a scale and the differences between integers of 1 / scale, or as doubles with the scale 0."""
     times = array("d", times)
     if all(map(float.is_integer, times)) and _fit_in_steps(times, 1):
         return 1, _steps(map(int, times))
@@ -194,14 +195,14 @@ _decode = msgspec.msgpack.Decoder(_Block).decode
 
 
 def entries_of(content: bytes) -> list[JournalEntry]:
-    """Return the entries of a block with `content`.
+    """Return the entries in a block with `content`.
 
     Raises:
-        BlockError: if `content` was not written by `columns_of`.
+        BlockError: if `content` does not have the form written by `columns_of`.
     """
     try:
         block = _decode(content)
-        _json(block.values)  # msgpack may contain what messages cannot: keys that are not texts, extensions
+        _json(block.values)  # msgpack may contain what messages cannot: keys that are not texts, and extensions
         return list(_EntryDecoder(block))
     except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, RecursionError, LookupError) as error:
         raise BlockError(str(error)) from error
@@ -269,7 +270,7 @@ def _fit(column: Sequence[object], count: int) -> None:
 
 
 def _message_shape(shape: Sequence[int], words: Sequence[str]) -> tuple[str, tuple[str, ...]]:
-    """Return a message's type, and the names of its fields."""
+    """Return the type of a message, and the names of its fields."""
     name, *fields = (words[place] for place in shape)
     if len({*fields}) < len(fields):
         raise ValueError(f"a message of type {name!r} has two fields with the same name")
@@ -297,7 +298,7 @@ def _finite(times: Iterable[float]) -> None:
 
 
 def _int64s(numbers: Iterable[int]) -> list[int]:
-    """Return `numbers`; raise `ValueError` if one does not fit into 64 bits."""
+    """Return `numbers`. Raises `ValueError` if a number does not fit into 64 bits."""
     numbers = list(numbers)
     if numbers and not (min(numbers) >= -_LARGEST and max(numbers) < _LARGEST):
         raise ValueError("a count is too large")

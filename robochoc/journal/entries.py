@@ -1,4 +1,4 @@
-"""The entries of a journal: a header, the events of a run, and its outcome; and errors of journals."""
+"""The entries of a journal: a header, the events of a run, and its outcome; and the errors of journals."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from robochoc.system.errors import RobochocError
 VERSION = 2
 """The version of the entries' meaning. It is increased if an entry is added or changed. Readers reject others."""
 STAMPED_LATE = 1
-"""In this version, the `clock` of a sent message was that at the end of the step, and it followed the decision."""
+"""The version in which the `clock` of a sent message was the one at the end of the step, and followed the decision."""
 BOUNDED = 3
-"""The version of journals with `Bounded` events, which are recorded on request only."""
+"""The version of journals with `Bounded` events, which are recorded only on request."""
 _BITS = 63
-"""Longer integers are written as texts, because msgpack has 64 bits."""
+"""Longer integers are written as texts, because integers in msgpack have at most 64 bits."""
 READ = (STAMPED_LATE, VERSION, BOUNDED)
 """The versions that can be read."""
 
 
 class JournalError(RobochocError, ValueError):
-    """The file is not a journal, has an unknown version, or is unreadable from the beginning."""
+    """Raised if the file is not a journal, has an unknown version, or is unreadable from the start."""
 
 
 class Header(Event, frozen=True, kw_only=True, tag="Journal"):
@@ -36,21 +36,21 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     runtime: str
     seed: int
     order: str | tuple[str, ...] | msgspec.UnsetType = msgspec.UNSET
-    """The priority order, as a name or a list of robots; omitted for the order in the files."""
+    """The priority order, as a name or a list of robots. It is omitted for the order in the files."""
     channel: str | msgspec.UnsetType = msgspec.UNSET
     """The channel model, if any. With one, the times of the search's events are in simulated seconds."""
     message_loss: float | msgspec.UnsetType = msgspec.UNSET
-    """The probability of a message's loss, if messages could be lost. Lost messages have no `Received`."""
+    """The probability that a message is lost, if messages could be lost. Lost messages have no `Received`."""
     version: int = VERSION
 
 
 class Ended(Event, frozen=True, kw_only=True):
-    """The outcome of the run. It is missing in the journal of an interrupted run."""
+    """The outcome of the run. An interrupted run has no such entry."""
 
     t: float = 0
     outcome: Outcome
     long: dict[str, Decimal] | msgspec.UnsetType = msgspec.UNSET
-    """Numbers of solutions and optima with more than 64 bits, which `outcome` lacks; omitted if there are none."""
+    """Numbers of solutions and optima with more than 64 bits, omitted in `outcome`. Unset if there are none."""
 
     @classmethod
     def from_outcome(cls, outcome: Outcome) -> Ended:

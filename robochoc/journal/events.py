@@ -17,9 +17,9 @@ class Event(msgspec.Struct, frozen=True, tag=True, tag_field="event", kw_only=Tr
 
 
 class Began(Event, frozen=True):
-    """A run of `protocol` begins, or its epoch `epoch`, which was opened by `opened_by`.
+    """A run of `protocol` begins, or the epoch `epoch` in it, which was opened by `opened_by`.
 
-    Withdrawing is a separate run after the search. All counts restart at 0. Times can only be compared within a run or
+    Withdrawal is a separate run after the search. All counts restart at 0. Times can be compared only within a run or
     an epoch. `minimises`: the run minimises costs, so there may be `Improved` events.
     """
 
@@ -30,21 +30,20 @@ class Began(Event, frozen=True):
 
 
 class Given(Event, frozen=True):
-    """The robots' problems at the beginning of a run or an epoch, after its `Began`. They suffice for a replay.
+    """The robots' problems at the beginning of a run or an epoch, after its `Began`. They are sufficient for a replay.
 
     Attributes:
         order: The priority order, with all robots of the team.
         robots: The XML files, by robot, that differ from the previous `Given`, or all files. If the problems cannot be
-            written, this is empty and `why` is the reason.
-        seed: A parameter of the run (`solver/agent_problem.py`), as `settings` and `aside`, the withdrawal cost.
+            written, `robots` is empty and `why` is the reason.
+        seed: A parameter of the run (`solver/agent_problem.py`), like `settings` and `aside`, the withdrawal cost.
         fresh: The robots that start again.
-        void_keys: Invalidated parts of the previous epoch (`solver/explanation.py`), as `void_agents`.
+        void_keys: Invalidated parts of the previous epoch (`solver/explanation.py`), like `void_agents`.
         quiet: Whether no message of the previous epoch was lost.
-        shown: By robot, its variables that neighbours see although its file does not show it.
+        shown: By robot, the variables that its neighbours see although its file does not show them.
         empty: The variables without remaining values, which a file cannot express (`journal/team_events.py`).
-        told_in: The user's units of costs, if they differ from the protocols' integers of 0 or more, which are
-            minimised: whether costs are maximised, their decimal places, and a constant that is added to the sum
-            (`model/costs.py`).
+        told_in: The user's units of costs, if they differ from the protocols' minimised integers of 0 or more: whether
+            costs are maximised, their decimal places, and a constant that is added to the sum (`model/costs.py`).
     """
 
     order: tuple[str, ...]
@@ -104,7 +103,7 @@ class Decided(Event, frozen=True):
 
 
 class Heard(Event, frozen=True):
-    """A robot has found or received an incumbent: an assignment of all robots that is cheaper than all before.
+    """A robot has found or received an incumbent: an assignment of all robots that is cheaper than all earlier ones.
 
     `values` are the robots' values as visible to others (null for a withdrawn robot). The cost is in the protocols'
     units (`Given.told_in`).
@@ -116,10 +115,10 @@ class Heard(Event, frozen=True):
 
 
 class Bounded(Event, frozen=True):
-    """A robot has proven a higher lower bound for the costs of a part of the team.
+    """A robot has proven a higher lower bound on the costs of a part of the team.
 
-    If several robots have bounds, their sum is a bound for the team (`protocols/findings.py`). The event is recorded
-    on request only. The bound is in the protocols' units (`Given.told_in`).
+    If several robots have bounds, the sum of the bounds is a bound for the team (`protocols/findings.py`). The event is
+    recorded only on request. The bound is in the protocols' units (`Given.told_in`).
     """
 
     robot: str
@@ -127,10 +126,10 @@ class Bounded(Event, frozen=True):
 
 
 class Improved(Event, frozen=True):
-    """The present assignment, or an incumbent received by a robot, is cheaper than all before.
+    """The current assignment, or an incumbent received by a robot, is cheaper than all earlier assignments.
 
-    A robot without a value counts as withdrawn. The event is computed from others, in journals only; no robot reports
-    it. An incumbent lacks the variables that no neighbour sees. The cost is in the user's units.
+    A robot without a value counts as withdrawn. No robot reports this event: it is computed from other events, in
+    journals only. An incumbent lacks the variables that no neighbour sees. The cost is in the user's units.
     """
 
     cost: int | Decimal
@@ -160,9 +159,9 @@ class Lost(Event, frozen=True):
 
 
 class Granted(Event, frozen=True):
-    """The Authority has granted `what` to `who`. Its events have Unix times in `t`, as the Authority outlives runs.
+    """The Authority has granted `what` to `who`. `t` is a Unix time, because the Authority outlives runs.
 
-    `origin` is the origin of the request, as `address:port`; empty if it did not come over a network.
+    `origin` is the origin of the request, as `address:port`; empty if the request did not come over a network.
     """
 
     who: str
@@ -171,9 +170,9 @@ class Granted(Event, frozen=True):
 
 
 class Refused(Event, frozen=True):
-    """The request of `who` for `what` was refused, for the reason `why`. `t` and `origin` as in `Granted`.
+    """The request of `who` for `what` was refused, for the reason `why`. For `t` and `origin` see `Granted`.
 
-    `who` is the unverified name that the other side has given, or `unknown`. Refusals in a run have the run's time.
+    `who` is the unverified name given by the other side, or `unknown`. Refusals in a run use the run's time.
     """
 
     who: str
@@ -203,7 +202,7 @@ Observer = Callable[[AnyEvent], None]
 
 
 def combined(*observers: Observer | None) -> Observer | None:
-    """Return one observer that passes events on to all `observers`; None if there are none."""
+    """Return one observer that passes events on to all `observers`, or None if there are no observers."""
     there = [one for one in observers if one is not None]
     if not there:
         return None
@@ -216,7 +215,7 @@ def combined(*observers: Observer | None) -> Observer | None:
 
 
 def actor(event: AnyEvent) -> str | None:
-    """Return the robot whose step contains `event`; None if the event is not part of a step."""
+    """Return the robot whose step contains `event`, or None if the event does not belong to a step."""
     match event:
         case Sent():
             return event.sender

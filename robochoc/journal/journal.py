@@ -1,7 +1,7 @@
 """The journal: all events of a run, in a compact file that can be read while it is written, and after a crash.
 
-The first entry is a header, the last one the outcome. Statistics, pictures and golden tests are computed from the
-journal, independently of the robots. docs/guides/journal.md describes the file. Its text form is one JSON object per
+The first entry is a header, the last entry is the outcome. Statistics, pictures and golden tests are computed from the
+journal, independently of the robots. docs/guides/journal.md describes the file. Its text form has one JSON object per
 line.
 """
 
@@ -37,7 +37,7 @@ __all__ = [
 
 
 def metrics_of(events: Iterable[AnyEvent]) -> Metrics:
-    """Return the counts of messages, bytes, NCCCs and checks in the events. The wall-clock time is unknown, and 0."""
+    """Return the counts of messages, bytes, NCCCs and checks in the events. The wall-clock time is unknown: 0."""
     total = Metrics()
     messages: Counter[str] = Counter()
     size = largest = ncccs = 0

@@ -22,7 +22,7 @@ from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.garbage import collection_paused
 
 ENTRIES_MAX = 30_000_000
-"""The most entries that `read_journal` reads: about 10 million messages, of a kilobyte of memory each."""
+"""The maximum number of entries that `read_journal` reads: about 10 million messages with a kilobyte of memory each."""
 LONGEST_LINE = 256 * 2**20
 """The longest line of the text form, in bytes."""
 _PIECE = 2**20
@@ -33,8 +33,9 @@ _TEXT = b'{"event":"Journal"'
 class Journal:
     """The content of a journal. `outcome` is None if the run was interrupted.
 
-    `damage` is the reason and the place of a premature end, after a crash or in an altered file; None if the journal is
-    complete. The events are those before the damage. `truncated`: only the end is missing, as after a crash.
+    `damage` is the reason and the position of a premature end, after a crash or in an altered file; None if the journal
+    is complete. The events are those before the damage. `truncated`: only the end is missing, for example after a
+    crash.
     """
 
     header: Header
@@ -45,7 +46,7 @@ class Journal:
 
 
 def is_journal(content: bytes) -> bool:
-    """Return whether `content` begins like a journal in one of its two forms."""
+    """Return whether `content` begins like one of the two forms of journals."""
     return content.startswith((MAGIC, _TEXT))
 
 
@@ -80,7 +81,7 @@ def read_journal(content: bytes) -> Journal:
 
 
 def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
-    """Yield the events of a journal, sorted by time within each run, which begins with its `Began`."""
+    """Yield the events in a journal, sorted by time within each run. A run begins with its `Began`."""
     events = list(events)
     begun = [place for place, event in enumerate(events) if type(event) is Began]
     by_time = attrgetter("t")
@@ -103,12 +104,12 @@ def lines_of(journal: Journal) -> Iterator[bytes]:
 class Follower:
     """Reads a journal, of either form, while it is written.
 
-    `file` is not closed. If possible, it is read at a separate offset (`os.pread`), so another process may append to it
-    through the same descriptor.
+    `file` is not closed. If possible, it is read at a separate offset (`os.pread`), so that another process can append
+    to it through the same descriptor.
     """
 
     damage: str | None = None
-    """The first damage and its place; None if there is none so far."""
+    """The first damage and its position, or None if no damage was found so far."""
     truncated: bool = False
     """True if the only damage is that the end of the journal is missing."""
 
@@ -118,10 +119,10 @@ class Follower:
         self._has_header = self._is_over = False
 
     def read(self, most: int | None = None) -> list[JournalEntry]:
-        """Return the entries completed since the last call, in the file's order. The first one is the `Header`.
+        """Return the entries completed since the last call, in file order. The first entry is the `Header`.
 
-        Bytes appended during the call are left to the next one: the writer may be faster than this reader. Stops after
-        the block that exceeds `most` entries.
+        Bytes appended during the call are left to the next call, because the writer may be faster than this reader.
+        Reading stops after the block in which the number of entries exceeds `most`.
 
         Raises:
             JournalError: if the file is not a journal.
@@ -136,7 +137,7 @@ class Follower:
         return lines
 
     def finish(self) -> tuple[list[JournalEntry], str | None]:
-        """Return the remaining entries of a file that is no longer written, and the damage if any.
+        """Return the remaining entries in a file that is no longer written, and the damage, if any.
 
         Raises `JournalError`.
         """
@@ -158,7 +159,7 @@ class Follower:
         return self._is_over
 
     def _next(self) -> Sequence[JournalEntry] | None:
-        """Return the next entries; None if there are none yet."""
+        """Return the next entries, or None if there are no entries yet."""
         while True:
             try:
                 if self._format and (lines := self._format.next()) is not None:
@@ -216,19 +217,19 @@ class _Stream:
         """Do nothing: the length is unknown."""
 
     def piece(self) -> bytes:
-        """Return the next piece; empty if there is none yet."""
+        """Return the next piece; empty if there is no piece yet."""
         return self._file.read(_PIECE)
 
 
 class _Stored:
-    """Reads a file with a known length piece by piece, up to its end at the last `update_end`."""
+    """Reads a file of known length piece by piece, up to its end at the last `update_end`."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
         self._place = self._end = 0
 
     def update_end(self) -> None:
-        """Include the bytes appended so far."""
+        """Include the bytes that were appended so far."""
         self._end = os.fstat(self._descriptor).st_size
 
     def piece(self) -> bytes:
@@ -254,14 +255,14 @@ class _Format(Protocol):
         """Append the next bytes."""
 
     def next(self) -> Sequence[JournalEntry] | None:
-        """Return the next entries; None if they are incomplete. Raises `JournalError`, `JournalDamagedError`."""
+        """Return the next entries, or None if they are incomplete. Raises `JournalError`, `JournalDamagedError`."""
 
     def rest(self) -> Sequence[JournalEntry]:
         """Return the entries that are complete without further bytes. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
     def place(self) -> str:
-        """The place of the last entries."""
+        """The position of the last entries."""
 
 
 class _Blocks:

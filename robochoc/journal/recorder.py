@@ -26,12 +26,12 @@ from robochoc.system.files import AppendableFile, errors_naming
 from robochoc.verification.objective import Objective
 
 ENTRIES_PER_BLOCK_MAX = 8192
-"""With four times as many entries, ABT's messages are 5 to 12 % shorter, but a crash loses more of them."""
+"""With four times as many entries, ABT's messages are 5 to 12 % shorter, but a crash loses more entries."""
 SPAN_S = 0.25
 """Seconds after which the next event closes a block. A killed run loses at most the events of this time."""
 
 BlockSink = Callable[[bytes], object]
-"""Receives complete blocks, the first one with the beginning of the file. It may raise `OSError`."""
+"""A function that receives complete blocks, the first with the beginning of the file. It may raise `OSError`."""
 
 
 class JournalRecorder:
@@ -43,7 +43,7 @@ class JournalRecorder:
     """
 
     outcome: Outcome | None = None
-    """The outcome of the run, to be set before `close`. None if the run has not ended, or was interrupted."""
+    """The outcome of the run, to be set before `close`; None if the run has not ended or was interrupted."""
 
     def __init__(
         self, header: Header, objective: Callable[[], Objective] | None = None, sinks: Sequence[BlockSink] = ()
@@ -64,14 +64,14 @@ class JournalRecorder:
         self._due = 0.0  # the header and the first event are written at once
 
     def __call__(self, event: AnyEvent) -> None:
-        """Record an event. `Began` begins a run; times can only be compared within a run."""
+        """Record an event. `Began` starts a run; times can be compared only within a run."""
         with self._lock:
             self._pending.append(event)
             if len(self._pending) >= ENTRIES_PER_BLOCK_MAX or time.monotonic() >= self._due:
                 self._close_block()
 
     def flush_if_due(self) -> None:
-        """Close the block if it has been open for `SPAN_S`. To be called at intervals while no events occur."""
+        """Close the block if it has been open for `SPAN_S`. Must be called at intervals while no events occur."""
         if self._pending and time.monotonic() >= self._due:
             self.flush()
 
@@ -95,21 +95,21 @@ class JournalRecorder:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no event was recorded. Then no file is written, and an old file remains."""
+        """Whether no event was recorded. Then no file is written, and an existing file is kept."""
         return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:
-        """Close, and return the journal if it was stored in memory."""
+        """Close the recorder, and return the journal if it was stored in memory."""
         self.close()
         return self._memory.getvalue()
 
     @property
     def failures(self) -> list[OSError]:
-        """The errors of sinks that are not used any more."""
+        """The errors of sinks that are no longer used."""
         return [sink.failure for sink in self._sinks if sink.failure]
 
     def _close_block(self) -> None:
-        """Make blocks of the pending entries, and write them to the sinks.
+        """Create blocks from the pending entries, and write the blocks to the sinks.
 
         The exception of a signal may occur between any two calls. So each change of state is a single statement
         without calls, and unfinished work is completed the next time.
@@ -179,7 +179,7 @@ class JournalRecorder:
 
 
 class JournalFile:
-    """A file as sink. The first block replaces an existing file; further blocks are appended.
+    """A file used as a sink. The first block replaces an existing file; further blocks are appended.
 
     Devices, pipes, and standard streams are written directly, as by `write_atomically`. Errors contain the file's name.
     """
@@ -217,7 +217,7 @@ class _SinkState:
         self._written = 0
 
     def write(self, blocks: Sequence[bytes], number: int) -> None:
-        """Write those of `blocks` that are missing in the sink. The first one has the `number` in the journal."""
+        """Write those of `blocks` that the sink has not received. The first one has this `number` in the journal."""
         while not self.failure and self._written < number + len(blocks):
             try:
                 self._sink(blocks[self._written - number])
@@ -227,9 +227,9 @@ class _SinkState:
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """Yield `events`, and an `Improved` after each event that makes the assignment cheaper than all before.
+    """Yield `events`, with an `Improved` after each event that makes the assignment cheaper than all earlier ones.
 
-    `objective` may be that of the team's files: `Given` events define the variables that robots show.
+    `objective` may be the one of the team's files: `Given` events define the variables that robots show.
     """
     best = INFINITE
     reader = TeamReader()
@@ -259,7 +259,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
 
 
 def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
-    """Return the variables that the robots in `given` show; empty if it cannot be read."""
+    """Return the variables that the robots in `given` show; empty if `given` cannot be read."""
     try:
         return {robot.name: robot.interface for robot in reader.team(given).robots}
     except GivenProblemError:
@@ -267,12 +267,12 @@ def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, .
 
 
 def _encodable(header: Header) -> Header:
-    """Return `header` with a team's name that can be encoded: a folder's name may be invalid text."""
+    """Return `header` with a team name that can be encoded: the name of a folder may be invalid text."""
     return msgspec.structs.replace(header, team=header.team.encode(errors="replace").decode())
 
 
 def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
-    """Yield the contents of one or more blocks for `lines`."""
+    """Yield the contents of one or more blocks with `lines`."""
     try:
         content = columns_of(lines, exact=exact)
     except (TypeError, ValueError, OverflowError, RecursionError) as error:
@@ -292,7 +292,7 @@ def _contents(lines: Sequence[JournalEntry], *, exact: bool) -> Iterator[bytes]:
 
 
 def _replacement(line: JournalEntry, why: str) -> JournalEntry:
-    """Return a replacement for an entry that cannot be encoded. Raises `ValueError` if there is none."""
+    """Return a replacement for an entry that cannot be encoded. Raises `ValueError` if no replacement is possible."""
     match line:
         case Sent():
             return msgspec.structs.replace(line, content={"left out": why})

@@ -1,4 +1,4 @@
-"""Teams as `Given` events, which contain the robots' problems for replays, and back.
+"""Conversion of teams to `Given` events, which contain the robots' problems for replays, and back.
 
 Robots are recorded as equivalent XML files. The event contains separately what a file cannot express: the priority
 order, variables that neighbours see although the robot's file does not show it, and domains that a scenario has
@@ -26,15 +26,15 @@ from robochoc.system.errors import RobochocError
 
 NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
 _PLACEHOLDER = (range(1),)
-"""The domain written in place of an empty one, which a file cannot have."""
+"""The domain written instead of an empty domain, which a file cannot contain."""
 
 
 class GivenProblemError(RobochocError, ValueError):
-    """The event with the robots' problems does not contain a valid team."""
+    """Raised if the event with the robots' problems does not contain a valid team."""
 
 
 class TeamWriter:
-    """Writes `Given` events. Each contains only the robots' files that have changed since the previous event."""
+    """Writes `Given` events. Each event contains only the robots' files that have changed since the previous event."""
 
     def __init__(self) -> None:
         self._robots: dict[str, Robot] = {}
@@ -49,7 +49,7 @@ class TeamWriter:
         fresh: Collection[str] = (),
         quiet: bool = True,
     ) -> Given:
-        """Return the event with the problem of `team`. If it cannot be written, the event's `why` is the reason."""
+        """Return the event with the problem of `team`. If it cannot be written, `why` is the reason."""
         event = Given(
             t=0,
             order=team.order,
@@ -85,7 +85,7 @@ class TeamWriter:
 
 
 class TeamReader:
-    """Reads the events of a `TeamWriter`, in their order."""
+    """Reads the events of a `TeamWriter`, in the order in which they were written."""
 
     def __init__(self, name: str = "") -> None:
         self._name = name
@@ -153,7 +153,7 @@ def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]
 
 
 def _writable(robot: Robot) -> Robot:
-    """Return `robot` without empty domains, as files require. Raises `ValueError` if no file can express it."""
+    """Return `robot` without empty domains, as files require. Raises `ValueError` if no file can express the robot."""
     for name in (robot.name, *(variable.name for variable in robot.variables)):
         if not is_name(name):
             raise ValueError(f"{name!r} cannot be a name in a file")

@@ -196,6 +196,7 @@ class StartSearch(EpochMessage, frozen=True):
 
 class Recall(EpochMessage, frozen=True):
     """Requests a `RobotSnapshot` with this `number`, containing the robot's current values.
+
     With a `cycle`: its values in that cycle of the protocol. With a `value`: the values of its variables that
     correspond to this value, which is visible to others.
     """
