@@ -1,6 +1,6 @@
 """The interface of protocols: a state machine that receives and sends messages.
 
-A host (see `communication/host.py`) drives the protocol: it calls `start` once; then, for each batch of waiting
+A host (see `communication/host.py`) drives the protocol: it calls `start` once; then, for each packet of waiting
 messages, it calls `receive` for each message, and `settle` when the inbox has been drained. Sent messages are collected
 in `outbox`, which the host empties. A protocol never reads the time or draws random numbers by itself, and behaves the
 same in a simulator and on a robot.

@@ -34,7 +34,7 @@ it. h is computed from the declared domains, without messages; for robots that m
 
 Choices that the paper leaves open, and differences:
 
-- Messages are read in batches; a robot decides when the inbox has been drained.
+- Messages are read in packets; a robot decides when the inbox has been drained.
 - Constraints may be n-ary. Values are tried by increasing cost.
 - Estimates are kept as long as their prefix is valid. Robots are asked only when their estimates may have changed, and
   answer only with new estimates. The next robot's answer is about the CPA itself.

@@ -43,7 +43,7 @@ follows a value that is ruled out for good; both happen finitely often. Then the
 and so on. A robot that sends a request, or forgets an aggregate after a nogood, always receives the next aggregate: the
 receiver either does as asked and sends its aggregate, or had sent a different one before the request arrived.
 
-Choices that ABT's paper leaves open are made as in `abt.py`: n-ary constraints, batches, the choice among nogoods,
+Choices that ABT's paper leaves open are made as in `abt.py`: n-ary constraints, packets, the choice among nogoods,
 interchangeable values. Partially known constraints are refused: a higher robot would need the sets of lower robots.
 
 >>> from robochoc.generators.meetings import meetings

@@ -24,7 +24,7 @@ Choices that the paper leaves open:
 
 - Constraints may be n-ary. The lowest-priority robot in the scope checks them, once it knows the values of all others.
 - Of several nogoods for a value, the one with the highest possible lowest variable is kept (Hirayama and Yokoo 2000).
-- Messages are read in batches; the view is checked when the inbox has been drained.
+- Messages are read in packets; the view is checked when the inbox has been drained.
 - A nogood contains only the relevant variables. So it rules out all values of a robot that are interchangeable in these
   variables (neighbourhood partial interchangeability).
 - The runtime detects quiescence, and so a solution (`communication/quiescence.py`).

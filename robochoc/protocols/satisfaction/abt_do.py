@@ -43,7 +43,7 @@ Choices that the papers leave open, and differences:
 - A nogood that does not match the receiver's order is answered with `ok?`, not passed on: one of the two robots will
   receive a newer order.
 - As in ABT, constraints may be n-ary (the robot in the scope that is lowest at present checks them, so all must know
-  them), messages are read in batches, nogoods contain only the relevant variables, and the runtime detects the
+  them), messages are read in packets, nogoods contain only the relevant variables, and the runtime detects the
   solution.
 
 >>> from robochoc.generators.queens3d import queens3d
@@ -98,7 +98,7 @@ class ABTDORetro(Backtracking):
     - `left`: the numbers of remaining values that other robots have sent.
     - `higher`: robots that send their values to this one while they have higher priority.
     - `listeners`: robots to which this one sends its value while they have lower priority.
-    - `owed`: robots that must be sent the value after the current batch of messages, even if it has not changed.
+    - `owed`: robots that must be sent the value after the current packet of messages, even if it has not changed.
     """
 
     messages: ClassVar[Any] = Ok | Nogood | Order | AddLink

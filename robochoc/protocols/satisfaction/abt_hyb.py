@@ -28,7 +28,7 @@ first, but only for a robot of higher priority, and the highest waiting robot is
 A robot without a value drops nogoods, and sends its next value to all robots with a link to it, including the sender of
 the nogood.
 
-Choices that the paper leaves open are made as in ABT: n-ary constraints, batches, the choice among nogoods,
+Choices that the paper leaves open are made as in ABT: n-ary constraints, packets, the choice among nogoods,
 interchangeable values, partially known constraints. A waiting robot tests no pairs of partially known constraints,
 because it has no value; it tests all of them once it has a value.
 

@@ -25,7 +25,7 @@ contradicts a later one never returns. The content of a `NotOk` stays true, howe
 Choices that the paper leaves open:
 
 - Constraints may be n-ary. The lowest-priority robot in the scope checks them, once the CPA contains all others.
-- Messages are read in batches. The view is updated with each message; the domain is filtered, or the CPA handled, when
+- Messages are read in packets. The view is updated with each message; the domain is filtered, or the CPA handled, when
   the inbox has been drained.
 - `NotOk` goes to all robots that have no value in the inconsistent assignment.
 - If one known inconsistent assignment is a prefix of another, the shorter one is kept.

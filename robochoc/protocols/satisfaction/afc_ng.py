@@ -26,7 +26,7 @@ Choices that the paper leaves open, and differences:
   its sender, which saves more than half of all messages if there are few constraints. This is sufficient: no other
   robot can check anything with it; its values of higher robots are also in later CPAs, which are compared by all
   counters; and the next robot, the only one that may continue, receives every CPA.
-- Messages are read in batches; the view is revised when the inbox has been drained, so weak CPAs in a batch cost no
+- Messages are read in packets; the view is revised when the inbox has been drained, so weak CPAs in a packet cost no
   checks.
 - A CPA with exactly the counters in the view is not stronger: otherwise a late copy would erase later assignments.
 - A value with a nogood is not checked again; a constraint whose robots are all above the first changed value is not

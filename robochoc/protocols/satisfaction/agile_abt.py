@@ -37,7 +37,7 @@ Choices that the paper leaves open, and differences:
 - The age of a value is its position in its channel, not a counter.
 - A robot whose domain size is unknown counts as having `UNKNOWN` values left, more than any other robot.
 - Values are checked one by one until one is consistent, so the remaining values are those without a nogood so far.
-- Messages are read in batches. As in `abt.py`, of several nogoods for a value the one with the highest possible lowest
+- Messages are read in packets. As in `abt.py`, of several nogoods for a value the one with the highest possible lowest
   variable is kept, and a nogood contains only the relevant variables.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent

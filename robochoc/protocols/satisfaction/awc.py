@@ -33,7 +33,7 @@ Choices that the papers leave open:
   as checks). Ties go to the first value of the domain.
 - For each value, the shortest nogood that holds is included in the new nogood, or else the first violated constraint.
 - A nogood contains only the relevant variables of a robot.
-- Messages are read in batches. The runtime detects quiescence, and so a solution.
+- Messages are read in packets. The runtime detects quiescence, and so a solution.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve

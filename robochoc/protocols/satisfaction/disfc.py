@@ -24,7 +24,7 @@ lower robot's. A higher robot whose value is not in a filter from below sends a 
 
 Choices that the paper leaves open:
 
-- Batches of messages, and the choice among several nogoods, are as in ABT.
+- Packets of messages, and the choice among several nogoods, are as in ABT.
 - A counter names an assignment and not a value, so others cannot see that a value is repeated. An assignment that is
   kept keeps its counter.
 - A robot that requested a link, but shares no constraint with the sender, gets a filter that allows everything.
