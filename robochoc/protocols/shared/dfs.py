@@ -34,7 +34,7 @@ class TreeProtocol(Protocol):
     """One agent that first finds its position in a pseudo-tree, and then runs a protocol on the tree.
 
     `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, when
-    `start_in_tree` is called. From then on `handle` is called for each message and `decide` for each packet of messages.
+    `start_in_tree` is called. From then on `handle` is called for each message and `decide` for each packet.
     Earlier messages are stored until then. Children may start before their parents, but never after them.
     """
 
