@@ -53,7 +53,7 @@ def test_help_imports_no_command() -> None:
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=unmeasured())
     assert set(done.stderr.split()) == {
         "robochoc.cli", "robochoc.cli.main", "robochoc.cli.group", "robochoc.system", "robochoc.system.streams",
-        "robochoc.system.termination",
+        "robochoc.system.termination", "robochoc.system.posix",
     }  # fmt: skip
 
 
