@@ -1,7 +1,7 @@
 """The choice between the core's modules compiled by mypyc and the same modules in plain Python.
 
-A wheel built with a C compiler contains both (`hatch_build.py`). The compiled modules are used, unless `ROBOCHOC_PURE`
-is set to a value other than 0. Child processes inherit the choice.
+A wheel built with a C compiler contains both kinds (`hatch_build.py`). The compiled modules are used unless
+`ROBOCHOC_PURE` is set to a value other than 0. Child processes inherit the choice.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from types import ModuleType
 from typing import Any
 
 _COMPILED_MODULE = "robochoc.protocols.protocol"
-"""One of the modules that are compiled."""
+"""The name of one of the compiled modules."""
 
 
 class PurePython:
-    """A module finder that loads robochoc's modules from their sources even if they are compiled as well."""
+    """A module finder that loads robochoc's modules from their sources even if compiled modules exist."""
 
     @staticmethod
     def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        """Return the specification of the module's source; None for modules of the usual finders."""
+        """Return the specification of the module's source, or None for modules left to the usual finders."""
         if not name.startswith("robochoc."):
             return None
         found = PathFinder.find_spec(name, path, target)
@@ -34,7 +34,7 @@ class PurePython:
 
 
 def prefer_sources() -> None:
-    """Load all robochoc modules that this process has not imported yet from their sources."""
+    """Load those robochoc modules that this process has not yet imported from their sources."""
     sys.meta_path.insert(0, PurePython)
 
 
@@ -50,14 +50,14 @@ def kind_of_core() -> str:
 
 
 def attributes_of(thing: object) -> Mapping[str, Any]:
-    """Return the attributes of an object like `vars`, also for compiled classes without `__dict__`."""
+    """Return the attributes of an object, like `vars`, but also for compiled classes without `__dict__`."""
     names: Sequence[str] = getattr(type(thing), "__mypyc_attrs__", ())
     found = {name: getattr(thing, name) for name in names if name != "__dict__" and hasattr(thing, name)}
     return {**found, **getattr(thing, "__dict__", {})}
 
 
 def docstring(module: ModuleType) -> str:
-    """Return the docstring of a module. Compiled modules have none: then it is read from the source."""
+    """Return the docstring of a module. Compiled modules have no docstring, so it is read from the source."""
     file = getattr(module, "__file__", None) or ""
     if module.__doc__ or not file.endswith(tuple(EXTENSION_SUFFIXES)):
         return module.__doc__ or ""
@@ -67,6 +67,6 @@ def docstring(module: ModuleType) -> str:
 
 
 def _source(compiled: str) -> Path:
-    """Return the source beside a compiled module."""
+    """Return the path of the source next to a compiled module."""
     path = Path(compiled)
     return path.with_name(f"{path.name.partition('.')[0]}.py")

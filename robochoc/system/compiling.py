@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 else:
 
     def mypyc_attr(**_: object) -> Callable[[T], T]:
-        """Return a decorator without effect: only mypyc reads its arguments."""
+        """Return a decorator without effect. Only mypyc reads its arguments."""
         return lambda decorated: decorated
 
 
 def answer_signals() -> None:
-    """Let Python run pending signal handlers: it does so when a function of plain Python, such as this one, begins."""
+    """Let Python run pending signal handlers: it does so when a function in plain Python, such as this one, starts."""

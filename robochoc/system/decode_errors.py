@@ -1,4 +1,4 @@
-"""msgspec's errors in plain words, for invalid JSON, TOML values and settings."""
+"""msgspec's errors on invalid JSON, TOML values and settings, reworded in plain words."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _TYPES = {
     "array": "a list",
     "object": "an object",
 }
-"""JSON types, by their names in msgspec."""
+"""JSON types, by their names in msgspec's messages."""
 
 _SENTENCES = (
     (r"Invalid (?:enum )?value (?P<value>.*)", "{value} is not allowed{allowed}"),
@@ -32,11 +32,11 @@ _SENTENCES = (
     (r"JSON is malformed: (?P<value>.*)", "it is not valid JSON: {value}"),
     (r"Input data was truncated", "it is not valid JSON: it ends too early"),
 )
-"""The messages of msgspec, as patterns, and their replacements."""
+"""Patterns of msgspec's messages, and their replacements."""
 
 
 def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  # noqa: ANN401 - a type
-    """Return the error, its place, the expected type, and the allowed values if there are few.
+    """Return the error, its location, the expected type, and the allowed values if there are only a few.
 
     Args:
         error: The error raised by msgspec.
@@ -59,7 +59,7 @@ def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  #
 
 
 def place_of(error: msgspec.MsgspecError) -> tuple[str, str]:
-    """Return the place of the invalid value, such as `links[1]`, and the name of its unknown field, if any."""
+    """Return the location of the invalid value, such as `links[1]`, and the name of its unknown field, if any."""
     text = str(error)
     place, field = _PLACE.search(text), _UNKNOWN.match(text)
     return place["place"] if place else "", field[1] if field else ""
@@ -85,7 +85,7 @@ def _allowed(kind: Any, place: str) -> Sequence[str]:  # noqa: ANN401 - a type
 
 
 def _inside(kind: Any, step: str) -> Any:  # noqa: ANN401 - types
-    """Return the type of the field or item `step` of a value of the type `kind`; None if it is unknown."""
+    """Return the type of the field or item `step` in a value of type `kind`, or None if it is unknown."""
     for option in _options(kind):
         if step.startswith("[") and get_args(option):
             return get_args(option)[1 if get_origin(option) in {dict, Mapping} else 0]
@@ -103,7 +103,7 @@ def _one_of(values: Sequence[str]) -> str:
 
 
 def _nearest(name: str, known: Sequence[str]) -> str:
-    """Return a hint that names the known name nearest to `name`, or lists all of them."""
+    """Return a hint with the known name that is most similar to `name`, or with all known names."""
     import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     close = difflib.get_close_matches(name[:40], known, n=1)

@@ -1,4 +1,4 @@
-"""The base class of all exceptions of robochoc, and the exceptions of invalid options."""
+"""The base class of all exceptions in robochoc, and the exceptions for invalid options."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 
 class RobochocError(Exception):
-    """The base class of all exceptions of robochoc.
+    """The base class of all exceptions in robochoc.
 
-    A copy in another process has the same type, message and attributes, also where the constructor of a subclass
-    expects other arguments than the message. (By default, Python calls the class with the message.)
+    A copy in another process has the same type, message and attributes, even if the constructor of a subclass expects
+    arguments other than the message. (By default, Python calls the class with the message.)
     """
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -17,11 +17,11 @@ class RobochocError(Exception):
 
 
 class OptionError(RobochocError, ValueError):
-    """The value of an option is not allowed."""
+    """Raised if the value of an option is not allowed."""
 
 
 class OptionTypeError(OptionError, TypeError):
-    """The value of an option has a wrong type, or there is no such option."""
+    """Raised if the value of an option has a wrong type, or no such option exists."""
 
 
 def _without_constructor(kind: type[RobochocError], args: tuple[object, ...]) -> RobochocError:

@@ -1,7 +1,7 @@
-"""Files that are either complete or missing, even if the program is killed while it writes.
+"""Writing files so that they are either complete or missing, even if the program is killed during a write.
 
-A new file is written in the same folder, and then replaces the old one. If Linux supports it, the new file has no name
-until then: not even SIGKILL leaves a partial file.
+A new file is written in the same folder, and then replaces the old file. If Linux supports it, the new file has no
+name until then, so not even SIGKILL leaves a partial file.
 """
 
 from __future__ import annotations
@@ -16,25 +16,25 @@ from robochoc.system.posix import IS_POSIX
 from robochoc.system.streams import BackgroundWriter
 
 MAX_AHEAD = 64 << 20
-"""The number of bytes that may be buffered for the reader of a pipe."""
+"""The maximum number of bytes buffered for the reader of a pipe."""
 READER_PATIENCE_S = 5.0
-"""Closing a pipe waits for its reader until the reader has read nothing for this time, in seconds."""
+"""How long closing a pipe waits for a reader that reads nothing, in seconds."""
 _BINARY: int = getattr(os, "O_BINARY", 0)
-"""The flag without which Windows writes line feeds as two bytes."""
+"""The flag without which Windows writes each line feed as two bytes."""
 _HIDDEN = (".part", ".new", ".old")
-"""The endings of hidden files and folders that are being written."""
+"""The endings of hidden files and folders while they are being written."""
 _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
-"""The errors of file systems and kernels without unnamed files."""
+"""The errors raised by file systems and kernels that do not support unnamed files."""
 
 
 @contextmanager
 def errors_naming(path: Path) -> Iterator[None]:
-    """Add the file name `path` to errors of the system that name no file, or a hidden temporary file.
+    """Add the file name `path` to system errors that contain no file name, or that of a hidden temporary file.
 
-    A write fails on a full disk, but its error does not name the file.
+    For example, a write fails on a full disk, but the error does not contain the name of the file.
 
     Raises:
-        OSError: as raised within, with a `filename`.
+        OSError: the error raised inside, with a `filename`.
     """
     try:
         yield
@@ -46,13 +46,13 @@ def errors_naming(path: Path) -> Iterator[None]:
 
 
 class PendingFile:
-    """A file that takes the place of `path` when it is complete: write to `stream`, then `keep` or `discard` it.
+    """A file that replaces `path` when it is complete: write to `stream`, then call `keep` or `discard`.
 
-    Until then readers see the old file. Symbolic links are followed.
+    Until then, readers see the old file. Symbolic links are followed.
 
     Args:
         path: The file to be replaced. It need not exist.
-        mode: The permissions of the new file, less the umask, from its first byte on. Secrets need 0o600.
+        mode: The permissions of the new file from its first byte on, minus the umask. Secrets need 0o600.
 
     Raises:
         OSError: if the file cannot be written, or `path` is a folder, a device, a pipe, or the target of the standard
@@ -75,7 +75,7 @@ class PendingFile:
         self.stream = os.fdopen(descriptor, "w+b")
 
     def keep(self) -> None:
-        """Replace `path` by the file. On an error, raise `OSError` and delete the file."""
+        """Replace `path` by the file. Raises `OSError` after deleting the file if an error occurs."""
         try:
             with errors_naming(self._path):
                 self.stream.flush()
@@ -91,7 +91,7 @@ class PendingFile:
         self.stream.close()
 
     def discard(self) -> None:
-        """Delete the file, unless it has been kept or discarded."""
+        """Delete the file, unless it has already been kept or discarded."""
         with suppress(OSError):  # buffered bytes may not fit on the disk
             self.stream.close()
         if self._named is not None:
@@ -99,7 +99,7 @@ class PendingFile:
             self._named = None
 
     def _copied(self) -> Path:
-        """Copy the file to one with a name, which becomes the `stream`, if the system cannot name an unnamed file."""
+        """Copy the file to a named one, which becomes the `stream`, if the system cannot name an unnamed file."""
         import shutil  # noqa: PLC0415 - start-up: rarely needed
 
         self._named = _beside(self._target)
@@ -124,7 +124,7 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
         mode: The permissions of the new file, as in `PendingFile`.
 
     Raises:
-        OSError: if it cannot be written. No partial file remains.
+        OSError: if the file cannot be written. No partial file remains.
     """
     if _is_stream(path):
         with errors_naming(path), os.fdopen(_open_stream(path), "wb") as stream:
@@ -141,18 +141,19 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
 
 
 class AppendableFile:
-    """A file that replaces `path` with its `beginning`, and then grows.
+    """A file that replaces `path` with its `beginning`, and to which more bytes can be appended.
 
-    Readers see the old file, or the beginning and the appended bytes. Devices, pipes and streams are written directly,
-    without waiting for their readers; only these are buffered. Processes forked meanwhile inherit the descriptor.
+    Readers see the old file, or the beginning with the bytes appended so far. Devices, pipes and streams are written
+    directly, without waiting for their readers; only these are buffered. Processes forked meanwhile inherit the
+    descriptor.
 
     Args:
         path: The file to be replaced. It need not exist.
-        beginning: Its first bytes.
+        beginning: The first bytes of the file.
         mode: The permissions of the new file, as in `PendingFile`.
 
     Raises:
-        OSError: if it cannot be written. No partial file remains.
+        OSError: if the file cannot be written. No partial file remains.
     """
 
     def __init__(self, path: Path, beginning: bytes, mode: int = 0o666) -> None:
@@ -177,15 +178,15 @@ class AppendableFile:
         file.keep()
         if not IS_POSIX:
             self._descriptor = os.open(resolved(path), os.O_WRONLY | _BINARY)
-        elif file.stream is not copied:  # a copy has replaced it
+        elif file.stream is not copied:  # a copy has replaced the unnamed file
             os.close(self._descriptor)
             self._descriptor = os.open(resolved(path), os.O_WRONLY)
 
     def append(self, content: bytes) -> None:
-        """Write all of `content` at the end. After an interrupt by a signal, the same content may be appended again.
+        """Append all of `content`. After an interrupt by a signal, the same content may be appended again.
 
         Raises:
-            OSError: if it cannot be written. A file is then unchanged.
+            OSError: if the content cannot be written. A regular file is then unchanged.
         """
         if self._stream:
             self._append_to_stream(self._stream, content)
@@ -204,7 +205,7 @@ class AppendableFile:
         """Close the file.
 
         Raises:
-            OSError: if it is a stream, and its reader did not read all of it.
+            OSError: if the file is a stream whose reader did not read everything.
         """
         if self._stream is None:
             os.close(self._descriptor)
@@ -225,7 +226,7 @@ class AppendableFile:
     def _append_to_stream(self, stream: BackgroundWriter, content: bytes) -> None:
         if self._torn:
             raise OSError(errno.EIO, "an interrupt has left a partial write")
-        self._torn = True  # after an interrupt, the written part is unknown
+        self._torn = True  # after an interrupt, it is unknown which part was written
         fits = stream.write(content)
         self._torn = False
         if not fits:
@@ -233,7 +234,7 @@ class AppendableFile:
 
 
 def _write_at(descriptor: int, content: memoryview, place: int) -> int:
-    """Write at a place of a file, and return the number of bytes written."""
+    """Write at the offset `place` in a file, and return the number of bytes written."""
     if IS_POSIX:
         return os.pwrite(descriptor, content, place)
     os.lseek(descriptor, place, os.SEEK_SET)
@@ -243,7 +244,7 @@ def _write_at(descriptor: int, content: memoryview, place: int) -> int:
 def resolved(path: Path) -> Path:
     """Return the absolute `path` without symbolic links. The file need not exist.
 
-    For circular links, `Path.resolve` raises `RuntimeError` or nothing, depending on the version of Python.
+    If links are circular, `Path.resolve` raises `RuntimeError` or no error, depending on the version of Python.
 
     Raises:
         OSError: if the links are circular.
@@ -268,7 +269,7 @@ def _open_stream(path: Path) -> int:
 
 
 def _standard_stream(path: Path) -> int | None:
-    """Return the standard stream whose target is `path`: replacing that file would lose its earlier output."""
+    """Return the standard stream whose target is `path`, if any. Replacing that file would lose its earlier output."""
     for stream in (1, 2):
         with suppress(OSError):
             if os.path.samestat(path.stat(), os.fstat(stream)):
@@ -277,7 +278,7 @@ def _standard_stream(path: Path) -> int | None:
 
 
 def _unnamed(target: Path, mode: int) -> int | None:
-    """Return a descriptor of an unnamed file in the folder of `target`; None if the system has no unnamed files."""
+    """Return a descriptor of an unnamed file in the folder of `target`, or None if the system has no unnamed files."""
     if not hasattr(os, "O_TMPFILE"):
         return None
     try:
@@ -289,10 +290,10 @@ def _unnamed(target: Path, mode: int) -> int | None:
 
 
 def _linked(descriptor: int, target: Path) -> Path | None:
-    """Give an unnamed file a new hidden name beside `target`; return None if the system cannot do that."""
+    """Give an unnamed file a new hidden name next to `target`. Return None if the system cannot do that."""
     complete = _beside(target)
     try:
-        # Python asks the kernel to follow the link in /proc only with a folder's descriptor.
+        # Python asks the kernel to follow the link in /proc only if a folder's descriptor is given.
         os.link(f"/proc/self/fd/{descriptor}", complete, src_dir_fd=descriptor, follow_symlinks=True)
     except OSError:
         return None
@@ -300,7 +301,7 @@ def _linked(descriptor: int, target: Path) -> Path | None:
 
 
 def _beside(target: Path) -> Path:
-    """Return an unused, short, hidden name in the same folder."""
+    """Return an unused, short, hidden file name in the same folder."""
     import secrets  # noqa: PLC0415 - start-up: only writers need names
 
     return target.with_name(f".{secrets.token_hex(8)}.part")

@@ -1,4 +1,4 @@
-"""Settings of Python's cyclic garbage collector while many long-lived objects are created."""
+"""Settings for Python's cyclic garbage collector while many long-lived objects are created."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 RARE_THRESHOLD = 100_000
-"""The number of new objects, less deleted ones, before a collection of the youngest. Python's default is 700."""
+"""The number of new objects minus deleted ones that starts a collection of the youngest. Python's default is 700."""
 _active_freezes: list[None] = []
-"""An item for each active `garbage_frozen` block."""
+"""One item for each active `garbage_frozen` block."""
 
 
 @contextmanager
 def collection_paused() -> Iterator[None]:
-    """Pause the cyclic garbage collector: it would visit millions of new objects repeatedly, and free none."""
+    """Pause the cyclic garbage collector, which would visit millions of new objects repeatedly without freeing any."""
     if not gc.isenabled():
         yield
         return
@@ -30,8 +30,8 @@ def collection_paused() -> Iterator[None]:
 def collection_seldom() -> Iterator[None]:
     """Collect cyclic garbage rarely.
 
-    For a search in one thread: it has many more pending messages than Python expects young objects, and each collection
-    would visit all of them.
+    This is meant for a search in one thread: it has many more pending messages than Python expects young objects, and
+    each collection would visit all of them.
     """
     before = gc.get_threshold()
     gc.set_threshold(max(RARE_THRESHOLD, before[0]) if before[0] else 0, *before[1:])
@@ -43,10 +43,10 @@ def collection_seldom() -> Iterator[None]:
 
 @contextmanager
 def garbage_frozen() -> Iterator[None]:
-    """Exclude existing objects from garbage collection in processes forked meanwhile.
+    """Exclude existing objects from garbage collection in processes forked inside the block.
 
-    A collection writes to each object, and thus copies every inherited page: without this, 256 robots take twice as
-    long to start.
+    A collection writes to each object and thus copies every inherited page. Without this function, 256 robots take
+    twice as long to start.
     """
     gc.freeze()
     _active_freezes.append(None)
@@ -58,9 +58,9 @@ def garbage_frozen() -> Iterator[None]:
 
 
 def count_as_old() -> None:
-    """Make the collector treat all present objects as old, without visiting them: most of them stay.
+    """Make the collector treat all present objects as old, without visiting them, because most of them stay.
 
-    If objects are frozen, this does nothing, because it would unfreeze them. `gc.get_freeze_count` visits each frozen
+    If objects are frozen, this has no effect, because it would unfreeze them. `gc.get_freeze_count` visits each frozen
     object, so it is not called inside `garbage_frozen`.
     """
     if not _active_freezes and not gc.get_freeze_count():

@@ -12,11 +12,11 @@ from robochoc.system.entry_points import EntryPoint, entry_points
 from robochoc.system.termination import Terminated
 
 Fault = Callable[[object], str]
-"""Returns the reason why a loaded object cannot be used; empty if it can."""
+"""A function that returns the reason why a loaded object cannot be used; empty if it can be used."""
 
 
 class Loaded(NamedTuple):
-    """The object of an entry point, or the reason why it cannot be used."""
+    """The object to which an entry point refers, or the reason why the object cannot be used."""
 
     what: object
     broken: str
@@ -25,8 +25,8 @@ class Loaded(NamedTuple):
 def installed_entry_points(group: str) -> Sequence[EntryPoint]:
     """Return all entry points in `group`, unordered.
 
-    Reading the entry points of all packages takes as long as a small run. They are read again only after a folder on
-    `sys.path` has changed, because a package may have been installed or removed.
+    Reading the entry points of all packages takes as long as a small run. They are read again only if a folder on
+    `sys.path` has changed, since then a package may have been installed or removed.
     """
     return _read(group, tuple((place, _changed_ns(place)) for place in sys.path))
 
@@ -49,13 +49,13 @@ def entry_point_names(group: str) -> tuple[str, ...]:
 
 
 def all_entry_points(group: str) -> list[tuple[EntryPoint, list[EntryPoint]]]:
-    """Return all entries, sorted by name, each with all entries of its name."""
+    """Return all entry points, sorted by name, each with all entry points of the same name."""
     found = sorted(installed_entry_points(group), key=lambda entry: entry.name)
     return [(entry, [other for other in found if other.name == entry.name]) for entry in found]
 
 
 def entry_points_named(group: str, name: str) -> list[EntryPoint]:
-    """Return all entries with this name; several if packages conflict."""
+    """Return all entry points with this name. There are several if packages conflict."""
     return [entry for entry in installed_entry_points(group) if entry.name == name]
 
 
@@ -67,7 +67,7 @@ def not_installed_message(group: str, kind: str, name: str, *, also: Sequence[st
         kind: A noun for the names, such as `protocol`.
         name: The unknown name.
         also: Known names that are not entry points.
-        listed_by: The command that lists the names, if they are too many for a message.
+        listed_by: The command that lists the names, for the case that they are too many for a message.
     """
     import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
@@ -95,6 +95,6 @@ def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: 
 
 
 def _after_an_update(entry: EntryPoint, error: BaseException) -> str:
-    """Return the hint for a missing module of robochoc itself."""
+    """Return a hint for the case that a module of robochoc itself is missing."""
     ours = entry.value.startswith("robochoc.") and isinstance(error, ModuleNotFoundError)
     return "; robochoc has changed since it was installed: run make demo, or pip install -e . again" if ours else ""

@@ -10,7 +10,7 @@ def lazy_names(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str]
 
     Args:
         package: The name of the package.
-        modules: The modules of the names.
+        modules: The module that defines each name.
     """
 
     def get(name: str) -> object:

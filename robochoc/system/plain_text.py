@@ -1,4 +1,4 @@
-"""Untrusted text made safe to display on a terminal, on a page, or in a journal.
+"""Makes untrusted text safe for display on a terminal, on a page, or in a journal.
 
 Names, reasons and messages come from files and from robots of other owners. They must not control the terminal (escape
 sequences), reverse the reading direction (bidirectional overrides), break the line, or fill the screen.
@@ -9,18 +9,18 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 LONGEST = 10_000
-"""The maximum number of characters of a line. robochoc's own lines are shorter."""
+"""The maximum number of characters in a line. Lines written by robochoc are shorter."""
 LONGEST_REASON = 500
-"""The maximum number of characters of the reason why a participant ends, or is refused."""
+"""The maximum number of characters in the reason why a participant ends or is refused."""
 MOST_LISTED = 8
-"""The maximum number of items in a list; a longer list is cut."""
+"""The maximum number of items in a list. A longer list is truncated."""
 
 
 def on_one_line(text: str, longest: int = LONGEST) -> str:
-    """Return `text` safe to display: unprintable characters are escaped, and characters beyond `longest` omitted.
+    """Return `text` in a form safe for display: unprintable characters are escaped, and the text is cut at `longest`.
 
-    Control characters, line breaks, marks that change the reading direction and lone surrogates are unprintable.
-    Markup is not changed: code that shows the text as HTML has to escape it.
+    Control characters, line breaks, marks that change the reading direction and lone surrogates count as unprintable.
+    Markup is not changed: code that shows the text as HTML must escape it.
     """
     shown = "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text[:longest])
     return shown if len(text) <= longest else f"{shown}... ({len(text) - longest:,} more characters)"

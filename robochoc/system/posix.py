@@ -1,4 +1,4 @@
-"""The difference between POSIX systems (Linux, macOS) and Windows, as far as robochoc depends on it."""
+"""The differences between POSIX systems (Linux, macOS) and Windows that affect robochoc."""
 
 from __future__ import annotations
 

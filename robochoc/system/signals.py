@@ -1,4 +1,4 @@
-"""Signals of processes: delayed while processes start, left to the parent, sent when the parent has died.
+"""Signals of processes: delayed while processes start, handled by the parent, sent when the parent has died.
 
 Ctrl-C reaches the whole process group, and only the parent handles it.
 """
@@ -22,9 +22,9 @@ _delayed_threads: set[int] = set()
 
 @contextmanager
 def signals_delayed() -> Iterator[None]:
-    """Delay Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) in the block: unfinished work would be lost.
+    """Delay Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) inside the block, which must not be interrupted.
 
-    A process that is started in the block inherits the delay until it calls `leave_ctrl_c_to_the_parent`: a signal
+    A process started in the block inherits the delay until it calls `leave_ctrl_c_to_the_parent`, because a signal
     would interrupt the start of Python with an unrelated error. Windows cannot delay signals.
     """
     if not IS_POSIX:
@@ -34,7 +34,7 @@ def signals_delayed() -> Iterator[None]:
     thread = threading.get_ident()
     is_outermost = thread not in _delayed_threads
     try:
-        # Inside `try`, because it may block the signals and still raise the exception of an earlier one.
+        # This is inside `try` because it may block the signals and still raise the exception of an earlier signal.
         signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
         _delayed_threads.add(thread)
         yield
@@ -50,10 +50,10 @@ def are_delayed(thread: int) -> bool:
 
 
 def leave_ctrl_c_to_the_parent() -> None:
-    """In a child process: ignore Ctrl-C, end on SIGTERM, and end the delay of both.
+    """In a child process: ignore Ctrl-C, end on SIGTERM, and end the delay of both signals.
 
-    Uses the C functions of `_signal`: those of `signal` look up an enumeration's member for each number, which costs
-    each of 1,000 robots 0.2 MB of unshared memory.
+    It uses the C functions in `_signal`. The functions in `signal` look up an enumeration member for each number, which
+    costs each of 1,000 robots 0.2 MB of unshared memory.
     """
     _signal.signal(_signal.SIGINT, _signal.SIG_IGN)
     _signal.signal(_signal.SIGTERM, _signal.SIG_DFL)
@@ -62,10 +62,10 @@ def leave_ctrl_c_to_the_parent() -> None:
 
 
 def signal_when_orphaned(signum: signal.Signals) -> None:
-    """Have the kernel send `signum` to this process when its parent dies (Linux; no effect elsewhere).
+    """Let the kernel send `signum` to this process when its parent dies (Linux; no effect elsewhere).
 
-    SIGCONT is harmless, and continues a stopped process (SIGSTOP), which can then detect the end of its parent.
-    Strictly, the kernel watches the parent's thread that has started this process.
+    SIGCONT is harmless, and continues a stopped process (SIGSTOP), which can then notice the end of its parent.
+    Strictly, the kernel watches the thread of the parent that started this process.
     """
     import ctypes  # noqa: PLC0415 - start-up: only child processes need it
 

@@ -1,7 +1,7 @@
-"""A search can be asked to stop early. Its answer is then the best one known, as at the end of its time.
+"""Stopping a search early on request. Its answer is then the best known one, as at a time limit.
 
-Another program asks by the signal `STOP` (`kill -USR1 PID`); a thread of this program asks by an event. Ctrl-C and
-SIGTERM end the program without an answer.
+Another program sends the signal `STOP` (`kill -USR1 PID`); a thread in this program sets an event. Ctrl-C and SIGTERM
+end the program without an answer.
 """
 
 from __future__ import annotations
@@ -13,20 +13,20 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 
 STOP: int = getattr(signal, "SIGUSR1", 0)
-"""The signal; 0 on systems without it."""
+"""The signal, or 0 on systems that do not have it."""
 _EVENT: ContextVar[threading.Event | None] = ContextVar("stop", default=None)
-"""The event that stops the runs of this thread."""
+"""The event that stops the runs in this thread."""
 
 
 class _Request:
-    """A request to this process."""
+    """The stop request to this process."""
 
     is_made = False
 
 
 @contextmanager
 def stop_handled() -> Iterator[None]:
-    """Handle the signal `STOP` inside the context; only possible in the main thread."""
+    """Handle the signal `STOP` inside the context. This is possible only in the main thread."""
     if not STOP or threading.current_thread() is not threading.main_thread():
         try:
             yield
@@ -38,7 +38,7 @@ def stop_handled() -> Iterator[None]:
         _Request.is_made = True
 
     before = signal.signal(STOP, on_signal)
-    mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # the parent may have blocked it
+    mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # the parent may have blocked the signal
     try:
         yield
     finally:
@@ -49,7 +49,7 @@ def stop_handled() -> Iterator[None]:
 
 @contextmanager
 def stopped_by(event: threading.Event | None) -> Iterator[None]:
-    """Stop searches of this thread inside the context when the event is set."""
+    """Inside the context, stop the searches in this thread when the event is set."""
     token = _EVENT.set(event)
     try:
         yield
@@ -58,11 +58,11 @@ def stopped_by(event: threading.Event | None) -> Iterator[None]:
 
 
 def request_stop() -> None:
-    """Request the end of searches in this process, as the signal does, until `stop_handled` is left."""
+    """Request the end of all searches in this process, like the signal, until `stop_handled` is left."""
     _Request.is_made = True
 
 
 def stop_requested() -> bool:
-    """Return whether the search of this thread is to stop."""
+    """Return whether the search in this thread must stop."""
     event = _EVENT.get()
     return _Request.is_made or (event is not None and event.is_set())

@@ -1,7 +1,7 @@
-"""Output that does not wait for its reader: an unread pipe or a stopped terminal does not delay a run.
+"""Output that does not wait for its reader, so that an unread pipe or a stopped terminal does not delay a run.
 
 Bytes that cannot be written at once are buffered in memory, and a thread writes them. The thread exists only while the
-buffer is not empty, so a program whose output is read never has this thread.
+buffer is not empty, so it never exists in a program whose output is read without delay.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     from typing_extensions import Buffer
 
 MAX_WAITING = 1 << 20
-"""The maximum number of buffered bytes of standard error. Further lines are dropped and counted."""
+"""The maximum number of bytes buffered for standard error. Further lines are dropped and counted."""
 PATIENCE_S = 2.0
-"""The program ends if the reader of standard error has read nothing for this time, in seconds."""
+"""How long the program waits at its end for a reader of standard error that reads nothing, in seconds."""
 _PIECE = 4096
 
 
@@ -50,7 +50,7 @@ class BackgroundWriter:
         self._changed = threading.Condition()
 
     def write(self, content: bytes) -> bool:
-        """Write `content` now or later. Return False without writing if the buffer is full.
+        """Write `content` now or later. If the buffer is full, write nothing and return False.
 
         Raises:
             OSError: if this or earlier content cannot be written.
@@ -72,7 +72,7 @@ class BackgroundWriter:
         return True
 
     def finish(self, patience_s: float) -> bool:
-        """Wait until everything is written; return False if nothing was read for `patience_s` seconds.
+        """Wait until everything is written. Return False if the reader has read nothing for `patience_s` seconds.
 
         Raises:
             OSError: if the content cannot be written.
@@ -99,7 +99,7 @@ class BackgroundWriter:
             os.close(self._direct)
 
     def _written_now(self, content: bytes) -> int:
-        """Write what can be written without waiting; return the number of bytes."""
+        """Write as much as possible without waiting, and return the number of bytes written."""
         done = 0
         while self._direct is not None and done < len(content):
             try:
@@ -121,7 +121,7 @@ class BackgroundWriter:
                 first = self._waiting[0]
             try:
                 done = os.write(self._target, first[:_PIECE])
-            except BlockingIOError:  # another process has made it non-blocking
+            except BlockingIOError:  # another process has made the target non-blocking
                 select.select([], [self._target], [])
                 continue
             except OSError as failed:
@@ -139,7 +139,7 @@ class BackgroundWriter:
 
 
 def _not_blocking(target: int) -> int | None:
-    """Return a descriptor of the same file, pipe or terminal whose writes do not block; None if there is none.
+    """Return a descriptor of the same file, pipe or terminal with non-blocking writes, or None if that is impossible.
 
     Making `target` itself non-blocking would affect the other processes that share it.
     """
@@ -154,7 +154,7 @@ def _not_blocking(target: int) -> int | None:
 
 
 class _StandardError(io.RawIOBase):
-    """Standard error by a `BackgroundWriter`. Lines that exceed the buffer are dropped and counted."""
+    """Standard error written by a `BackgroundWriter`. Lines that do not fit into the buffer are dropped and counted."""
 
     def __init__(self, descriptor: int) -> None:
         self._descriptor = descriptor
@@ -179,13 +179,13 @@ class _StandardError(io.RawIOBase):
         return len(data)
 
     def finish(self) -> None:
-        """Wait as long as the reader makes progress."""
+        """Wait for as long as the reader makes progress."""
         with suppress(OSError):  # the reader is gone
             self._writer.finish(PATIENCE_S)
 
 
 class _StandardOutput(io.FileIO):
-    """Standard output. Its first error names it. Later writes do nothing, since Python flushes again at exit."""
+    """Standard output. Its first error names it. Later writes have no effect, because Python flushes again at exit."""
 
     _has_failed = False
 
@@ -201,12 +201,12 @@ class _StandardOutput(io.FileIO):
 
 
 _REPLACED: list[object] = []
-"""Python's original streams: deleting them would close their descriptors."""
+"""Python's original streams. Deleting them would close their descriptors."""
 
 
 def prepare_standard_streams() -> None:
-    """Make errors of `sys.stdout` name it, and writes to `sys.stderr` independent of its reader. Not on Windows."""
-    if not IS_POSIX:  # consoles have streams of their own
+    """Make errors of `sys.stdout` name it, and writes to `sys.stderr` independent of their reader. Not on Windows."""
+    if not IS_POSIX:  # consoles have their own streams
         return
     _REPLACED.extend((sys.stdout, sys.stderr))
     with suppress(OSError, ValueError):

@@ -12,7 +12,7 @@ _Member = TypeVar("_Member", bound=StrEnum)
 
 
 def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> str:
-    """Return a hint with the known word most similar to `word`, or `fallback` if none is similar."""
+    """Return a hint with the known word most similar to `word`, or `fallback` if no word is similar."""
     import difflib  # noqa: PLC0415 - start-up: only needed for errors
 
     words = [str(one) for one in known]
@@ -24,7 +24,7 @@ def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> s
 
 
 def member(choices: type[_Member], name: str, value: object) -> _Member:
-    """Return the member of `choices` with this `value`. Raises `ValueError` with the most similar member."""
+    """Return the member of `choices` with this `value`. Otherwise raise `ValueError` with the most similar one."""
     try:
         return choices(value)  # type: ignore[arg-type]
     except ValueError:

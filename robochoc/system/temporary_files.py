@@ -1,7 +1,7 @@
 """The folder for temporary files, and temporary files and folders that leave no trace.
 
-On first use, Python's `tempfile` tests folders with a named file, which remains if the process is killed at that
-moment. So the folder is found here, and passed to `tempfile` each time.
+On first use, Python's `tempfile` tests folders by creating a named file, which remains if the process is killed at that
+moment. So this module finds the folder, and passes it to `tempfile` each time.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ _FOLDERS = ("/tmp", "/var/tmp", "/usr/tmp")  # noqa: S108 - candidates; no file 
 
 
 def temporary_folder() -> Path:
-    """Return the folder for temporary files: the first writable one, in the order of `tempfile`.
+    """Return the folder for temporary files: the first writable folder in the search order of `tempfile`.
 
     Raises:
-        FileNotFoundError: if there is none.
+        FileNotFoundError: if no folder is writable.
     """
     chosen = filter(None, (tempfile.tempdir, *map(os.environ.get, _VARIABLES)))
     for folder in map(Path, (*chosen, *_FOLDERS, os.curdir)):
@@ -45,14 +45,14 @@ def unnamed_file(*, buffered: bool = True) -> IO[bytes]:
 
 
 class PrivateFolder:
-    """A new folder that only this user can read. It is removed by `close`, at the latest when this process ends.
+    """A new folder that only this user can read. It is removed by `close`, or at the latest when this process ends.
 
-    Ctrl-C and SIGTERM may interrupt any line of the main thread. `tempfile.TemporaryDirectory` leaves a folder behind
-    if they interrupt it between creation and registration, or during removal. Here the removal is registered first,
-    and done in a thread, which they do not interrupt. Forked processes do not remove the folder.
+    Ctrl-C and SIGTERM may interrupt any line in the main thread. `tempfile.TemporaryDirectory` leaves a folder behind
+    if it is interrupted between creation and registration, or during removal. This class registers the removal first,
+    and removes the folder in a thread, which signals do not interrupt. Forked processes do not remove the folder.
 
     Raises:
-        OSError: if it cannot be created.
+        OSError: if the folder cannot be created.
     """
 
     def __init__(self) -> None:
@@ -67,7 +67,7 @@ class PrivateFolder:
         self.close()
 
     def close(self) -> None:
-        """Remove the folder and its content. A second call does nothing."""
+        """Remove the folder and its content. A second call has no effect."""
         if self._remove.alive:
             remover = threading.Thread(target=self._remove)
             try:

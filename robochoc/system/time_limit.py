@@ -1,7 +1,7 @@
 """Time limits for computations that do not check the clock, such as preparation with many nested loops in Python.
 
-A loop might lack a check of the clock. Instead, a second thread raises `TimeLimitError` in the computing thread at any
-point, as Ctrl-C raises `KeyboardInterrupt`. While signals are delayed (`system/signals.py`), so is the error.
+Checks of the clock could be missing in a loop. So a second thread raises `TimeLimitError` in the computing thread at
+any point, like Ctrl-C raises `KeyboardInterrupt`. The error is delayed while signals are (`system/signals.py`).
 """
 
 from __future__ import annotations
@@ -17,16 +17,16 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.signals import are_delayed
 
 AGAIN_S = 0.05
-"""The interval at which the error is raised again, in seconds: Python drops an exception in a destructor."""
+"""The interval at which the error is raised again, in seconds, because Python drops exceptions in destructors."""
 _LONGEST_WAIT_S = 1e6
-"""The maximum waiting time of a lock, in seconds."""
+"""The longest wait for a lock, in seconds."""
 
 Arguments = ParamSpec("Arguments")
 Result = TypeVar("Result")
 
 
 class TimeLimitError(RobochocError):
-    """The time limit of a computation was reached before its result."""
+    """Raised if the time limit of a computation was reached before its result."""
 
 
 def computed_by(
@@ -37,8 +37,8 @@ def computed_by(
     Args:
         deadline: The end of the time, on the monotonic clock. None: no limit.
         function: The computation.
-        args: Its arguments.
-        kwargs: Its keyword arguments.
+        args: The arguments of `function`.
+        kwargs: The keyword arguments of `function`.
 
     Raises:
         TimeLimitError: when the deadline has passed.
@@ -50,7 +50,7 @@ def computed_by(
     running, raising = _thread.allocate_lock(), _thread.allocate_lock()
     raised: list[float] = []
     running.acquire()
-    # Python checks for an exception from another thread after a call: `release` precedes the first check.
+    # Python checks for an exception from another thread after a call, so `release` precedes the first check.
     try:
         _thread.start_new_thread(_watch, (threading.get_ident(), deadline, running, raising, raised))
         return function(*args, **kwargs)
@@ -90,10 +90,10 @@ def _ignore_where_dropped() -> None:
 
 
 def _drop_pending_error() -> None:
-    """Ensure that no pending `TimeLimitError` is raised later in this thread: raise another one, and catch it.
+    """Ensure that no pending `TimeLimitError` is raised later in this thread, by raising and catching another one.
 
-    `PyThreadState_SetAsyncExc` can also remove the error. But then Python up to 3.12 checks for it before each
-    function, for ever, which is slow, and never ends if functions are traced (`sys.setprofile`).
+    `PyThreadState_SetAsyncExc` can also remove the error. But then Python up to 3.12 checks for an error before each
+    function from then on, which is slow, and never ends if functions are traced (`sys.setprofile`).
     """
     interruption: BaseException | None = None
     while True:

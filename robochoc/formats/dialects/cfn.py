@@ -80,7 +80,7 @@ class _CfnReader:
         self._open("the functions")
         while not _closes(word := self._in.word("a function, or '}'")):
             self._read_function(word)
-        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 may omit the last bracket
+        if (last := self._in.more()) is not None and not _closes(last):  # toulbar2 allows a missing last bracket
             self._in.refuse(f"expected the end of the problem, found '{shortened(last)}'", "write } or ]")
         for place, source in self._shared:
             self._functions[place] = self._with_shared_costs(self._functions[place], source)
@@ -172,7 +172,7 @@ class _CfnReader:
             self._in.refuse(f"expected the end of the function, found '{shortened(closing)}'", "write } or ]")
 
     def _default(self) -> tuple[Amount | None, str]:
-        """Return the default cost, if there is one, and the next word."""
+        """Return the default cost, or None, and the next word."""
         word = self._in.word("costs")
         if self._tagged and word == "defaultcost":
             return self._cost(self._in.word("a cost")), self._in.word("'costs'")
@@ -242,7 +242,7 @@ class _CfnReader:
         return domain if isinstance(domain, int) else len(domain)
 
     def _cost(self, word: str) -> Amount:
-        """Return a cost, cut to the decimal places of `mustbe`."""
+        """Return a cost, truncated to the decimal places of `mustbe`."""
         amount = self._in.amount(word)
         if not isinstance(amount, Fraction) or amount == INFINITE:
             return amount
@@ -292,7 +292,7 @@ def _closes(word: str) -> bool:
 
 
 def write(team: Team, options: ExportOptions) -> ExportResult:
-    """Return the `.cfn` of `team`, with a bound that no sum of finite costs reaches.
+    """Return the `.cfn` file of `team`, with a bound that exceeds every sum of finite costs.
 
     Forbidden tuples cost three times the bound, since toulbar2 1.1 does not read `inf`: a sum with such a cost reaches
     the bound even with the least cost of all other functions.
@@ -337,12 +337,12 @@ def _cost(cost: Amount, places: int, forbidden_cost: str) -> str:
 
 
 def _is_zero_based(domain: Domain) -> bool:
-    """Return whether the values are 0, 1, ..., which need no names."""
+    """Return whether the values are 0, 1, ... Such values need no names."""
     return not domain.symbols and len(domain.ranges) == 1 and domain.ranges[0].start == 0
 
 
 def _names(domain: Domain) -> dict[int, str]:
-    """Return the names of the values; a name begins with a letter or an underscore."""
+    """Return the names of the values. Each name begins with a letter or an underscore."""
     if _is_zero_based(domain):
         return {value: str(value) for value in domain}
     names = {}

@@ -10,7 +10,7 @@ from robochoc.model.problem import Team
 
 
 def shared_constraints(team: Team) -> Counter[tuple[str, str]]:
-    """Return the number of constraints that each pair of variables shares, including the parts of PKC constraints."""
+    """Return the number of constraints that each pair of variables shares, including parts of PKC constraints."""
     place = {name: number for number, name in enumerate(team.variables)}
     pairs: Counter[tuple[str, str]] = Counter()
     for constraint in {id(one): one for one in team.constraints()}.values():
@@ -20,7 +20,7 @@ def shared_constraints(team: Team) -> Counter[tuple[str, str]]:
 
 
 def pseudo_tree(team: Team) -> dict[str, str | None]:
-    """Return each robot's parent in the pseudo-tree of a depth-first search; None for a root.
+    """Return each robot's parent in the pseudo-tree of a depth-first search, or None for a root.
 
     The search starts at the robot with the most neighbours and visits neighbours with more neighbours first.
     """

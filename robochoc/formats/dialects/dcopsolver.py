@@ -1,9 +1,9 @@
-"""The part of XDisCSP 1.0 that DCOPSolver supports; other readers of XDisCSP read it, too.
+"""The part of XDisCSP 1.0 that DCOPSolver supports. Other readers of XDisCSP read it, too.
 
-Its parser (czy920/DCOPSolverOld) supports one variable for each agent, domains from 1 to n, and one relation of two
-variables for each pair of neighbours, in which each tuple has an integer cost. It has no infinity, and its protocols
-require a connected graph. So costs of one variable are added to those of a pair, and a forbidden tuple costs more than
-all other costs together; this cost is the attribute `maximalCost` of XCSP 2.1.
+Its parser (czy920/DCOPSolverOld) supports one variable per agent, domains from 1 to n, and one relation on two
+variables for each pair of neighbours, in which each tuple has an integer cost. The format has no infinity, and the
+protocols of DCOPSolver require a connected graph. So costs of one variable are added to those of a pair, and a
+forbidden tuple costs more than all other costs together; this cost is the attribute `maximalCost` of XCSP 2.1.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from robochoc.solver.errors import UnsupportedError
 NAME = "dcopsolver"
 TITLE = "DCOPSolver's XDisCSP"
 LIMIT = 2**31 - 1
-"""The integer that counts as infinity in DCOPSolver."""
+"""The integer that DCOPSolver treats as infinity."""
 
 _PAIR = 2
 _Pair = tuple[str, str]
@@ -81,7 +81,7 @@ def _check(team: Team) -> None:
 
 
 def _by_pair(team: Team, tables: list[TabulatedConstraint]) -> dict[_Pair, list[TabulatedConstraint]]:
-    """Return the tables of each pair of variables in the order of the agents; the pairs connect all variables."""
+    """Return the tables of each pair of variables, in the order of the agents. The pairs connect all variables."""
     place = {name: number for number, name in enumerate(team.variables)}
     pairs: dict[_Pair, list[TabulatedConstraint]] = defaultdict(list)
     unary = []
@@ -103,7 +103,7 @@ def _by_pair(team: Team, tables: list[TabulatedConstraint]) -> dict[_Pair, list[
 
 
 def _missing_links(team: Team, pairs: Mapping[_Pair, object]) -> Iterator[_Pair]:
-    """Yield, for each part of the graph without the first variable, the first variable and one of that part."""
+    """Yield, for each part of the graph without the first variable, the first variable and a variable in that part."""
     near: dict[str, list[str]] = defaultdict(list)
     for one, other in pairs:
         near[one].append(other)
@@ -139,7 +139,7 @@ def _document(team: Team, costs: Mapping[_Pair, Mapping[tuple[int, int], Amount]
     stated = {
         "name": team.name,
         "type": "DCOP",
-        "benchmark": "RandomDCOP",  # the parser requires a name here, and accepts this one for any problem
+        "benchmark": "RandomDCOP",  # the parser requires a name here, and accepts this name for any problem
         "model": "Simple",
         "constraintModel": "TKC",
         "maxConstraintArity": "2",

@@ -1,4 +1,4 @@
-"""The interface of a dialect, and what all dialects need: options, results, notes, valid names, owners by name."""
+"""The interface of a dialect, and parts common to all dialects: options, results, notes, valid names, owners."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class ImportOptions:
     """The options of an import.
 
     Attributes:
-        infinity: Costs of at least this are hard; when maximising, costs of at most its negative. None: no finite cost
-            is hard.
-        owner: A regular expression; variables whose names have the same first group (or match) belong to one robot.
+        infinity: Costs of at least this value are hard; if costs are maximised, costs of at most its negative. None: no
+                finite cost is hard.
+        owner: A regular expression. Variables whose names have the same first group (or match) belong to one robot.
         allow_code: Whether Python files named by a problem may be executed.
         name: The name of the team. None: the name of the file, or of its problem.
     """
@@ -37,7 +37,7 @@ class ImportOptions:
 
 
 class ConversionNote(NamedTuple):
-    """A difference between a file and a team: a keyword for scripts, and a sentence for people."""
+    """A difference between a file and a team: a keyword for scripts, and a sentence for users."""
 
     kind: str
     text: str
@@ -47,20 +47,20 @@ OTHER_PROBLEM = {
     "bound", "count", "default", "dropped", "external", "infinity", "left out", "repeated", "rounded", "scenario",
     "truncated",
 }  # fmt: skip
-"""Kinds of notes that report a different problem; the other kinds report a different form of the same problem."""
+"""The kinds of notes on a different problem. All other kinds are notes on a different form of the same problem."""
 
 
 @dataclass(frozen=True)
 class ImportResult:
-    """A problem of another tool, as a team.
+    """Another tool's problem, converted to a team.
 
     Attributes:
         team: The team.
         dialect: The name of the dialect.
-        names: The original names of robots and variables, by their names in the team, where the two differ.
+        names: The original names of robots and variables, by their names in the team, if the two differ.
         notes: The differences from the files: `renamed`, `scale`, `shared variable`, ...
-        bound: A cost that solutions in this format do not reach. None: the format has no such bound, or no assignment
-            of the team reaches it.
+        bound: An upper bound that the costs of solutions in this format do not reach. None: the format has no such
+            bound, or no assignment of the team reaches it.
     """
 
     team: Team
@@ -75,17 +75,17 @@ class ExportOptions:
     """The options of an export.
 
     Attributes:
-        intension: Whether predicates and functions are written as such where the format has them, not as tables.
+        intension: Whether predicates and functions are written as such if the format allows it, not as tables.
     """
 
     intension: bool = False
 
 
 class ExportResult(NamedTuple):
-    """A team in the format of another tool.
+    """A team in another tool's format.
 
     Attributes:
-        files: The contents of the files by name; the problem is the first.
+        files: The contents of the files by name. The first file is the problem.
         notes: Differences between the files and the team, and options that the other tool requires.
     """
 
@@ -95,13 +95,13 @@ class ExportResult(NamedTuple):
 
 @dataclass(frozen=True)
 class Dialect:
-    """A format of another tool.
+    """Another tool's format.
 
     Attributes:
         name: Its name on the command line, such as `frodo`.
         title: Its name in messages, such as `FRODO's XCSP 2.1`.
         recognises: Returns whether a file is in this format, from its path and its first bytes.
-        read: Returns the problem in the given files. Raises `InvalidInputError`.
+        read: A function that returns the problem in the given files. Raises `InvalidInputError`.
         write: Returns the files of a team. Raises `UnsupportedError` if the format lacks a feature of the team. None:
             the format is only read.
         is_part: Returns whether a file is one of several files of a problem, from its path and its first bytes; such
@@ -117,14 +117,14 @@ class Dialect:
 
 
 class NameMap:
-    """Maps names of other tools to unique names that are valid in a team. Valid names are kept."""
+    """Maps names from other tools to unique names that are valid in a team. Valid names stay unchanged."""
 
     def __init__(self) -> None:
         self._taken: dict[str, str] = {}
         self._given: dict[str, str] = {}
 
     def allowed(self, original: str) -> str:
-        """Return the valid name for `original`, always the same one for the same original."""
+        """Return the valid name for `original`. It is always the same for the same original."""
         if original not in self._given:
             self._given[original] = self._free(original)
             self._taken[self._given[original]] = original
@@ -132,7 +132,7 @@ class NameMap:
 
     @property
     def originals(self) -> dict[str, str]:
-        """The original names by their valid names, where the two differ."""
+        """The original names by their valid names, if the two differ."""
         return {name: original for name, original in self._taken.items() if name != original}
 
     def _free(self, original: str) -> str:
@@ -146,7 +146,7 @@ class NameMap:
 
 
 def owners_by(pattern: str, names: Iterable[str]) -> dict[str, str]:
-    """Return the owner of each of `names`: the first group of the match of `pattern`, or the whole match.
+    """Return the owner of each of `names`: the first group in the match of `pattern`, or the whole match.
 
     Raises:
         MistakeError: if `pattern` is not a regular expression, or does not match a name.
@@ -172,7 +172,7 @@ def notes_on_names(changed: Collection[tuple[str, str]]) -> list[ConversionNote]
 
 
 def notes_on_absence(team: Team) -> list[ConversionNote]:
-    """Return a note on `when_absent` of constraints, which no other format has; no note if none is set."""
+    """Return a note on `when_absent` of constraints, which no other format supports; empty if it is not used."""
     first, *more = [*dict.fromkeys(one.name for one in team.constraints() if one.when_absent is not None), ""]
     others = f" and {counted(len(more) - 1, 'other constraint')}" if len(more) > 1 else ""
     return (

@@ -1,4 +1,4 @@
-"""Exact costs as other tools write them, and their conversion to relations with integer costs."""
+"""Exact costs in the notation of other tools, and their conversion to relations with integer costs."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from robochoc.model.constraint import INFINITE, Relation, Semantics
 from robochoc.model.cost_units import MAX_PLACES
 
 Amount = int | Fraction | float
-"""An exact cost; the only float is `INFINITE`, the cost of a forbidden tuple."""
+"""An exact cost. The only float is `INFINITE`, the cost of a forbidden tuple."""
 
 
 @dataclass(frozen=True)
 class ExactCostTable:
-    """The costs of the values of some variables.
+    """The costs for the values of some variables.
 
     Attributes:
-        name: Its name.
+        name: The name of the table.
         rows: The costs of the listed tuples.
         default: The cost of all other tuples.
-        size: The number of all tuples, listed or not.
+        size: The number of all tuples, whether listed or not.
     """
 
     name: str
@@ -46,7 +46,7 @@ class ExactCostTable:
 
 
 class Scale:
-    """The decimal places that a team's costs require, at most nine; costs with more are rounded."""
+    """The decimal places needed for a team's costs, at most nine. Costs with more places are rounded."""
 
     def __init__(self, amounts: Iterable[Amount]) -> None:
         needed = [decimal_places(amount) for amount in amounts if isinstance(amount, Fraction)]
@@ -65,7 +65,7 @@ class Scale:
 
 
 def decimal_places(number: Fraction) -> int | None:
-    """Return the number of decimal places of `number`. None: it has no finite decimal form."""
+    """Return the number of decimal places of `number`, or None if it has no finite decimal form."""
     rest, twos, fives = number.denominator, 0, 0
     while rest % 2 == 0:
         rest, twos = rest // 2, twos + 1
@@ -75,7 +75,7 @@ def decimal_places(number: Fraction) -> int | None:
 
 
 def relation(table: ExactCostTable, arity: int, scale: Scale) -> Relation | int:
-    """Return `table` as a relation with as few tuples as possible; an integer if all its costs are this finite one.
+    """Return `table` as a relation with as few tuples as possible, or as an integer if it has one finite cost only.
 
     Raises:
         MistakeError: if a cost or the table is too large.
@@ -91,7 +91,7 @@ def relation(table: ExactCostTable, arity: int, scale: Scale) -> Relation | int:
         what = f"the table has {len(listed)} tuples, more than the limit of {MAX_TUPLES}"
         raise MistakeError(what, "make domains or scopes smaller")
     name = definition_name(table.name)
-    if not listed:  # all tuples are forbidden: a relation over the first variable is enough
+    if not listed:  # all tuples are forbidden, so a relation over the first variable is enough
         return Relation(name, min(1, arity), Semantics.SUPPORTS, ())
     if {*listed.values(), default} <= {0, INFINITE}:
         semantics = Semantics.CONFLICTS if default == 0 else Semantics.SUPPORTS
@@ -114,13 +114,13 @@ def apply_infinity(amount: Amount, infinity: int | None, *, maximize: bool) -> A
     """Return `amount`, or `INFINITE` if it is the cost of a forbidden tuple.
 
     Args:
-        amount: A cost; it may be an infinity of either sign.
+        amount: A cost. It may be an infinity of either sign.
         infinity: Costs of at least this are infinite; when maximising, costs of at most its negative. None: no finite
             cost is.
         maximize: Whether costs are maximised.
 
     Raises:
-        MistakeError: if `amount` is the infinity that would be the best of all costs.
+        MistakeError: if `amount` is an infinity that would be the best possible cost.
     """
     bad = -amount if maximize else amount
     if bad == -math.inf:

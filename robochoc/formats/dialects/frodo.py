@@ -1,4 +1,4 @@
-"""FRODO's XCSP 2.1 (`format="XCSP 2.1_FRODO"`), in one file or in one for each agent, and plain XCSP 2.0 and 2.1.
+"""FRODO's XCSP 2.1 (`format="XCSP 2.1_FRODO"`), in one file or in one file per agent, and plain XCSP 2.0 and 2.1.
 
 Sources: FRODO's manual, Appendix A, and its schemas; Roussel and Lecoutre, arXiv 0902.2362.
 
@@ -60,7 +60,7 @@ FORMAT = "XCSP 2.1_FRODO"
 TITLE = "FRODO's XCSP 2.1"
 KEEPS_FORMULAS = "--intension writes it as a predicate or function, for FRODO's JaCoP parser"
 LIMIT = 2**31 - 1
-"""The integer that counts as infinity in FRODO's 32 bits."""
+"""The integer that FRODO, whose costs have 32 bits, treats as infinity."""
 
 _SELF = re.compile(rb"<agents\s[^>]*\bself\s*=")
 _TERM = r"(?:X\d+|-?\d+)"
@@ -97,13 +97,13 @@ def _private_agent(element: ElementView, _instance: Instance) -> str:
 
 
 def merge(instances: Sequence[Instance]) -> Instance:
-    """Return the problem in the files of all agents, such as FRODO's `-split` writes.
+    """Return the problem in the files of all agents, for example those written by FRODO's `-split`.
 
     Constraints with the same name, scope and contents in several files are one constraint. Variables in several files
     are one variable, and must have the same domain and owner.
 
     Raises:
-        InvalidInputError: if the files do not belong together, or one is missing.
+        InvalidInputError: if the files do not belong together, or a file is missing.
     """
     result = replace(instances[0], self_agent="", agents=[], variables={}, constraints=[], notes=[])
     if len(instances) > 1:
@@ -133,7 +133,7 @@ def merge(instances: Sequence[Instance]) -> Instance:
 
 
 def is_hard(constraint: ForeignConstraint) -> bool:
-    """Return whether all costs of a constraint are 0 or infinite."""
+    """Return whether each cost of a constraint is 0 or infinite."""
     match constraint.content:
         case ForeignTable(costs=costs, default=default):
             return {default, *costs.values()} <= {0, INFINITE}
@@ -197,7 +197,7 @@ def _same(one: ForeignConstraint, other: ForeignConstraint) -> bool:
 
 
 def _write(team: Team, options: ExportOptions) -> ExportResult:
-    """Return the file, in which all agents of a constraint's variables know the constraint.
+    """Return a file in which every agent with a variable in a constraint's scope knows the constraint.
 
     Raises:
         UnsupportedError: if FRODO lacks a feature of the team.
@@ -245,7 +245,7 @@ class _FrodoWriter:
         return document.content()
 
     def notes(self) -> Iterator[ConversionNote]:
-        """Yield the differences from the team."""
+        """Yield the differences between the file and the team."""
         if self._places:
             yield ConversionNote(
                 "scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits"
@@ -273,7 +273,7 @@ class _FrodoWriter:
                 raise UnsupportedError(f"{TITLE}: {what}")
 
     def _in_intension(self, one: OwnedConstraint) -> Predicate | Function | None:
-        """Return the definition of a constraint in FRODO's operators. None: write the constraint as a relation."""
+        """Return the definition of a constraint in FRODO's operators, or None if it must be written as a relation."""
         definition, cost = one.constraint.definition, one.constraint.cost
         if isinstance(definition, Relation):
             return None
@@ -287,8 +287,8 @@ class _FrodoWriter:
         return self._as_function(one, definition, body)
 
     def _as_function(self, one: OwnedConstraint, definition: Predicate | Function, body: Expression) -> Function | None:
-        """Return a definition whose costs are finite as a function. None: write the constraint as a relation."""
-        if any(robot.costs.places for robot in self._flat.team.robots):  # the costs of a function have no unit
+        """Return a definition with finite costs as a function, or None if it must be written as a relation."""
+        if any(robot.costs.places for robot in self._flat.team.robots):  # functions have no unit of costs
             return None
         if isinstance(definition, Predicate):
             if self._flat.small_table(one) is not None:

@@ -19,11 +19,11 @@ NAMES = ("frodo", "xdiscsp", "dcopsolver", "tasks", "pydcop", "xcsp3", "cfn", "w
 """The names of all dialects, in the order in which they are tried on a file."""
 
 _BEGINNING = 64 * 1024
-"""The number of bytes at the beginning of a file by which it is recognised."""
+"""The number of bytes at the beginning of a file used to detect its format."""
 
 
 def find_dialect(name: str) -> Dialect | None:
-    """Return the dialect called `name`. None: there is no such dialect in this version."""
+    """Return the dialect called `name`, or None if this version has no such dialect."""
     module = f"{__package__}.{name}"
     if name not in NAMES:
         return None
@@ -44,7 +44,7 @@ def dialects() -> Iterator[Dialect]:
 
 
 def recognise(path: Path) -> Dialect | None:
-    """Return the dialect of the file at `path`. None: the format is unknown, or the file cannot be read."""
+    """Return the dialect of the file at `path`, or None if the format is unknown or the file cannot be read."""
     beginning = first_bytes(path)
     if beginning is None:
         return None
@@ -52,12 +52,12 @@ def recognise(path: Path) -> Dialect | None:
 
 
 def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None = None) -> ImportResult:
-    """Return the problem in the files `paths` of another tool.
+    """Return another tool's problem, read from the files `paths`.
 
     Args:
         paths: The files of one problem.
         options: The options of the import.
-        name: The name of the dialect. None: it is recognised.
+        name: The name of the dialect. None: the dialect is detected.
 
     Raises:
         InvalidInputError: if a file's format is unknown, the files have different formats, or they are invalid.
@@ -78,7 +78,7 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
 
 
 def first_bytes(path: Path) -> bytes | None:
-    """Return the first bytes of a regular file; None if there is no such file. Does not block on a FIFO."""
+    """Return the first bytes of a regular file, or None if there is no such file. Does not block on a FIFO."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     except OSError:
@@ -92,10 +92,10 @@ def first_bytes(path: Path) -> bytes | None:
 
 
 def recognise_or_raise(path: Path) -> Dialect | None:
-    """Return the dialect of the file at `path`. None: it is not a file, or may be a robot's file.
+    """Return the dialect of the file at `path`, or None if it is not a file, or may be a robot's file.
 
     Raises:
-        InvalidInputError: if it is a file of an unknown format.
+        InvalidInputError: if it is a file in an unknown format.
     """
     dialect = recognise(path)
     if dialect is None and path.is_file() and (_is_wide(path) or path.suffix.lower() not in {"", ".xml"}):

@@ -1,4 +1,4 @@
-"""Write a team's constraints as tables of costs in the user's numbers, as other tools require."""
+"""Convert a team's constraints to tables of costs in the user's units, as required by other tools."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from robochoc.model.problem import Robot, Team
 from robochoc.solver.errors import UnsupportedError
 
 CONSTANT = "constant"
-"""The name of the constraint that has the constant cost."""
+"""The name of the constraint that contains the constant cost."""
 
 
 class OwnedConstraint(NamedTuple):
@@ -43,7 +43,7 @@ class TabulatedConstraint:
     Attributes:
         name: The name of the constraint.
         scope: Its variables.
-        table: The costs of their values, the same object for constraints that differ only in variables.
+        table: The costs of their values. Constraints that differ only in variables have the same table object.
     """
 
     name: str
@@ -52,7 +52,7 @@ class TabulatedConstraint:
 
 
 def owned_constraints(team: Team) -> Iterator[OwnedConstraint]:
-    """Yield the constraints of `team`; a partially known constraint (PKC) yields each of its parts."""
+    """Yield the constraints of `team`. For a partially known constraint (PKC), each of its parts is yielded."""
     for robot in team.robots:
         for constraint in (*robot.private, *robot.shared):
             yield OwnedConstraint(constraint, robot, constraint.model == ConstraintModel.PKC)
@@ -62,14 +62,14 @@ def owned_constraints(team: Team) -> Iterator[OwnedConstraint]:
 
 
 class Tabulator:
-    """Tabulates the constraints of a team; constraints that differ only in their variables are tabulated once."""
+    """Tabulates the constraints of a team. Constraints that differ only in their variables are tabulated once."""
 
     def __init__(self, team: Team) -> None:
         self._domains = {name: variable.domain for name, variable in team.variables.items()}
         self._known: dict[object, ExactCostTable] = {}
 
     def table(self, one: OwnedConstraint, name: str = "", most: int = MAX_TUPLES) -> TabulatedConstraint | None:
-        """Return a constraint as a table. None: the table would have more than `most` tuples."""
+        """Return a constraint as a table, or None if the table would have more than `most` tuples."""
         constraint = one.constraint
         scope, definition = constraint.variables, constraint.definition
         domains = [self._domains[variable] for variable in scope]
@@ -89,7 +89,7 @@ class Tabulator:
 
 
 def tabulate(team: Team) -> tuple[list[TabulatedConstraint], Fraction]:
-    """Return the tables of all constraints, and the constant cost, of a team that has not been normalised.
+    """Return the tables of all constraints, and the constant cost. The `team` must not be normalised.
 
     Raises:
         UnsupportedError: if a constraint is too large for a table.
@@ -116,12 +116,12 @@ def unique_name(name: str, taken: set[str]) -> str:
 
 
 def constant_cost(team: Team) -> Fraction:
-    """Return the constant cost of a team that has not been normalised."""
+    """Return the constant cost of a team, which must not be normalised."""
     return sum((Fraction(one.costs.constant, 10**one.costs.places) for one in team.robots), Fraction(0))
 
 
 def constant_table(team: Team, constant: Fraction) -> TabulatedConstraint:
-    """Return a constraint on the first variable whose values all have the constant cost."""
+    """Return a constraint on the first variable in which every value has the constant cost."""
     variable = next(iter(team.variables.values()))
     return TabulatedConstraint(CONSTANT, (variable.name,), ExactCostTable(CONSTANT, {}, constant, len(variable.domain)))
 
@@ -154,7 +154,7 @@ def amounts(tables: Sequence[TabulatedConstraint]) -> set[Amount]:
 
 
 def decimal(amount: Amount, places: int | None = None) -> str:
-    """Return a finite cost as a decimal without an exponent, with `places` decimal places if given."""
+    """Return a finite cost as a decimal without an exponent, with `places` decimal places if specified."""
     if isinstance(amount, int) and not places:
         return str(amount)
     exact = Fraction(amount)
@@ -180,7 +180,7 @@ def _price(definition: Predicate | Function, cost: float, places: int) -> Callab
 def _evaluated_table(
     price: Callable[[Sequence[int]], Amount], pattern: _Pattern, domains: Sequence[Domain], size: int
 ) -> ExactCostTable:
-    """Return the table of a predicate or function; its most frequent cost is the default."""
+    """Return the table of a predicate or function. Its most frequent cost is the default."""
     costs = {
         values: price([values[term] if isinstance(term, int) else term[0] for term in pattern])
         for values in itertools.product(*domains)
@@ -192,7 +192,7 @@ def _evaluated_table(
 def _relation_table(
     relation: Relation, pattern: _Pattern, domains: Sequence[Domain], places: int, size: int
 ) -> ExactCostTable:
-    """Return the table of a relation over its distinct variables, without tuples that have values outside domains."""
+    """Return the table of a relation over its distinct variables, without tuples with values outside the domains."""
     listed, other = relation.prices
     known = [frozenset(domain) for domain in domains]
     rows: dict[tuple[int, ...], Amount] = {}

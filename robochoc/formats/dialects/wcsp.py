@@ -152,7 +152,7 @@ class _WcspReader:
 
 
 def write(team: Team, options: ExportOptions) -> ExportResult:
-    """Return the `.wcsp` of `team`, without any names.
+    """Return the `.wcsp` file of `team`, which contains no names.
 
     Raises:
         UnsupportedError: if a cost is negative or not an integer, costs are maximised, costs or the table of a

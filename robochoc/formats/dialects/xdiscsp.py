@@ -1,7 +1,7 @@
-"""XDisCSP 1.0, the files of DisChoco 2 and of DCOPSolver: DisCSP, DCOP, MaxDisCSP, and ADCOP with two costs a tuple.
+"""XDisCSP 1.0, the format of DisChoco 2 and DCOPSolver: DisCSP, DCOP, MaxDisCSP, and ADCOP with two costs per tuple.
 
-Sources: the names in DisChoco's parser, and the files shipped with DCOPSolver. The variant with one file for each agent
-is robochoc's own format.
+Sources: the names in DisChoco's parser, and the files shipped with DCOPSolver. The variant with one file per agent is
+robochoc's own format.
 """
 
 from __future__ import annotations
@@ -72,7 +72,7 @@ def _private_agent(element: ElementView, instance: Instance) -> str:
 
 
 def _cost_one(instance: Instance) -> None:
-    """Replace hard constraints by soft ones that cost 1 when violated."""
+    """Replace hard constraints by soft constraints with the cost 1 for a violation."""
     tables: dict[int, ForeignTable] = {}
 
     def with_cost_one(one: ForeignConstraint) -> ForeignConstraint:
@@ -113,7 +113,7 @@ class _XdiscspWriter:
         presentation = {
             "name": flat.team.name,
             "type": kind,
-            "benchmark": "RandomDCOP",  # DCOPSolver requires a name here, and accepts this one for any problem
+            "benchmark": "RandomDCOP",  # DCOPSolver requires a name here, and accepts this name for any problem
             "model": "Complex" if any(len(robot.variables) > 1 for robot in flat.team.robots) else "Simple",
             "constraintModel": "PKC" if partly else "TKC",
             "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.owned), default=1)),
@@ -177,7 +177,7 @@ class _XdiscspWriter:
         return True
 
     def _add_sides(self) -> None:
-        """Write both sides of each pair of variables as one relation with two costs a tuple."""
+        """Write both sides of each pair of variables as one relation with two costs per tuple."""
         sides: dict[tuple[str, ...], dict[str, list[TabulatedConstraint]]] = defaultdict(lambda: defaultdict(list))
         for one in self._flat.owned:
             if self._is_side(one):
