@@ -64,7 +64,7 @@ def assemble(
         name: The team's name.
         variables: The variables of each robot, by its name; the robots are in priority order, the highest first.
         constraints: Totally known constraints over these variables, with costs in the unit `costs`. Constraints over
-                variables of a single robot are private.
+            variables of a single robot are private.
         kind: The kind of problem.
         costs: The unit of costs. Only the first robot gets its constant.
         extras: Further parts of the robots.

@@ -38,9 +38,8 @@ class PathLoss(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=
     The sender radiates `power_dbm` towards the receiver, including the gains of both antennas. Up to `reference_m` the
     loss is the free-space loss at `frequency_hz` (Friis); beyond `reference_m` it grows by 10 `exponent` dB for each
     factor of 10. In free space the `exponent` is 2. Obstacles add a normally distributed number of dB with the standard
-    deviation
-    `shadowing_db`, drawn for each message. A message that arrives with less than `sensitivity_dbm` is lost. Raises
-    `ValueError` for invalid values.
+    deviation `shadowing_db`, drawn for each message. A message that arrives with less than `sensitivity_dbm` is lost.
+    Raises `ValueError` for invalid values.
     """
 
     power_dbm: float

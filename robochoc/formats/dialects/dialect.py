@@ -24,7 +24,7 @@ class ImportOptions:
 
     Attributes:
         infinity: Costs of at least this value are hard; if costs are maximised, costs of at most its negative. None: no
-                finite cost is hard.
+            finite cost is hard.
         owner: A regular expression. Variables whose names have the same first group (or match) belong to one robot.
         allow_code: Whether Python files named by a problem may be executed.
         name: The name of the team. None: the name of the file, or of its problem.
