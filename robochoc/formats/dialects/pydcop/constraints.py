@@ -22,12 +22,12 @@ from robochoc.model.expression import Expression
 from robochoc.model.expression.bounds import Interval, bounds
 
 MAX_CELLS = 5_000_000
-"""The maximum number of tuples of all tables made from functions."""
+"""The maximum total number of tuples in tables created from functions."""
 
 
 @dataclass(frozen=True)
 class ParsedConstraint:
-    """A constraint of the file.
+    """A constraint in the file.
 
     Attributes:
         name: Its name.
@@ -83,7 +83,7 @@ class ConstraintReader:
     def function(
         self, name: str, node: Node, variables: Collection[str], sources: Node | None = None
     ) -> ParsedConstraint:
-        """Return the constraint with the function in `node` over some of `variables`."""
+        """Return the constraint given by the function in `node` over some of the `variables`."""
         if isinstance(node.scalar, (bool, int, Fraction, float)):
             return ParsedConstraint(name, (), ExactCostTable(name, {}, self._amount(node.scalar), 1), node.line)
         if not isinstance(node.scalar, str):
@@ -207,7 +207,7 @@ class ConstraintReader:
 
 
 def _tuple_words(scope: Sequence[str], node: Node) -> Iterator[tuple[int, list[str]]]:
-    """Yield the words of the tuples of a cost, with their lines."""
+    """Yield the words in the tuples of a cost, with their line numbers."""
     for one in node.items if node.items is not None else [node]:
         if not one.is_scalar:
             raise MistakeError("has a list or a mapping instead of tuples", "write v w | v w", one.line)

@@ -19,7 +19,7 @@ _HINT = "write values: [R, G] or [0..4]"
 
 @dataclass(frozen=True)
 class DomainValues:
-    """The values of a domain, as in the file and as integers.
+    """The values of a domain, as written in the file and as integers.
 
     Attributes:
         domain: The domain in the team.
@@ -36,16 +36,16 @@ class DomainValues:
 
     @property
     def kind(self) -> type | None:
-        """The type of all values. None: they have several types."""
+        """The common type of all values, or None if they have several types."""
         kinds = {type(value) for value in self.scalars.values()}
         return kinds.pop() if len(kinds) == 1 else None
 
 
 class Domains:
-    """The domains of a problem, with one numbering of all symbols."""
+    """The domains of a problem. All symbols have a common numbering."""
 
     def __init__(self, nodes: Mapping[str, Node]) -> None:
-        """Read domains, by their names. Raises `MistakeError`."""
+        """Read domains. The keys are their names. Raises `MistakeError`."""
         scalars = {name: _scalars(name, node) for name, node in nodes.items()}
         self._symbols = NameMap()
         symbolic = {name for name, values in scalars.items() if not _are_integers(values)}
@@ -90,7 +90,7 @@ def _scalars(name: str, node: Node) -> list[Scalar]:
         raise MistakeError(f"the domain '{shortened(name)}' has no values", _HINT, node.line)
     for key in ("type", "initial_value"):
         if remark := node.get(key):
-            remark.skip()  # a remark, and a value that pyDCOP itself ignores
+            remark.skip()  # a remark for users, and a value that pyDCOP itself ignores
     for one in values.items:
         if not one.is_scalar:
             what = f"the domain '{shortened(name)}' has a list or a mapping as a value"

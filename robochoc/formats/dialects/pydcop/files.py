@@ -1,4 +1,4 @@
-"""The files of one problem: the problem in one or several files, a distribution, a scenario."""
+"""The files of one problem: the problem in one or several files, a distribution, and a scenario."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class SourceText:
             raise InvalidInputError([Diagnostic(path, line, mistake.message, mistake.hint)]) from None
 
     def place(self, line: int) -> tuple[str, int]:
-        """Return the file of a line of the text, and the number of the line in this file."""
+        """Return the file that contains a line of the text, and the line number in that file."""
         found, before = next(((path, start) for path, start in reversed(self.files) if start < line), self.files[0])
         return encodable(str(found)), max(0, line - before)
 

@@ -18,7 +18,7 @@ class VariableOwners:
     Attributes:
         agents: The agents, in the order of the file.
         variables: The variables, in the order of the file.
-        constraints: The constraints; a file may host them, too, but here they have no owners.
+        constraints: The constraints. A file may assign them to hosts, but here they have no owners.
         owners: The agent of each variable.
         notes: Notes on the decisions made.
     """
@@ -30,12 +30,12 @@ class VariableOwners:
     notes: list[ConversionNote] = field(default_factory=list)
 
     def assign_by_pattern(self, pattern: str) -> None:
-        """Group the variables by the first group of the match of `pattern`, or by the whole match."""
+        """Group the variables by the first group in the match of `pattern`, or by the whole match."""
         self.owners = owners_by(pattern, self.variables)
         self.agents = list(dict.fromkeys(self.owners.values()))
 
     def assign_by_agent(self, node: Node, what: str) -> None:
-        """Read owners from a mapping of agents to the names that they host. Variables with an owner keep it."""
+        """Read owners from a mapping of agents to the names that they host. Variables that have an owner keep it."""
         if not node.is_mapping:
             raise MistakeError(f"the {what} is not a mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
         found: dict[str, str] = {}
@@ -56,7 +56,7 @@ class VariableOwners:
             self.owners.setdefault(name, agent)
 
     def assign_remaining(self) -> None:
-        """Give each variable without an owner to the agent with the fewest; without agents, to its own robot."""
+        """Assign each variable without an owner to the agent with the fewest; without agents, to its own robot."""
         left = [name for name in self.variables if name not in self.owners]
         if not left:
             return
@@ -78,7 +78,7 @@ class VariableOwners:
         self.notes.append(ConversionNote("owner", text))
 
     def robots(self) -> dict[str, list[str]]:
-        """Return the variables of each agent that owns some; add a note on the other agents."""
+        """Return the variables of each agent that owns any, and add a note on the other agents."""
         owned: dict[str, list[str]] = {agent: [] for agent in self.agents}
         for name in self.variables:
             owned[self.owners[name]].append(name)

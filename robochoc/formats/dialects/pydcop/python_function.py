@@ -1,6 +1,6 @@
-"""Functions of pyDCOP's files: Python's syntax, parsed by `ast`, interpreted here, and never executed.
+"""Functions in pyDCOP's files: Python syntax that is parsed by `ast` and interpreted here, and never executed.
 
-`_Compiler` lists the allowed syntax; anything else is refused by its name. Numbers are exact (`python_values`).
+`_Compiler` lists the allowed syntax. Any other syntax is refused by its name. Numbers are exact (`python_values`).
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ MAX_DEPTH = 300
 MAX_STEPS = 5_000_000
 """The maximum number of steps of a function, for all arguments together.
 
-Each pass of a loop counts, depending on the length of its body, and so does each member of a list or text that an
-operation reads.
+Each pass of a loop counts, in proportion to the length of the loop's body, and so does each member of a list or text
+that an operation reads.
 """
 _NODES_A_STEP = 10
 """The number of operators and terms of a loop's body that count as one step."""
@@ -66,7 +66,7 @@ class PythonFunction:
 
     Attributes:
         scope: The variables in it, in the order in which they appear.
-        body: Its statements; one expression for an expression.
+        body: Its statements. For an expression, the only statement.
     """
 
     def __init__(
@@ -92,7 +92,7 @@ class PythonFunction:
         stored = {node.id for node in names if isinstance(node.ctx, ast.Store)}
         loaded = [node.id for node in names]
         self.scope = tuple(dict.fromkeys(name for name in loaded if name in variables and name not in stored))
-        # Only names that appear: a problem has as many functions as variables.
+        # Only names that appear in the text: a problem has as many functions as variables.
         constants = {name: fixed[name] for name in loaded if name in fixed and name not in stored}
         compiler = _Compiler(variables, stored, constants, source_functions)
         self._compiler = compiler
@@ -159,7 +159,7 @@ def _check_size(body: Sequence[ast.stmt]) -> None:
 
 
 def _nodes(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
-    """Yield all nodes, in the order of the text."""
+    """Yield all nodes, in the order of the source text."""
     waiting = list(reversed(body))
     while waiting:
         node = waiting.pop()
@@ -312,7 +312,7 @@ class _Compiler:
         return call
 
     def _members(self, node: ast.expr) -> _Closure:
-        """Return an expression of which only the members are used; it may be a set, with each member once."""
+        """Return an expression of which only the members are used. It may be a set, with each member once."""
         if not isinstance(node, ast.Set):
             return self.expression(node)
         compiled = [self.expression(one) for one in node.elts]
@@ -411,7 +411,7 @@ def _binary(meaning: Callable[..., Value], left: _Closure, right: _Closure) -> _
 
 
 def _short_circuit(parts: Sequence[_Closure], *, is_and: bool) -> _Closure:
-    """Return the value of `and` or `or`: the first value that decides, or the last."""
+    """Return the value of `and` or `or`: the first value that decides the result, or the last value."""
 
     def decide(names: _Names) -> Value:
         value: Value = None

@@ -1,4 +1,4 @@
-"""Python's operators and some of its functions on the values of pyDCOP's functions: exact, and bounded.
+"""Python's operators and some of its functions, exact and bounded, on the values in pyDCOP's functions.
 
 Numbers are integers and fractions: `0.1 + 0.2` is 0.3 here. Only infinities are floats.
 
@@ -24,22 +24,22 @@ Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict[
 MAX_BITS = 1024
 """The maximum size of a number, and of its denominator, in bits."""
 MAX_ITEMS = 100_000
-"""The maximum size of a value: the number of its members, those of its members included."""
+"""The maximum size of a value: the number of its members, including the members of members."""
 MAX_NESTING = 50
 """The maximum depth of lists in lists."""
 _MAX_COLLISIONS = 16
-"""The maximum number of different keys with one hash: with more, a lookup becomes a search."""
+"""The maximum number of different keys with the same hash. With more keys, a lookup becomes a linear search."""
 
 _DECIMAL = re.compile(r"\s*[+-]?[0-9]{1,18}(\.[0-9]{1,18})?\s*")
 _PLACES = 18
 
 
 class NoValueError(RobochocError):
-    """The function has no value for these arguments; the message is the reason."""
+    """Raised if the function has no value for these arguments. The message is the reason."""
 
 
 class _Sized:
-    """The size of a list or dictionary: `size` members on all its levels, `nesting` levels."""
+    """The size of a list or dictionary: `size` members on all levels, and `nesting` levels."""
 
     size: int
     nesting: int
@@ -101,7 +101,7 @@ def bounded(value: Value) -> Value:
 
 
 def literal(value: object) -> Value:
-    """Return a constant of the source as a value; a float as its decimal text. Raises `NoValueError`."""
+    """Return a constant in the source as a value. A float is converted from its decimal text. Raises `NoValueError`."""
     if isinstance(value, float):
         return value if math.isinf(value) else Fraction(repr(value))
     if value is None or isinstance(value, (int, str)):
@@ -110,14 +110,14 @@ def literal(value: object) -> Value:
 
 
 def divide(left: Fraction | float, right: Fraction | float) -> Value:
-    """Return the quotient, exactly."""
+    """Return the exact quotient."""
     if isinstance(left, float) or isinstance(right, float):
         return float(left) / float(right)
     return Fraction(left) / Fraction(right)
 
 
 def power(base: Fraction | float, exponent: Fraction | float) -> Value:
-    """Return the power; its size is checked before it is computed. Roots are computed as floats, as in Python."""
+    """Return the power. Its size is checked before the computation. Roots are computed as floats, like in Python."""
     if isinstance(base, float) or isinstance(exponent, float):
         raise NoValueError("a power of infinity")
     if exponent != int(exponent):
@@ -158,7 +158,7 @@ COMPARISONS: dict[type[ast.cmpop], Callable[..., bool]] = {
     ast.Is: operator.eq,
     ast.IsNot: operator.ne,
 }
-"""The comparisons of two values. `is` means `==`, since equal values of domains need not be one object."""
+"""Comparisons of two values. `is` means `==`, since equal domain values need not be the same object."""
 
 
 def _round(value: Value, places: Value = None) -> Value:

@@ -36,7 +36,7 @@ from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.problem import ProblemKind, ScenarioEvent, Team
 
 _REMARKS = ("description", "inputs")
-"""Sections with remarks for people, or about the program that wrote the file."""
+"""Sections with remarks for users, or about the program that wrote the file."""
 _WISHES = ("host_with", "may_host")
 """Distribution hints that do not affect owners."""
 _DISTRIBUTE_REMARKS = ("inputs", "status", "cost", "duration", "communication_cost", "hosting_cost")
@@ -50,10 +50,10 @@ _DROPPED = {
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
-    """Return the problem in pyDCOP's files `paths`.
+    """Return the problem in the pyDCOP files `paths`.
 
     Raises:
-        InvalidInputError: with the first mistake.
+        InvalidInputError: with the first error.
     """
     parts, notes = read_files(paths), []
 
@@ -119,7 +119,7 @@ class _PydcopReader:
         return known == "max"
 
     def _infinity(self) -> int | None:
-        """Return the infinity of the options, or of the file if it was exported by robochoc."""
+        """Return the infinity specified by the options, or by the file if robochoc exported it."""
         node = self._root.get("infinity")
         if self._options.infinity is not None or node is None:
             if node is not None:
@@ -232,7 +232,7 @@ class _PydcopReader:
 
 
 class _ConstraintBuilder:
-    """Builds the team's constraints. Equal predicates and functions are one object."""
+    """Builds the team's constraints. Equal predicates and functions share one object."""
 
     def __init__(self, names: NameMap, scale: Scale) -> None:
         self._names = names
@@ -241,7 +241,7 @@ class _ConstraintBuilder:
         self.constant = 0
 
     def constraint(self, parsed: ParsedConstraint) -> Constraint | None:
-        """Return a constraint. None: it was a constant cost, now part of `constant`. Raises `MistakeError`."""
+        """Return a constraint, or None if it is a constant cost, now part of `constant`. Raises `MistakeError`."""
         scope = tuple(map(self._names.allowed, parsed.scope))
         name = xml_name(parsed.name)
         with _error_context(f"the constraint {shortened(parsed.name)}", parsed.line):
@@ -281,7 +281,7 @@ class _ConstraintBuilder:
 
 
 def _over_formals(body: Expression) -> Expression:
-    """Return the body of a predefined predicate with X0 and X1 for X and Y."""
+    """Return the body of a predefined predicate, with X and Y renamed to X0 and X1."""
     match body:
         case Apply(operator, (Name("X"), Name("Y"))):
             return Apply(operator, (Name("X0"), Name("X1")))
@@ -348,7 +348,7 @@ def _read_distribution(root: Node, hosting: VariableOwners) -> None:
 
 
 def _ignore_duplicate_key(_line: int, _key: str) -> None:
-    """Use the later of two equal keys, as pyDCOP does."""
+    """Use the later one of two equal keys, like pyDCOP."""
 
 
 @contextmanager

@@ -21,7 +21,7 @@ def read_scenario(
         root: The file.
         team: The team at its start.
         names: Maps the names of agents to those of robots.
-        agents: All agents of the problem, also those without variables.
+        agents: All agents in the problem, including agents without variables.
         notes: Notes on ignored parts are added to this list.
 
     Raises:
@@ -74,7 +74,7 @@ def _actions(event: Node, *, is_delay: bool) -> list[Node]:
 
 
 def _removed_robot(action: Node, names: NameMap, agents: Collection[str]) -> str | None:
-    """Return the robot that an action removes. None: it does something else."""
+    """Return the robot that an action removes, or None if it is another kind of action."""
     kind = action.get("type")
     if kind is None or kind.scalar != "remove_agent":
         action.skip()

@@ -1,4 +1,4 @@
-"""Translate simple functions of pyDCOP's files to predicates and functions, which are cheaper than tables."""
+"""Translate simple functions in pyDCOP's files to predicates and functions, which are cheaper than tables."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.parser import MAX_DEPTH
 
 _LARGEST = 2**62
-"""The limit of all intermediate results: robochoc's values are undefined from 2**63 on, unlike Python's."""
+"""The limit on all intermediate results. Unlike in Python, values in robochoc are undefined from 2**63 on."""
 _MAX_PARTS = 1000
 _NEGATION = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
 _ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
@@ -30,7 +30,7 @@ class VariableInfo:
 
     Attributes:
         domain: Its domain.
-        kind: The type of all its values. None: they have several types.
+        kind: The common type of all its values, or None if they have several types.
     """
 
     domain: Domain
@@ -45,7 +45,7 @@ class ViolationCost(NamedTuple):
 
 
 class _NotTranslatableError(Exception):
-    """The function has no counterpart among robochoc's expressions."""
+    """Raised if a function has no counterpart in robochoc's expressions."""
 
 
 def translate(
@@ -54,7 +54,7 @@ def translate(
     """Translate the statements of a function, with formal parameters X0, X1, ... in the order of `scope`.
 
     Returns:
-        A predicate and its cost, or an expression whose value is the cost. None: the function requires a table.
+        A predicate and its cost, an expression whose value is the cost, or None if the function requires a table.
     """
     try:
         return _Translator(scope, variables, fixed).cost(_as_expression(body))
@@ -63,7 +63,7 @@ def translate(
 
 
 def _as_expression(body: Sequence[ast.stmt]) -> ast.expr:
-    """Return one expression for statements that only choose the value to return."""
+    """Return one expression for statements that only select the value to return."""
     match body:
         case [ast.Expr(value=value)] | [ast.Return(value=ast.expr() as value), *_]:
             return value
@@ -154,7 +154,7 @@ class _Translator:
                 return self._checked(Apply(name, (self.integer(left), self.integer(right))))
 
     def _have_equal_codes(self, one: str, other: str) -> bool:
-        """Return whether equal integers of two variables in the team are equal values in the file."""
+        """Return whether two variables' values are equal in the file whenever their integers in the team are equal."""
         kind = self._kind(one)
         return kind is not None and kind is self._kind(other)
 
@@ -184,7 +184,7 @@ def _depth(expression: Expression) -> int:
 
 
 def _amount(node: ast.expr) -> Amount | None:
-    """Return the value of `node`. None: it is not a number."""
+    """Return the value of `node`, or None if it is not a number."""
     match node:
         case ast.Constant(value=value):
             amount: Value = literal(value)

@@ -1,11 +1,11 @@
-"""Write teams as pyDCOP's YAML: tables, owners, a scenario of robots that leave.
+"""Write teams as pyDCOP's YAML: tables, owners, and a scenario of robots that leave.
 
-The file also has the section `distribution` of a distribution file, so it can be given to pyDCOP as both: if a robot
-has several variables, pyDCOP itself finds no distribution for DPOP. For algorithms over factors (Max-Sum) it does
-(`adhoc`): the hints name the owners, and the capacities suffice.
+The file also has the section `distribution` of a distribution file, so it can be passed to pyDCOP as both. If a robot
+has several variables, pyDCOP itself finds no distribution for DPOP. For algorithms on factors (Max-Sum) it finds one
+(`adhoc`): the hints name the owners, and the capacities are sufficient.
 
-pyDCOP has no hard constraints. A forbidden tuple gets a cost that no sum of the other costs reaches, and the file
-states this cost: `infinity: 10000`. pyDCOP ignores this key; an import makes costs from it on infinite again.
+pyDCOP has no hard constraints. A forbidden tuple gets a cost that exceeds every sum of the other costs, and the file
+contains this cost: `infinity: 10000`. pyDCOP ignores this key; an import treats costs from this value on as infinite.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from robochoc.model.problem import RemoveAgent, Team
 from robochoc.solver.errors import UnsupportedError
 
 CAPACITY = 1000
-"""The capacity of an agent for each variable, constraint and value: more than any algorithm of pyDCOP needs."""
+"""The capacity of an agent per variable, constraint and value. It exceeds the needs of all algorithms in pyDCOP."""
 LIMIT = 2**31 - 1
 """The worst cost in pyDCOP's DPOP."""
 LEAST_INFINITY = 10_000
@@ -41,8 +41,8 @@ def write(team: Team, options: ExportOptions) -> ExportResult:
     """Return the files of `team`.
 
     Raises:
-        UnsupportedError: if costs or a constraint's table are too large, or its scenario has other changes than robots
-            that leave.
+        UnsupportedError: if costs or a constraint's table are too large, or the scenario contains changes other than
+            leaving robots.
     """
     del options
     file = f"{team.name}.yaml"

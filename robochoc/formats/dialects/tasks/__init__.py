@@ -12,7 +12,7 @@ _SECTIONS = {"robots", "tasks"}
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
-    """Return whether a YAML or JSON file begins with robots and tasks; in a long file, robots are enough."""
+    """Return whether a YAML or JSON file begins with robots and tasks. In a long file, robots are sufficient."""
     if path.suffix.lower() not in (".yaml", ".yml", ".json"):
         return False
     found = sections(beginning.decode("utf-8", "replace").lstrip("\ufeff"))

@@ -1,4 +1,4 @@
-"""Read and check the entries of a list of robots and tasks; a mistake is reported with its line."""
+"""Read and check the entries in a list of robots and tasks. Errors are reported with their line."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class RobotEntry:
 
     Attributes:
         line: Its line in the file.
-        at: Its place; empty: all its ways have length 0.
+        at: Its position; empty: the length of each of its ways is 0.
         skills: Its skills.
         capacity: The maximum sum of the loads of its tasks. None: unlimited.
         most: The maximum number of its tasks. None: unlimited.
-        speed: The length of its way in a unit of time.
+        speed: The distance that it covers per unit of time.
     """
 
     line: int
@@ -48,7 +48,7 @@ class TaskEntry:
 
     Attributes:
         line: Its line in the file.
-        at: Its place; empty: all ways to it have length 0.
+        at: Its position; empty: all ways to it have length 0.
         needs: The skills required of each of its robots.
         worth: The worth of doing it.
         load: The part of a robot's capacity that it requires.
@@ -67,7 +67,7 @@ class TaskEntry:
 
 @dataclass(frozen=True)
 class Synergy:
-    """The additional worth of two tasks if the same robot does both; it may be negative."""
+    """The additional worth of two tasks if the same robot does both. It may be negative."""
 
     line: int
     tasks: tuple[str, str]
@@ -84,7 +84,7 @@ class EntryReader:
         self._node = node
 
     def point(self, key: str) -> Point:
-        """Return a place of two or three coordinates; empty if the key is missing."""
+        """Return a position with two or three coordinates; empty if the key is missing."""
         node = self.node(key)
         if node is None:
             return ()

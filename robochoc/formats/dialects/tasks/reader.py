@@ -46,7 +46,7 @@ MAX_NUMBER = 1000
 MAX_CONSTRAINTS = 200_000
 """The maximum number of constraints of the team, and of tours."""
 MAX_CREW = 16
-"""The maximum number of robots able to do a task that requires several: one constraint is over all of them."""
+"""The maximum number of robots that can do a task that requires several: one constraint is over all of them."""
 NONE = "none"
 """The value of a robot without a task."""
 _ONLY = "task"
@@ -54,10 +54,10 @@ _ONLY = "task"
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
-    """Return the team of a list of robots and tasks.
+    """Return the team for a list of robots and tasks.
 
     Raises:
-        InvalidInputError: with all mistakes.
+        InvalidInputError: with all errors.
     """
     if len(paths) > 1:
         mistakes = DiagnosticCollector(encodable(str(paths[1])))
@@ -173,7 +173,7 @@ def _check_names(variables: Mapping[str, Sequence[Variable]]) -> None:
 
 
 class _TaskTeamBuilder:
-    """Builds the team of a list. Tasks are numbered from 1, in the order of the file."""
+    """Builds a team from a task list. Tasks are numbered from 1, in the order of the file."""
 
     def __init__(self, read: _TaskList) -> None:
         self._read = read
@@ -233,7 +233,7 @@ class _TaskTeamBuilder:
 
     def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[TaskSet, int], bool]:
         """Return the lengths of the robot's tours, and whether deadlines exclude other sets of tasks."""
-        if not self._read.tours or not robot.at:  # all ways of a robot without a place have length 0
+        if not self._read.tours or not robot.at:  # for a robot without a position, all ways have length 0
             return {}, False
         numbered = enumerate(self._read.tasks.values(), start=1)
         placed = {number: entry for number, entry in numbered if number in able and entry.at}
@@ -253,7 +253,7 @@ class _TaskTeamBuilder:
         return TaskSpec(self._task_names.allowed(name), task.load, task.robots)
 
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
-        """Return the names in the file, by the names in the team where the two differ."""
+        """Return the original names in the file, by the names in the team, if the two differ."""
         tasks = list(self._read.tasks)
         found = dict(self._robot_names.originals)
         for name, one in zip(self._read.robots, workers, strict=True):
@@ -274,7 +274,7 @@ class _TaskTeamBuilder:
                 self._notes.append(ConversionNote("left out", f"the task {shortened(name)}, which no robot can do"))
 
     def _profit(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:
-        """Return a robot's profit of a task: its share of the worth minus the way. None: it cannot do the task."""
+        """Return a robot's profit from a task: its share of the worth minus the way; None if it cannot do the task."""
         if not entry.needs <= robot.skills or robot.most == 0:
             return None
         if robot.capacity is not None and entry.load > robot.capacity:

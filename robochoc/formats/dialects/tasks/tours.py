@@ -1,7 +1,7 @@
-"""The shortest tours of a robot: from its place to all tasks of a set, in an order that meets all deadlines.
+"""The shortest tours of a robot from its position to all tasks in a set, in an order that meets all deadlines.
 
-By dynamic programming over sets and their last tasks (Held and Karp, SIAM J. 10, 1962): an earlier arrival at a task is
-never worse for the tasks after it. A tour does not lead back.
+They are found by dynamic programming over sets and their last tasks (Held and Karp, SIAM J. 10, 1962): an earlier
+arrival at a task is never worse for the following tasks. A tour does not return to its start.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.tasks.entries import MAX_PLACES, Point, RobotEntry, TaskEntry
 
 MAX_SETS = 4096
-"""The maximum number of sets of tasks that a robot has time and capacity for."""
+"""The maximum number of task sets for which a robot has time and capacity."""
 TaskSet = tuple[int, ...]
 """Numbers of tasks, in ascending order."""
 
@@ -25,9 +25,9 @@ class TourSearch:
 
     Attributes:
         name: The robot's name.
-        robot: The robot, which has a place.
-        tasks: The tasks with a place that the robot can do, by number.
-        way: Returns the length of the way between two places, in units of 10**-MAX_PLACES.
+        robot: The robot. It has a position.
+        tasks: The tasks that have a position and that the robot can do, by number.
+        way: Returns the length of the way between two positions, in units of 10**-MAX_PLACES.
     """
 
     name: str
@@ -36,7 +36,7 @@ class TourSearch:
     way: Callable[[Point, Point], int]
 
     def lengths(self) -> dict[TaskSet, int]:
-        """Return the length of the shortest tour of each set of tasks that the robot has time and capacity for.
+        """Return the length of the shortest tour for each set of tasks for which the robot has time and capacity.
 
         Raises:
             MistakeError: if there are more than `MAX_SETS` sets.
@@ -63,7 +63,7 @@ class TourSearch:
         return {tasks: min(found.values()) for tasks, found in ends.items() if tasks}
 
     def _larger_sets(self, tasks: TaskSet) -> Iterator[TaskSet]:
-        """Yield the sets with one more task, of a higher number, that the robot has capacity for."""
+        """Yield the sets with one more task, with a higher number, for which the robot has capacity."""
         if self.robot.most is not None and len(tasks) >= self.robot.most:
             return
         load = sum(self.tasks[task].load for task in tasks)
@@ -99,6 +99,6 @@ class TourSearch:
 
 
 def round_length(length: int, places: int) -> int:
-    """Convert a length from units of 10**-MAX_PLACES to units of 10**-places, rounding halves up."""
+    """Convert a length from units of 10**-MAX_PLACES to units of 10**-places, rounding half up."""
     unit = Fraction(10**places, 10**MAX_PLACES)
     return int(2 * length * unit + 1) // 2

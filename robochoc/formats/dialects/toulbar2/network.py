@@ -1,4 +1,4 @@
-"""Cost function networks, which `.cfn` and `.wcsp` share: from a network to a team, and from a team to its costs."""
+"""Cost function networks, for `.cfn` and `.wcsp`: conversion from a network to a team, and from a team to its costs."""
 
 from __future__ import annotations
 
@@ -26,12 +26,12 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.errors import UnsupportedError
 
 LIMIT = 2**53
-"""The limit of costs in units of their last decimal place: toulbar2 1.1 reads the costs of a cfn as floats."""
+"""The limit on costs, in units of their last decimal place, because toulbar2 1.1 reads the costs in a cfn as floats."""
 
 
 @dataclass(frozen=True)
 class CostFunction:
-    """A cost function over indexes of variables, with the costs of tuples of indexes of values."""
+    """A cost function over variables given by their indices, with the costs of tuples of value indices."""
 
     scope: tuple[int, ...]
     table: ExactCostTable
@@ -44,9 +44,9 @@ class CostFunctionNetwork:
 
     Attributes:
         name: Its name.
-        variables: Its variables by name: the number of their values, or the names of these.
+        variables: Its variables by name: the number of their values, or the names of the values.
         functions: Its cost functions. A scope may be empty.
-        bound: The total cost of a solution is below this bound; above, when maximising.
+        bound: A bound on the total cost of a solution: an exclusive upper bound, or lower bound if costs are maximised.
         maximize: Whether costs are maximised.
         notes: The changes made when reading the file.
     """
@@ -100,7 +100,7 @@ def _is_soft(constraint: Constraint) -> bool:
 
 
 def _domains(network: CostFunctionNetwork, symbols: NameMap) -> tuple[dict[str, Sequence[int]], dict[str, Domain]]:
-    """Return the integers of each variable's values, in the order of the file, and its domain."""
+    """Return the integers for each variable's values, in the order of the file, and the variable's domain."""
     named = {
         symbols.allowed(one): None
         for values in network.variables.values()
@@ -138,7 +138,7 @@ def _relation(function: CostFunction, scale: Scale, codes: Sequence[Sequence[int
 
 
 def _with_hard_tuples(network: CostFunctionNetwork, infinity: int | None) -> Iterator[CostFunction]:
-    """Yield the functions, in which tuples that no solution below the bound contains are forbidden.
+    """Yield the functions, after forbidding the tuples that no solution below the bound contains.
 
     A tuple is forbidden if its cost plus the least costs of all other functions reaches the bound.
     """

@@ -1,4 +1,4 @@
-"""Reading toulbar2's files word by word, with the line of each word; compressed files up to a maximum size."""
+"""Read toulbar2's files word by word, with the line of each word. Compressed files are read up to a maximum size."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ Words = Iterator[tuple[int, str]]
 
 
 class WordReader:
-    """Reads the words of a file one by one, and remembers the line of the last word."""
+    """Reads the words of a file one by one, and stores the line of the last word."""
 
     def __init__(self, words: Words) -> None:
         self._words = words
@@ -43,7 +43,7 @@ class WordReader:
         return word
 
     def more(self) -> str | None:
-        """Return the next word; None at the end of the file."""
+        """Return the next word, or None at the end of the file."""
         found = next(self._words, None)
         if found is None:
             return None
@@ -90,7 +90,7 @@ def read_file(
     """Return the result of `read` for the text of the only file in `paths`, the stem of its name, and `options`.
 
     Raises:
-        InvalidInputError: with the file and the line of the mistake.
+        InvalidInputError: if `read` raises `MistakeError`. It contains the file and the line of the error.
     """
     path = paths[0]
     if len(paths) > 1:
