@@ -14,7 +14,7 @@ _SECTIONS = {"domains", "variables", "constraints", "objective", "distribution",
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
-    """Return whether a file is pyDCOP's: YAML by its name, with a known section; or a file that begins like a problem."""
+    """Return whether a file is pyDCOP's: YAML by its name, with a known section; or the beginning of a problem."""
     found = sections(beginning.decode("utf-8", "replace").lstrip("\ufeff"))
     if path.suffix.lower() in (".yaml", ".yml"):
         return bool(found & _SECTIONS)
