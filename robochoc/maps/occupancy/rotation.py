@@ -51,11 +51,11 @@ def split_yaw(yaw: Fraction, reach: Fraction) -> tuple[int, Rotation]:
         yaw: The angle in radians. Quarter turns may be given with few decimal places.
         reach: The remaining rotation is omitted if it moves points within this radius by at most 1/100.
     """
-    quadruple_squares = round(yaw / _HALF_PI)
-    rest = yaw - quadruple_squares * _HALF_PI
+    quarters = round(yaw / _HALF_PI)
+    rest = yaw - quarters * _HALF_PI
     if abs(rest) * reach * 100 <= 1:
-        return quadruple_squares % 4, NO_ROTATION
-    return quadruple_squares % 4, Rotation(*_cosine_and_sine(rest))
+        return quarters % 4, NO_ROTATION
+    return quarters % 4, Rotation(*_cosine_and_sine(rest))
 
 
 def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:
