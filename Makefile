@@ -5,24 +5,23 @@ BIN := $(VENV)/bin
 RUN := $(VENV)/.run
 READY := $(VENV)/.ready
 # What is installed is what requirements/ has, by version and hash: wheels only, so that nothing is built but robochoc
-# itself, by the locked build backend. `make lock` writes it: docs/guides/testing.md. pip does
-# not look for requirements, as a lock has them all; for the demo it compiles nothing that may never be imported.
+# itself, by the locked build backend. `make lock` writes it: docs/guides/testing.md. For the demo, pip neither looks for
+# what the lock already has, nor compiles what may never be imported: this halves its time.
 PIP := pip install --disable-pip-version-check
-PINNED := --no-deps --require-hashes --only-binary :all: -r
-LOCKED := $(PINNED) requirements/build.txt -r
+LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
 .PHONY: demo demo-11 docs test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom release audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
-	@echo "Installing robochoc into $(VENV): about 250 MB, almost half of it Java for the solver ACE. This takes half a minute."
+	@echo "Installing robochoc into $(VENV): about 300 MB, a third of it Java for the solver ACE. This takes half a minute."
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/$(PIP) --quiet --no-compile $(LOCKED) requirements/run.txt
+	$(BIN)/$(PIP) --quiet --no-deps --no-compile $(LOCKED) requirements/run.txt
 	$(BIN)/$(PIP) --quiet --no-index --no-deps --no-build-isolation --editable .
 	@touch $@
 
 $(READY): $(RUN) requirements/dev.txt
-	@echo "Adding the development tools to $(VENV): about 800 MB more. This takes a minute."
+	@echo "Adding the development tools to $(VENV): about 430 MB more. This takes a minute."
 	$(BIN)/$(PIP) --quiet $(LOCKED) requirements/dev.txt
 	@touch $@
 
@@ -134,9 +133,9 @@ mutate: $(READY)  ## all packages, changed in one place each: do the tests notic
 
 # Tools in an environment of their own: their versions and the project's cannot be in each other's way.
 TOOLS := $(VENV)/tools
-$(TOOLS)/.ready: requirements/tools.txt
+$(TOOLS)/.ready: requirements/build.txt requirements/tools.txt
 	$(PYTHON) -m venv $(TOOLS)
-	$(TOOLS)/bin/$(PIP) --quiet $(PINNED) requirements/tools.txt
+	$(TOOLS)/bin/$(PIP) --quiet $(LOCKED) requirements/tools.txt
 	@touch $@
 
 # Workflows, issue forms and CITATION.cff by their schemas; workflows also for what makes them unsafe.

@@ -1,7 +1,4 @@
-"""Puts the viewer of the 3D scene into distributions, and compiled modules into the wheel, where there is a C compiler.
-
-The viewer is a script of the package meshcat (MIT), which is needed for the build alone: installed beside robochoc, it
-would bring IPython and a server. A source distribution has the script, and needs no meshcat.
+"""Puts compiled modules into the wheel, where there is a C compiler.
 
 The reasons are in docs/explanation/design/development.md, "Compiled core".
 
@@ -20,7 +17,6 @@ import subprocess
 import sys
 import sysconfig
 import tempfile
-from importlib.metadata import distribution
 from pathlib import Path
 from typing import Any
 
@@ -29,8 +25,6 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 NEEDED = ["msgspec>=0.18", "mypy[mypyc]>=1.13"]
 """mypyc sees the types of what is imported: without msgspec it would know nothing of messages."""
 NEXT = "A C compiler and Python's headers are needed. Without ROBOCHOC_COMPILE=1, a build without them is plain Python."
-VIEWER = ("meshcat>=0.3.2", "robochoc/view/viewer")
-"""The package of the viewer, and where the script and its licence are in a distribution."""
 MYPY = ["--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
 
 
@@ -38,17 +32,12 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
     """hatchling asks it for what it needs, and lets it work before the wheel is packed."""
 
     def dependencies(self) -> list[str]:
-        """Return what a build needs besides hatchling."""
-        viewer = [] if (Path(self.root) / VIEWER[1]).exists() else [VIEWER[0]]
-        return viewer + (NEEDED if may_compile() else [])
+        """Return what a build needs besides hatchling: nothing where nothing can be compiled."""
+        return NEEDED if may_compile() else []
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
         """Compile, and add what has been made to the wheel. Raises `RuntimeError` where it must not fail, and does."""
-        if version == "editable":
-            return
-        if not (Path(self.root) / VIEWER[1]).exists():
-            build_data["force_include"].update(_viewer())
-        if self.target_name != "wheel" or not may_compile():
+        if version == "editable" or not may_compile():
             return
         self._folder = Path(tempfile.mkdtemp(prefix="robochoc-compiled-"))
         failure = _compiled(Path(self.root), self._folder, self.config["modules"])
@@ -64,14 +53,6 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
     def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002 - hatchling's
         """Remove what has been packed."""
         shutil.rmtree(getattr(self, "_folder", ""), ignore_errors=True)
-
-
-def _viewer() -> dict[str, str]:
-    """Return the files of the viewer, and their places in a distribution."""
-    meshcat = distribution("meshcat")
-    wanted = ("meshcat/viewer/dist/main.min.js", "LICENSE.txt")
-    found = [Path(str(meshcat.locate_file(file))) for file in meshcat.files or () if str(file).endswith(wanted)]
-    return {str(path): f"{VIEWER[1]}/{path.name}" for path in found}
 
 
 def _asked() -> bool:

@@ -21,14 +21,7 @@ nox.options.error_on_missing_interpreters = False
 
 def _install(session: nox.Session) -> None:
     session.install(
-        "--no-deps",
-        "--require-hashes",
-        "--only-binary",
-        ":all:",
-        "-r",
-        "requirements/build.txt",
-        "-r",
-        "requirements/dev.txt",
+        "--require-hashes", "--only-binary", ":all:", "-r", "requirements/build.txt", "-r", "requirements/dev.txt"
     )
     session.install("--no-index", "--no-deps", "--no-build-isolation", "--editable", ".")
 

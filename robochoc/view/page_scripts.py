@@ -17,18 +17,11 @@ from pathlib import Path
 def viewer_script() -> str:
     """Return the JavaScript of meshcat's viewer, three.js included.
 
-    A wheel of robochoc contains it (`hatch_build.py`); beside sources, it is read from the package meshcat, which
-    is not imported. Raises `ModuleNotFoundError` if there is neither.
+    It is read from a file of meshcat, which is not imported, since that takes long. Raises `ModuleNotFoundError`.
     """
-    bundled = files(__package__) / "viewer" / "main.min.js"
-    if bundled.is_file():
-        return bundled.read_text(encoding="utf-8")
     found = find_spec("meshcat")
     if found is None or not found.submodule_search_locations:
-        raise ModuleNotFoundError(
-            "meshcat, whose viewer draws the scene, is not installed; run: pip install --no-deps meshcat",
-            name="meshcat",
-        )
+        raise ModuleNotFoundError("meshcat, whose viewer draws the scene, is not installed", name="meshcat")
     viewer = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
     return viewer.read_text(encoding="utf-8")
 

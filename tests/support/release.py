@@ -27,8 +27,6 @@ from tests.support.snippets import blocks_of
 
 ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-VIEWER = {f"robochoc/view/viewer/{name}" for name in ("main.min.js", "main.min.js.LICENSE.txt", "LICENSE.txt")}
-"""The only files of a wheel that are not in git, besides compiled modules: hatch_build.py."""
 NEEDED = {"robochoc/py.typed", "robochoc/xsd/robot.xsd", "robochoc/sniffer/assets/index.html", "robochoc/app/icon.svg"}
 """Some of what a wheel is not complete without. All must be there that is in git; these are also not to leave git."""
 MOST_BYTES = {"sdist": 30_000_000, "wheel": 4_000_000, "compiled": 12_000_000}
@@ -70,8 +68,9 @@ def digest(file: Path) -> str:
 
 def package_files(tracked: Sequence[str]) -> set[str]:
     """Return the names that files of the repository have in a wheel, the compiled modules left out."""
-    ours = {name for name in tracked if name.startswith("robochoc/")}
-    return ours | {f"robochoc/{name}" for name in tracked if name.startswith("xsd/")} | VIEWER
+    return {name for name in tracked if name.startswith("robochoc/")} | {
+        f"robochoc/{name}" for name in tracked if name.startswith("xsd/")
+    }
 
 
 def faults_of(wheel: Path, expected: set[str]) -> Iterator[str]:

@@ -10,7 +10,6 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
-from pathlib import Path
 
 import pytest
 
@@ -20,7 +19,6 @@ from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
 from robochoc.view.page import scene_page
-from robochoc.view.page_scripts import viewer_script
 from robochoc.view.scene import DrawnDrone, Scene
 from tests.support.cases import looped
 from tests.support.flights import commands_of, scene_of, straight
@@ -306,26 +304,6 @@ def test_equal_scenes_make_equal_pages() -> None:
     assert scene_page(four()) == scene_page(four())
 
 
-def test_a_scene_is_drawn_without_the_python_package_of_meshcat() -> None:
-    """It would bring IPython and a server: only its viewer is used, a script."""
-    code = (
-        "import sys, robochoc\n"
-        "from robochoc.view.page import scene_page; from tests.support.flights import scene_of\n"
-        "model = robochoc.Model('one'); model.robot('a').variable('x', [1])\n"
-        "assert len(scene_page(scene_of(model.solve('abt')))) > 500_000\n"
-        "sys.exit(bool({'meshcat', 'zmq', 'IPython'} & {*sys.modules}))"
-    )
+def test_meshcat_is_not_imported_before_a_scene_is_drawn() -> None:
+    code = "import sys, robochoc.view.page; sys.exit('meshcat' in sys.modules or 'zmq' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_the_viewer_of_the_wheel_is_preferred_and_its_absence_says_what_to_install(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("robochoc.view.page_scripts.files", lambda _: tmp_path)
-    assert len(viewer_script()) > 500_000
-    monkeypatch.setattr("robochoc.view.page_scripts.find_spec", lambda _: None)
-    with pytest.raises(ModuleNotFoundError, match="pip install --no-deps meshcat"):
-        viewer_script()
-    (tmp_path / "viewer").mkdir()
-    (tmp_path / "viewer" / "main.min.js").write_text("its script")
-    assert viewer_script() == "its script"
