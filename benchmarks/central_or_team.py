@@ -8,8 +8,8 @@ its own model, with `add_all_different` and `add_element`, and all cores. The te
 
 from __future__ import annotations
 
+import argparse
 import random
-import sys
 import time
 
 from ortools.sat.python import cp_model
@@ -56,7 +56,9 @@ def solved_by_team(costs: list[list[int]], protocol: str) -> str:
 
 def main() -> None:
     """Solve the problem for each number of robots on the command line."""
-    for robots in [int(word) for word in sys.argv[1:]] or [20, 40, 60]:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("robots", type=int, nargs="*", default=[20, 40, 60], help="numbers of robots")
+    for robots in parser.parse_args().robots:
         costs = costs_of(robots)
         for name in ("ortools", *TEAM_PROTOCOLS):
             start = time.perf_counter()

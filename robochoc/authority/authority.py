@@ -2,7 +2,7 @@
 
 A person enrols a name and carries the token to the robot. The robot creates a key, and redeems the token once. The
 Authority signs a certificate, which is valid for a day and is renewed before it expires. A revocation is recorded until
-the certificate would have expired. Whoever holds `ca.key` in the folder can act as the Authority.
+the certificate would have expired. Anyone who has `ca.key` of the folder can act as the Authority.
 """
 
 from __future__ import annotations

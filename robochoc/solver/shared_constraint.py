@@ -14,7 +14,7 @@ from robochoc.solver.encoding import MAX_TUPLES, Cost, allows_function, cost_fun
 from robochoc.solver.errors import UnsupportedError
 
 Conflict = Mapping[str, Value]
-"""Assignments of other robots that exclude an own value: the left side of a nogood."""
+"""Assignments of other robots that exclude a value of this robot: the left side of a nogood."""
 
 UNKNOWN = -1
 """The mask if there is none: a value in the scope is unknown, or a withdrawn robot drops the constraint."""
@@ -24,7 +24,7 @@ OtherValues = tuple[int | None, ...]
 
 
 class Gap(NamedTuple):
-    """The combinations of the others' values that violate a constraint with an own value, and those that satisfy it."""
+    """The others' values that violate a constraint with a value of this robot, and those that satisfy it."""
 
     broken: Sequence[Conflict]
     allowed: Sequence[Conflict]

@@ -106,7 +106,7 @@ def test_what_cannot_be_or_nobody_asked_for_is_refused() -> None:
     assert_refused(fork, [("RC", Result(3, {"RC": (1,), "RE": (1,)}))], "which has no open request")
     assert_refused(searching, [("RA", Result(3, {}))], "which has no open request")
     assert_refused(searching, [("RF", Report(3))], "unexpected bound from")
-    assert_refused(searching, [("RC", Result(3, {"RD": (1,)}))], "values of other robots")
+    assert_refused(searching, [("RC", Result(3, {"RD": (1,)}))], "an assignment without its own value")
     final = [("RA", Terminate({f"R{name}": (2,) for name in names})) for names in ("CDEF", "BCDE")]
     assert_refused(fork, final, "below it are incomplete")
     assert_refused(leaf, [("RZ", Request((1,)))], "is not above")

@@ -5,6 +5,7 @@ python -m tests.support.public_api > tests/repository/public_api.txt
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import inspect
 import sys
@@ -79,4 +80,5 @@ def _parameters(value: object) -> str:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     sys.stdout.writelines(f"{line}\n" for line in public_api())

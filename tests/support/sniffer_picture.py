@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import io
 import tempfile
 from pathlib import Path
@@ -45,6 +46,7 @@ def page(folder: Path) -> Path:
 
 def main() -> None:
     """Write the picture."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     with tempfile.TemporaryDirectory() as place, chromium() as browser:
         url = page(Path(place)).as_uri()
         with shown(browser, url, "6 messages", viewport=SIZE) as shown_page:

@@ -37,7 +37,7 @@ class AuditedSearchState(SearchState):
     """The state of a search whose robots are not trusted: their messages are checked for plausibility.
 
     stuck: The reason why the search can never end; empty if it can end.
-    drops: Whether robots are told to drop messages.
+    drops: Whether robots must drop messages.
     duration_s: The duration of the search in seconds, after `note_end` was called.
     """
 

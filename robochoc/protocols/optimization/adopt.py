@@ -25,7 +25,7 @@ Choices that the paper leaves open, and differences:
 - Constraints may be n-ary (the robot that is lowest in the tree in the scope pays, once it knows all other values) and
   hard (LB may become infinite; then a root ends the search).
 - UB is infinite until the values of all neighbours above are known.
-- A value in a context has a counter, as in BnB-ADOPT (`bnb_adopt`); the larger counter wins, whoever sent it. Without
+- A value in a context has a counter, as in BnB-ADOPT (`bnb_adopt`); the larger counter wins, from any sender. Without
   it, late costs would restore obsolete values of robots further up.
 - No message is repeated (Gutierrez, Meseguer: "Saving redundant messages in ADOPT-based algorithms", DCR workshop
   2010). The paper's robots repeat messages; under a slow schedule these would accumulate without end. Therefore a

@@ -173,7 +173,7 @@ class _Xcsp21Reader:
         if most and most != "infinity":
             bound = finite_cost(most)
             self.instance.maximal_cost = bound
-            text = f"costs of {most} or more are infinite (maximalCost): an optimum of {most} or more is no solution"
+            text = f"costs of {most} or more are infinite (maximalCost): an optimum of {most} or more means no solution"
             self.instance.notes.append(ConversionNote("bound", text))
 
     def _read_agent(self, element: ElementView) -> None:

@@ -79,7 +79,7 @@ def _objective(element: Element, posting: Posting, *, maximize: bool) -> Express
 def _n_values_objective(members: Sequence[Expression], posting: Posting, *, maximize: bool) -> Expression:
     """Return the number of different values of `members`; for many members, as a sum of auxiliary variables.
 
-    In an optimal solution the sum equals this number; in other solutions the sum is no better.
+    In an optimal solution the sum equals this number; in other solutions the sum is equal or worse.
     """
     if posting.size({name for member in members for name in names(member)}) <= MAX_TOGETHER:
         return number_of_values(members)
