@@ -57,7 +57,8 @@ class PrivateFolder:
 
     def __init__(self) -> None:
         self.path = temporary_folder() / f"robochoc-{secrets.token_hex(16)}"
-        self._remove = weakref.finalize(self, _remove, self.path, os.getpid())
+        self._owner = os.getpid()
+        self._remove = weakref.finalize(self, _remove, self.path, self._owner)
         self.path.mkdir(mode=0o700)
 
     def __enter__(self) -> Path:
@@ -69,13 +70,14 @@ class PrivateFolder:
     def close(self) -> None:
         """Remove the folder and its content. A second call has no effect."""
         if self._remove.alive:
-            remover = threading.Thread(target=self._remove)
+            remover = threading.Thread(target=_remove, args=(self.path, self._owner))
             try:
                 remover.start()
             except RuntimeError:  # no further thread can be started
                 self._remove()
             else:
                 remover.join()
+                self._remove.detach()  # last: the end of the process does not wait for a thread that has hardly started
 
 
 def _remove(folder: Path, owner: int) -> None:
