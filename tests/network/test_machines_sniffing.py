@@ -96,7 +96,7 @@ def test_sniffers_that_are_stopped_killed_or_revoked_in_mid_run(site: Deployment
     whole = copy_of(site, "Whole").read_bytes()
     programs["Stopped"].strike(signal.SIGCONT)
     assert programs["Stopped"].status() == 4
-    assert "is gone" in programs["Stopped"].errors
+    assert "has ended, or does not allow Stopped to sniff any more" in programs["Stopped"].errors
     for name in ("Stopped", "Killed", "Revoked"):
         part = copy_of(site, name).read_bytes()
         assert whole.startswith(part)
