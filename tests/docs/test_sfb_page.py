@@ -52,9 +52,9 @@ class Listener:
 
 
 def revealed(problem: Team) -> tuple[int, int, int]:
-    """How many rows of tables there are, how many robots can tell, and how many they can tell but for a constant.
+    """How many rows of tables there are, how many robots can tell, and how many they can tell up to a constant.
 
-    A row counts once for each robot that has no part in its constraint. But for a constant: the robot can tell the
+    A row counts once for each robot that has no part in its constraint. Up to a constant: the robot can tell the
     difference to another row of the same table.
     """
     listener = Listener(problem)
@@ -85,5 +85,5 @@ def test_the_page_says_what_robots_can_tell_of_others_tables(agents: int, densit
     for seed in range(1, 11):
         parameters = {"domain": DOMAIN, "density": density, "max_cost": 100, "connected": True}
         found += revealed(FAMILIES["random"](agents=agents, seed=seed, **parameters))
-    said = re.findall(r"(\d+) % of the rows exactly, and (\d+) % but for", PAGE.read_text())
+    said = re.findall(r"(\d+) % of the rows exactly, and (\d+) % up to a constant", PAGE.read_text())
     assert [f"{share:.0%}" for share in found[1:] / found[0]] == [f"{number}%" for number in said[place]]
