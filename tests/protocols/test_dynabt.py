@@ -34,7 +34,7 @@ from tests.support.agents import replies, value
 from tests.support.cases import looped
 from tests.support.dynabt_robots import after, agent, change
 from tests.support.problems import team_of
-from tests.support.small_teams import DIFFERENT, differ, triangle
+from tests.support.small_teams import DIFFERENT, differ, different, triangle
 
 CAB, CBC, CAC = "RB<RA:C", "RC<RB:C", "RC<RA:C"  # keys of the triangle's constraints
 
@@ -277,6 +277,21 @@ def test_a_robot_of_an_old_name_is_a_stranger() -> None:
     )
     dynabt.resume(lossless=True)
     assert dynabt.outbox == [("RD", Ok((2,)))]
+
+
+def test_a_robot_that_joined_under_an_old_name_is_informed_if_it_becomes_a_child_later() -> None:
+    team = different("ABC", "AB AC", 2)
+    dynabt = agent(team, "RA")
+    again = replace(team["RB"], parents=(Parent("RC", (differ("C", "B", "M"),)),))
+    new = apply_changes(team, [RemoveAgent("RB"), AddAgent(again)])
+    dynabt.change(
+        LocalProblem(agent_problems(new)["RA"]), PriorityOrder(new.order), Invalidated(frozenset(), frozenset({"RB"}))
+    )
+    dynabt.resume(lossless=True)
+    said = list(dynabt.outbox)
+    dynabt.outbox.clear()
+    said += after(dynabt, new, AddConstraint("RB", "RA", differ("A", "B", "N")))
+    assert said == [("RB", Ok((1,)))]
 
 
 # The search goes on

@@ -90,11 +90,11 @@ class DynABT(ABT, DynamicProtocol):
         known = (
             {*self.lower} - invalidated.agents - {*self.uninformed}
         )  # a change may follow another before the search continues
-        self.uninformed = [child for child in problem.children if child not in known]
         self.higher = {*problem.parents, *(self.higher - invalidated.agents)}
         # Robots that requested the value, and are still present, continue to receive it, even if its variables have
-        # changed.
+        # changed. A robot of the same name that has joined instead does not know the value yet.
         self.lower = list(dict.fromkeys((*problem.children, *(robot for robot in self.lower if robot in order.rank))))
+        self.uninformed = [robot for robot in self.lower if robot not in known]
         self.problem, self.order = problem, order
 
     def resume(self, *, lossless: bool) -> None:

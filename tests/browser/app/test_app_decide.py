@@ -86,7 +86,7 @@ def test_a_long_search_is_watched_and_stopped(browser: Browser, application: App
         tab.page.click(GO)
         tab.page.wait_for_selector(".facts:has-text('The best so far costs 105')")
         tab.page.wait_for_selector(".team-picture .said", state="attached")
-        tab.page.wait_for_selector(".said-list li:has-text('the best solution so far costs 105')")
+        tab.page.wait_for_selector(".said-list li:has-text('Here are plans of the robots before you')")
         tab.page.click(f"{GO}:has-text('Stop')")
         _told(tab, "The search was stopped; this is the best answer so far. It costs 105.")
 
