@@ -7,7 +7,7 @@ import io
 import os
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from operator import attrgetter
 from pathlib import Path
 from threading import Lock
@@ -205,6 +205,49 @@ class JournalFile:
         if file:
             with errors_naming(self._path):
                 file.close()
+
+
+@contextmanager
+def recorded(
+    path: Path | None,
+    header: Header,
+    objective: Callable[[], Objective] | None = None,
+    sinks: Sequence[BlockSink] = (),
+    on_error: Callable[[JournalRecorder], None] | None = None,
+) -> Iterator[JournalRecorder]:
+    """Provide a recorder that writes to a file and to other sinks during the block, and is closed at its end.
+
+    If a sink cannot be written, the run continues; the errors are in `failures` of the recorder. A block that fails
+    before any event, such as a rejected run, does not overwrite an older file.
+
+    Args:
+        path: The file, if there is one.
+        header: The header of the journal.
+        objective: See `JournalRecorder`.
+        sinks: Other sinks.
+        on_error: Called with the closed recorder if the block raises an exception.
+
+    Raises:
+        OSError: at the end, if the file is a pipe and its reader did not read all of it.
+    """
+    file = JournalFile(path) if path else None
+    recorder = JournalRecorder(header, objective, [file.write, *sinks] if file else sinks)
+    try:
+        yield recorder
+    except BaseException:
+        if not recorder.is_empty:
+            recorder.close()
+        if on_error:
+            on_error(recorder)
+        if file:
+            with suppress(OSError):  # the error that ended the block is more important
+                file.close()
+        raise
+    try:
+        recorder.close()
+    finally:
+        if file:
+            file.close()
 
 
 class _SinkState:

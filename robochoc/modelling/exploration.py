@@ -13,7 +13,8 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.solver.ace import AceProcess
-from robochoc.system.errors import RobochocError
+from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import OptionError, RobochocError
 
 if TYPE_CHECKING:
     from robochoc.modelling.constraints import ModelConstraint
@@ -25,11 +26,23 @@ Test = Callable[[Collection[int]], bool]
 
 
 def solutions_of(model: Model, protocol: str, limit: int | None, options: dict[str, object]) -> Iterator[Solution]:
-    """Yield the distinct solutions of a model: after each solution, a constraint excludes its values."""
+    """Yield the distinct solutions of a model: after each solution, a constraint excludes its values.
+
+    Raises:
+        OptionError: if the robots may withdraw: the values of a solution would exclude more than that solution.
+        UnsupportedError: if events change the model.
+        ExplorationError: if a search ends without a verdict.
+    """
+    if options.get("withdraw"):
+        raise OptionError("solutions() cannot be used with withdraw: it lists solutions for all robots")
+    _refuse_events(model, "solutions()")
     rest = copy.copy(model)
     number = 0
     while limit is None or number < limit:
         solution = rest.solve(protocol, **options)  # type: ignore[arg-type] # options of `solve`
+        if solution.verdict == Verdict.UNKNOWN:
+            why = solution.reason or "a limit was reached"
+            raise ExplorationError(f"the search for solution {number + 1} ended without a verdict: {why}")
         if not solution:
             return
         yield solution
@@ -38,8 +51,13 @@ def solutions_of(model: Model, protocol: str, limit: int | None, options: dict[s
         rest.add(any_of(variable != values[name] for name, variable in rest.variables.items() if name in values))
 
 
-class ConflictTimeoutError(RobochocError):
-    """The search for a conflict reached its time limit."""
+class ExplorationError(RobochocError):
+    """A search ended without a verdict: at a limit, or because the protocol is incomplete."""
+
+
+def _refuse_events(model: Model, function: str) -> None:
+    if model.events:
+        raise UnsupportedError(f"{function} is for models that do not change, but {model.name} has events")
 
 
 def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, ...] | None:
@@ -48,8 +66,12 @@ def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, .
     The algorithm is QuickXplain (Junker, AAAI 2004); the central solver tests whether sets can hold together.
 
     Raises:
-        ConflictTimeoutError: if the time limit was reached.
+        UnsupportedError: if the model was loaded, so that its constraints are not objects of this model, or changes.
+        ExplorationError: if the time limit was reached.
     """
+    _refuse_events(model, "conflict()")
+    if model.given is not None:
+        raise UnsupportedError("conflict() names constraints added to a model; this model was loaded, and has others")
     until = None if timeout is None else time.monotonic() + timeout
     every = _constraints(model)
     hard = [place for place, one in enumerate(every) if one.cost is None]
@@ -60,7 +82,7 @@ def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, .
             options = Options(protocol=CENTRAL, timeout=left)
             verdict = solve(_with_only(model, places).team, options, solver=solver).verdict
             if verdict == Verdict.UNKNOWN:
-                raise ConflictTimeoutError(f"no conflict was found within {timeout:g} s: set a longer timeout")
+                raise ExplorationError(f"no conflict was found within {timeout:g} s: set a longer timeout")
             return verdict != Verdict.NO_SOLUTION
 
         if can_hold(hard):

@@ -321,7 +321,12 @@ class Model(Solvable):
         Args:
             protocol: The protocol, or `central`: a single solver that knows the constraints of all robots.
             limit: The maximum number of solutions. None: all solutions.
-            **options: The other options of `solve`.
+            **options: The other options of `solve`, except `withdraw`.
+
+        Raises:
+            ExplorationError: if a search ends without a verdict, at a limit or because the protocol is incomplete.
+            UnsupportedError: if events change the model.
+            OptionError: if the robots may withdraw.
 
         Example:
             >>> model = robochoc.Model()
@@ -342,7 +347,8 @@ class Model(Solvable):
             timeout: A time limit, in seconds. None: no limit.
 
         Raises:
-            ConflictTimeoutError: if the time limit was reached.
+            ExplorationError: if the time limit was reached.
+            UnsupportedError: if the model was loaded, or events change it.
         """
         from robochoc.modelling.exploration import conflict_of  # noqa: PLC0415 - start-up: seldom used
 

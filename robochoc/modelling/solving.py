@@ -14,12 +14,11 @@ from robochoc.journal.events import Observer, combined
 from robochoc.model.outcome import Answer, Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.option_names import errors_in_python, in_python
-from robochoc.modelling.run_journal import recorded
 from robochoc.modelling.solution import Solution
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import CentralSolverName, Options, Runtime, ScheduleName
-from robochoc.run.orchestrator import prepare
+from robochoc.run.orchestrator import PreparedRun, prepare
 from robochoc.run.scenario import Environment
 from robochoc.solver.compile import CompileLimits
 from robochoc.system.errors import OptionError, OptionTypeError
@@ -152,11 +151,7 @@ class Solvable(ABC):
             options = _with_team_names(Options(**given | {"protocol": protocol or AUTO}), self._robots_called(team))
             refuse_options(options, environment=environment is not None)
             run = prepare(team, options, environment=environment is not None, ordered=self._is_ordered)
-            with recorded(journal, run) as recorder:
-                observers = combined(observer, recorder)
-                outcome = run.solve(observer=observers, progress=progress, environment=environment)
-                if recorder is not None:
-                    recorder.outcome = outcome
+            outcome = _solve_recorded(run, journal, observer, progress, environment)
         solution = self._solution(_texts_in_python(outcome), team)
         if html is not None:
             solution.scene().save(html)
@@ -214,6 +209,30 @@ def _texts_in_python(outcome: Outcome) -> Outcome:
     epochs = tuple(replace(one, reason=reason(one)) for one in outcome.epochs)
     chosen = {name: in_python(why, ARGUMENTS) for name, why in outcome.chosen.items()}
     return replace(outcome, reason=reason(outcome), epochs=epochs, chosen=chosen)
+
+
+def _solve_recorded(
+    run: PreparedRun,
+    journal: Path | str | None,
+    observer: Observer | None,
+    progress: Callable[[Progress], None] | None,
+    environment: Environment | None,
+) -> Outcome:
+    """Run the search, with a journal if there is a path for it. Raises `OSError` if the journal cannot be written."""
+    if journal is None:
+        return run.solve(observer=observer, progress=progress, environment=environment)
+    from robochoc.journal.recorder import recorded  # noqa: PLC0415 - start-up: seldom used
+    from robochoc.run.recording import journal_header, objective_to_record  # noqa: PLC0415 - start-up: seldom used
+
+    options = run.choice.options
+    objective = None if environment else objective_to_record(run.team, options)  # otherwise the problem changes
+    with recorded(Path(journal), journal_header(run.team, options), objective) as recorder:
+        observers = combined(observer, recorder)
+        outcome = run.solve(observer=observers, progress=progress, environment=environment)
+        recorder.outcome = outcome
+    for failure in recorder.failures:
+        raise failure
+    return outcome
 
 
 def _refuse(unknown: Iterable[str]) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -47,28 +47,12 @@ def recording(
     if path is None and not sinks:
         yield None
         return
-    from robochoc.journal.journal import JournalFile, JournalRecorder
+    from robochoc.journal.recorder import recorded
 
-    file = JournalFile(path) if path else None
-    recorder = JournalRecorder(header(), objective, [file.write, *sinks] if file else sinks)
-    try:
+    with recorded(path, header(), objective, sinks, on_error=_show_failures) as recorder:
         yield recorder
-    except BaseException:
-        if not recorder.is_empty:  # a rejected run must not overwrite the journal of an earlier run
-            recorder.close()
-        for failure in _failures(recorder):
-            failure.show()
-        if file:
-            with suppress(OSError):  # the error that ended the run is more important
-                file.close()
-        raise
-    else:
-        recorder.close()
-        for failure in _failures(recorder):
-            raise failure
-    finally:
-        if file:
-            file.close()
+    for failure in _failures(recorder):
+        raise failure
 
 
 def flushing_progress(
@@ -84,6 +68,11 @@ def flushing_progress(
             show(progress)
 
     return flush_and_show
+
+
+def _show_failures(recorder: JournalRecorder) -> None:
+    for failure in _failures(recorder):
+        failure.show()
 
 
 def _failures(recorder: JournalRecorder) -> list[Failure]:

@@ -37,6 +37,15 @@ def _is_delayed(options: Options) -> bool:
     return bool(options.delay) or options.schedule != ScheduleName.CONCURRENT
 
 
+def _starts_programs_without(options: Options) -> bool:
+    """Return whether robots are programs of their own, which do not know a protocol that this program registered."""
+    if options.runtime != Runtime.NETWORK:
+        return False
+    from robochoc.run.registry import is_registered  # noqa: PLC0415 - start-up: this runtime is rare
+
+    return is_registered(options.protocol)
+
+
 _WITHOUT_PROCESSES = frozenset({Runtime.SIMULATOR, Runtime.ARRAYS})
 
 OPTION_RULES = (
@@ -123,6 +132,11 @@ OPTION_RULES = (
     OptionRule(
         lambda o: o.count and o.withdraw is not None,
         "--count counts solutions for all robots, and cannot be used with --withdraw",
+    ),
+    OptionRule(
+        _starts_programs_without,
+        "--runtime network starts programs that do not know a protocol registered by this program",
+        "add --runtime processes, or install the protocol as a package",
     ),
     OptionRule(
         lambda o: o.filters and o.runtime != Runtime.NETWORK,

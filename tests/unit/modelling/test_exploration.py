@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 from random import Random
+from typing import Any
 
 import pytest
 
 import robochoc
-from robochoc.modelling.exploration import ConflictTimeoutError
+from robochoc.modelling.exploration import ExplorationError
 from tests.support.cases import looped
 
 DIFFERENCES = (-1, 0, 1)
@@ -73,5 +74,27 @@ def test_costs_and_parts_of_robots_in_conflicts() -> None:
 
 def test_the_time_limit() -> None:
     model, _ = random_model(3)
-    with pytest.raises(ConflictTimeoutError, match="within 0 s"):
+    with pytest.raises(ExplorationError, match="within 0 s"):
         model.conflict(timeout=0)
+
+
+@looped(
+    ("protocol", "options"),
+    [("abt", {"messages": 1}), ("mgm", {}), ("central", {"timeout": 0}), ("dsa", {"settings": {"cycles": 1}})],
+)
+def test_a_search_without_a_verdict_does_not_end_the_list_silently(protocol: str, options: dict[str, Any]) -> None:
+    model, _ = random_model(3)
+    with pytest.raises(ExplorationError, match=r"ended without a verdict: [^N]"):
+        list(model.solutions(protocol, **options))
+
+
+def test_withdrawal_events_and_loaded_constraints_are_refused() -> None:
+    model, _ = random_model(3)
+    with pytest.raises(robochoc.OptionError, match="cannot be used with withdraw"):
+        list(model.solutions(withdraw=True))
+    with pytest.raises(robochoc.UnsupportedError, match="was loaded"):
+        robochoc.Model.of(model.team).conflict()
+    model.after_solution().add(model["r0.x"] == 1)
+    for explore in (model.conflict, lambda: list(model.solutions())):
+        with pytest.raises(robochoc.UnsupportedError, match="do not change"):
+            explore()

@@ -12,7 +12,8 @@ import pytest
 
 import robochoc
 from robochoc.communication.search_result import Progress
-from robochoc.journal.events import AnyEvent
+from robochoc.journal import read_journal
+from robochoc.journal.events import AnyEvent, Improved
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.run.registry import installed_protocols, protocol_names
 from tests.support.cases import looped
@@ -55,6 +56,11 @@ def test_a_protocol_may_be_a_class(runtime: str) -> None:
     assert "this program" in {one.package for one in installed_protocols()}
 
 
+def test_programs_on_a_network_do_not_know_a_registered_protocol() -> None:
+    with pytest.raises(robochoc.UnsupportedError, match="runtime='network' starts programs that do not know"):
+        slots().solve(SlowMGM, "network")
+
+
 @pytest.mark.parametrize(
     ("name", "protocol", "text"),
     [
@@ -79,6 +85,15 @@ def test_a_journal_a_page_and_progress(tmp_path: Path) -> None:
     assert len([*robochoc.journal.rows(journal)]) >= len(events) > outcome.metrics.messages["Value"]
     assert b"<html" in page.read_bytes()[:1000]
     assert seen
+
+
+def test_a_journal_of_a_problem_that_changes_weighs_no_decision_by_the_first_problem(tmp_path: Path) -> None:
+    journal = tmp_path / "run.journal"
+    slots().solve("dpop", journal=journal)
+    assert any(isinstance(event, Improved) for event in read_journal(journal.read_bytes()).events)
+    outcome = slots().solve("dpop", journal=journal, environment=lambda *_: None)
+    assert outcome.verdict == "optimal"
+    assert not any(isinstance(event, Improved) for event in read_journal(journal.read_bytes()).events)
 
 
 def test_a_run_that_is_refused_keeps_the_older_journal(tmp_path: Path) -> None:
