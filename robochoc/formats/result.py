@@ -44,6 +44,8 @@ _DIGITS_S = 6
 """The number of decimal places for measured seconds."""
 _MOST_DIGITS = 10_000
 """The maximum number of digits in a number: 1e999999999 as an integer would exhaust the memory."""
+_LARGEST_EXPONENT = 300
+"""The largest exponent of a decimal: a larger number would be infinite as a float."""
 _ENCODER = msgspec.json.Encoder(decimal_format="number")
 
 
@@ -144,8 +146,8 @@ def _integer(digits: str) -> int:
 
 def _decimal(digits: str) -> Decimal:
     number = Decimal(digits)
-    if abs(number.adjusted()) > _MOST_DIGITS or len(digits) > _MOST_DIGITS:
-        raise ResultError(f"the number {digits[:20]} has more than {_MOST_DIGITS:,} digits")
+    if abs(number.adjusted()) > _LARGEST_EXPONENT or len(digits) > _MOST_DIGITS:
+        raise ResultError(f"the number {digits[:20]} is too large or has too many digits; write at most 1e300")
     return number
 
 

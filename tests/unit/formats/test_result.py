@@ -67,8 +67,10 @@ def test_results_of_earlier_versions_are_read() -> None:
     [
         ("count", "1.5", "count: expected an integer or null"),
         ("count", "NaN", "NaN is not a number"),
-        ("count", "1e999999999", "more than 10,000 digits"),
-        ("cost", "-1e-999999999", "more than 10,000 digits"),
+        ("count", "1e999999999", "too large or has too many digits"),
+        ("deadline", "1e9000", "too large or has too many digits"),
+        ("metrics", '{"wall_s":-1e-9000}', "too large or has too many digits"),
+        ("cost", "-1e-999999999", "too large or has too many digits"),
         ("cost", "1" * 10_001, "more than 10,000 digits"),
         ("bound", '"3"', "bound: expected "),
         ("checked", '{"by_both":1}', "checked.*: expected an integer"),
