@@ -46,7 +46,7 @@ class Problem(Solvable):
             the team. Solutions use the original names.
         notes: The changes made while reading the file, as `robochoc import` reports them: pairs of keyword and
             sentence.
-        ordered: Whether the priority order of the robots was given. Files of other tools give no order.
+        ordered: True if the priority order of the robots was given. Files of other tools give no order.
 
     Raises:
         InvalidInputError: if the team is invalid. The error lists every mistake.
@@ -164,7 +164,7 @@ class AgentsContainer:
         Args:
             name: The name of the robot or the master.
             file: The robot's XML file. The master has no file.
-            sniff: Whether the sniffer at the master shows the messages that the agent sends and receives.
+            sniff: True if the sniffer at the master shows the messages that the agent sends and receives.
         """
         self._agents[name] = (None if file is None else Path(file), sniff)
 

@@ -45,7 +45,7 @@ def serve_app(
     Args:
         folder: The folder with the teams.
         port: The port. 0: any free port.
-        open_browser: Whether to open the user's browser.
+        open_browser: True to open the user's browser.
         ready: Called with the URL when it can be opened.
 
     Raises:

@@ -91,7 +91,7 @@ class EnrolledName(msgspec.Struct, frozen=True):
 
     @property
     def never_certified(self) -> bool:
-        """Whether no certificate of this name can exist."""
+        """True if no certificate of this name can exist."""
         return not self.certificates and not self.withdrawn
 
     def expires(self, now: float) -> float:

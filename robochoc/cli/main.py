@@ -23,7 +23,7 @@ PATIENCE_S = 1.0
 _RETRY_S = 0.01
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 _HAS_TIMER = hasattr(signal, "setitimer")
-"""Whether a signal can be handled later. If not (on Windows), it raises at once, even during an import."""
+"""True if a signal can be handled later. If not (on Windows), it raises at once, even during an import."""
 
 
 def main() -> NoReturn:

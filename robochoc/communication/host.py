@@ -236,7 +236,7 @@ class Host:
             packet: The messages that have arrived.
             missing: Returns the number of messages from the same sender that were lost right before a message; None if
                 the message itself is lost.
-            lost: Whether a message in this search is or may be lost, to this robot or to others.
+            lost: True if a message in this search is or may be lost, to this robot or to others.
 
         Returns:
             The robot's messages, or None if the protocol cannot continue.

@@ -84,7 +84,7 @@ class MasterLoop(ABC):
 
     @property
     def is_to_stop(self) -> bool:
-        """Whether a stop was requested, or the watch is satisfied."""
+        """True if a stop was requested, or the watch is satisfied."""
         return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
     def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:

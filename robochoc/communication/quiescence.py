@@ -67,7 +67,7 @@ class FourCounters:
 
     @property
     def due(self) -> bool:
-        """Whether a wave is due: all counters are known, the sums are equal, and no wave is open."""
+        """True if a wave is due: all counters are known, the sums are equal, and no wave is open."""
         return not self._unanswered and not self._unreported and self._total.sent == self._total.received
 
     def start_wave(self) -> int:
@@ -79,7 +79,7 @@ class FourCounters:
 
     @property
     def is_wave_open(self) -> bool:
-        """Whether some robots have not yet answered the latest wave."""
+        """True if some robots have not yet answered the latest wave."""
         return bool(self._unanswered)
 
     def answer(self, robot: str, wave: int, counts: MessageCounts) -> None:

@@ -81,7 +81,7 @@ class RobotLoop(ABC):
 
         Args:
             began: The start of the run, on the monotonic clock.
-            lossless: Whether no message of the previous epoch was lost.
+            lossless: True if no message of the previous epoch was lost.
         """
         if self._host is None:
             return
@@ -158,7 +158,7 @@ class RobotLoop(ABC):
 
     @property
     def is_restless(self) -> bool:
-        """Whether the counters have changed since the last report to the master."""
+        """True if the counters have changed since the last report to the master."""
         return self._searching and self._reported != (self._sent, self._received)
 
     def report_counters(self, wave: int) -> None:

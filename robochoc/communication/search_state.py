@@ -29,9 +29,9 @@ class SearchState:
         verdict: The verdict of the search; None until the search has ended.
         witness: The robot that concluded the verdict; None if the search ended by quiescence or a limit.
         max_messages: The limit on messages, if there is one.
-        ordered: Whether the robots were ordered to start.
-        searching: Whether the robots are searching now.
-        lossy: Whether messages are lost and the protocol tolerates this: waiting robots continue without the lost
+        ordered: True if the robots were ordered to start.
+        searching: True if the robots are searching now.
+        lossy: True if messages are lost and the protocol tolerates this: waiting robots continue without the lost
             messages, until no robot can continue.
     """
 
@@ -135,22 +135,22 @@ class SearchState:
 
     @property
     def ready(self) -> bool:
-        """Whether all robots are ready."""
+        """True if all robots are ready."""
         return not self._unready
 
     @property
     def broken_off(self) -> bool:
-        """Whether the search must end without a verdict: robots were lost, or the message limit is reached."""
+        """True if the search must end without a verdict: robots were lost, or the message limit is reached."""
         return bool(self.lost) or (self.max_messages is not None and self.counters.sent >= self.max_messages)
 
     @property
     def ended(self) -> bool:
-        """Whether the search is over, with or without a verdict."""
+        """True if the search is over, with or without a verdict."""
         return self.verdict is not None or self.broken_off
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave could prove quiescence, or show that the message limit is reached."""
+        """True if a wave could prove quiescence, or show that the message limit is reached."""
         return self.counters.due or (self.max_messages is not None and not self.counters.is_wave_open)
 
     def next_wave(self, *, wanted: bool = False) -> int | None:

@@ -19,7 +19,7 @@ class SearchWatch(ABC):
     @property
     @abstractmethod
     def satisfied(self) -> bool:
-        """Whether the search may stop."""
+        """True if the search may stop."""
 
     @abstractmethod
     def wait_s(self, now: float) -> float:

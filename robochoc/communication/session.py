@@ -65,7 +65,7 @@ class Session(ABC):
     @property
     @abstractmethod
     def lossless(self) -> bool:
-        """Whether no message was lost in the previous search: it became quiescent, or there was no previous search."""
+        """True if no message was lost in the previous search: it became quiescent, or there was no previous search."""
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:

@@ -102,7 +102,7 @@ class _Shown:
 
     @property
     def grouped(self) -> bool:
-        """Whether the parameter has several values, but fewer than there are problems."""
+        """True if the parameter has several values, but fewer than there are problems."""
         return 1 < len(self.values) < len({(row.get("case"), row["digest"]) for row in self.rows})
 
     @cached_property

@@ -87,7 +87,7 @@ class ReportContent:
         """Yield, for each compared metric, its name and a table of pairs, unless no test was possible.
 
         Args:
-            first_only: Whether only pairs with the first way to run are shown. All pairs are tested in any case.
+            first_only: True if only pairs with the first way to run are shown. All pairs are tested in any case.
         """
         for metric in [one for one in self.metrics if one in (*CENSORED, "cost")][:MOST_TESTED]:
             for part, rows in self.parts:

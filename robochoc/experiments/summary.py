@@ -65,7 +65,7 @@ class Sample:
         problems: The problem for each value.
         censored: The number of values from runs that a limit ended.
         failed: The number of runs without a value, for instance because they crashed or were refused.
-        open_ended: Whether the median is only a lower bound: without the limit that ended runs it would be higher.
+        open_ended: True if the median is only a lower bound: without the limit that ended runs it would be higher.
     """
 
     values: tuple[float, ...]

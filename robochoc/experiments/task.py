@@ -139,7 +139,7 @@ class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True
 
     @property
     def is_timed(self) -> bool:
-        """Whether robots run as processes, so that nothing else should run on the machine."""
+        """True if robots run as processes, so that nothing else should run on the machine."""
         return self.setup.runtime not in {Runtime.SIMULATOR, Runtime.ARRAYS}
 
 
@@ -213,10 +213,10 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
         verdict: The verdict.
         cost: The exact cost as text, in the user's numbers.
         bound: A lower bound on the cost, if known.
-        maximises: Whether the cost is a utility.
+        maximises: True if the cost is a utility.
         withdrawn: The number of withdrawn robots.
-        verified: Whether the checker has checked the answer.
-        confirmed: Whether a central solver has found the same answer.
+        verified: True if the checker has checked the answer.
+        confirmed: True if a central solver has found the same answer.
         messages: The number of messages sent.
         messages_by_type: The number of messages of each type.
         total_s: The seconds for the whole run, including checks and set-up.

@@ -153,7 +153,7 @@ class _Worker:
 
     @property
     def is_late(self) -> bool:
-        """Whether the current task has taken too long."""
+        """True if the current task has taken too long."""
         return self.deadline is not None and time.monotonic() > self.deadline
 
     def exit_reason(self) -> str:

@@ -82,7 +82,7 @@ class Flight:
         homes: The drones' initial places (N, 3), in metres.
         conditions: Distance, wind, failures and obstacles.
         progress: Called with a description of the progress at every logged sample.
-        rises: Whether drones take off and land vertically where possible.
+        rises: True if drones take off and land vertically where possible.
         ground: The height of the ground. None: the lowest home is on the ground.
         walls: Walls that drones fly around, at the speed for which the team was made.
 
@@ -141,7 +141,7 @@ class Flight:
         Args:
             title: The leg's title in the log.
             goals: Goals by the drones' numbers. A drone without a goal stays in place.
-            stop_on_report: Whether all drones stop and hover at the first report, before they reach their goals. If
+            stop_on_report: True if all drones stop and hover at the first report, before they reach their goals. If
                 False, no reports are returned.
             blocks: Points that routes avoid, except points too near to a start or a goal.
 

@@ -78,7 +78,7 @@ class BoxAxis:
 
     @property
     def _is_even(self) -> bool:
-        """Whether each value has its own cell."""
+        """True if each value has its own cell."""
         return self.cells == self.last - self.first + 1
 
     @property

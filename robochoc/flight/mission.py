@@ -198,7 +198,7 @@ class MissionBuilder:
 
     @property
     def rises(self) -> bool:
-        """Whether drones take off vertically, since their places are known from a map."""
+        """True if drones take off vertically, since their places are known from a map."""
         return self._ground is not None
 
     def _blocks(self) -> Iterator[MissionBlock]:

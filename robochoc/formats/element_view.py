@@ -31,7 +31,7 @@ def open_xml(path: Path, most: int, *, long_texts: bool = False) -> Iterator[Ele
     Args:
         path: The file. Its contents are not trusted.
         most: The maximum size of the file, in bytes.
-        long_texts: Whether a text may have more than 10 million characters.
+        long_texts: True if a text may have more than 10 million characters.
 
     Raises:
         InvalidInputError: if the file is not valid XML; or, when the block ends, with every error reported in it, or
@@ -114,7 +114,7 @@ class ElementView:
 
     @property
     def has_children(self) -> bool:
-        """Whether there are child elements."""
+        """True if there are child elements."""
         return len(self._element) > 0
 
     def has(self, name: str) -> bool:

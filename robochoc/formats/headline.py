@@ -16,7 +16,7 @@ def describe_outcome(
         total: The number of robots in the run. If the outcome has epochs, the robots in the last epoch are counted.
         flying: The number of `total` that have a place, if drones are counted and a robot decides about several.
         noun: The noun for the counted robots or drones, in the singular.
-        weighted: Whether robots differ in weight, so that a maximum is one of weight instead of number. None: unknown,
+        weighted: True if robots differ in weight, so that a maximum is one of weight instead of number. None: unknown,
             and the words are "the best".
     """
     if flying is None:

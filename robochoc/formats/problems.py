@@ -22,7 +22,7 @@ class ReadProblem(NamedTuple):
     Attributes:
         team: The team.
         names: The original names of its robots and variables.
-        foreign: Whether it was read from another tool's file, whose user knows only the original names.
+        foreign: True if it was read from another tool's file, whose user knows only the original names.
         notes: The changes made while reading such a file.
         bound: The sum of costs that counts as no solution in the file's format; see `ImportResult`.
     """

@@ -95,7 +95,7 @@ class _ScenarioReader:
         self._robot_mistakes: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
         self._has_unread_file = False
-        """Whether a file of an added robot could not be read. Its contents are then unknown."""
+        """True if a file of an added robot could not be read. Its contents are then unknown."""
         self._not_added: set[str] = set()
         """Robots, variables and constraints that could not be added."""
 

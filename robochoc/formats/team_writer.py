@@ -32,7 +32,7 @@ def write_team(
     Args:
         team: A valid team.
         folder: The folder to be written.
-        replace: Whether an existing folder of a team is replaced. It may contain only XML files, and files written by
+        replace: True if an existing folder of a team is replaced. It may contain only XML files, and files written by
             an import, the application or a problem on a map.
         extra_files: The contents of further files in the folder, by name.
 

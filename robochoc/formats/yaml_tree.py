@@ -51,7 +51,7 @@ class Node:
     Attributes:
         line: The line where the value begins, from 1.
         size: The number of values it contains.
-        is_named: Whether it has an anchor that an alias refers to.
+        is_named: True if it has an anchor that an alias refers to.
     """
 
     __slots__ = ("_asked", "_is_read", "_is_skipped", "_key_lines", "_value", "is_named", "line", "size")

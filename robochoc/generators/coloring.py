@@ -59,7 +59,7 @@ def coloring(
         colors: The number of colours.
         degree: The average number of neighbours.
         seed: The same seed gives the same problem on every machine.
-        connected: Whether graphs are drawn until one is connected.
+        connected: True if graphs are drawn until one is connected.
         conflicts: The cost of neighbours with the same colour: 1, a random weight, or infinite.
         max_cost: The maximum weight.
         places: The decimal places of weights.

@@ -106,7 +106,7 @@ def small_world(agents: int, neighbours: int = 4, rewiring: float = 0.1, *, conn
         agents: The number of nodes.
         neighbours: The number of nearest nodes; even.
         rewiring: The probability that an edge is moved; 0 leaves the ring.
-        connected: Whether graphs are drawn until one is connected.
+        connected: True if graphs are drawn until one is connected.
 
     Raises:
         ValueError: `neighbours` is odd, or more than the number of other nodes.

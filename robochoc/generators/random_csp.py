@@ -70,10 +70,10 @@ def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
         density: The fraction of pairs of variables that are constrained, from 0 to 1.
         tightness: The fraction of pairs of values that a constraint forbids, from 0 to 1.
         seed: The same seed gives the same problem on every machine.
-        connected: Whether graphs are drawn until one is connected. All connected graphs are then equally likely.
+        connected: True if graphs are drawn until one is connected. All connected graphs are then equally likely.
         max_cost: The maximum cost of pairs of values that are not forbidden, in a DCOP. None: no costs.
         costs: The decimal places of costs, and whether costs are utilities to be maximised.
-        asymmetric: Whether the robots of a pair have separate costs (partially known constraints).
+        asymmetric: True if the robots of a pair have separate costs (partially known constraints).
 
     Raises:
         ValueError: There is no such problem, or it is too large. The message names the number to change.

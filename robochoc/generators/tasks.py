@@ -113,7 +113,7 @@ def tasks(
         worth: The maximum worth of a task; the minimum is 1.
         travel: The places of robots and tasks, and the measure of distances.
         skills: The skills of robots.
-        model: Whether a robot does at most one task, or several.
+        model: The maximum number of tasks of a robot: one (`assignment`) or several (`several`).
         capacity: The maximum load of a robot in `several`; the load of a task is from 1 to 3.
 
     Raises:

@@ -39,7 +39,7 @@ class Given(Event, frozen=True):
         seed: A parameter of the run (`solver/agent_problem.py`), like `settings` and `aside`, the withdrawal cost.
         fresh: The robots that start again.
         void_keys: Invalidated parts of the previous epoch (`solver/explanation.py`), like `void_agents`.
-        quiet: Whether no message of the previous epoch was lost.
+        quiet: True if no message of the previous epoch was lost.
         shown: By robot, the variables that its neighbours see although its file does not show them.
         empty: The variables without remaining values, which a file cannot express (`journal/team_events.py`).
         told_in: The user's units of costs, if they differ from the protocols' minimised integers of 0 or more: whether

@@ -155,7 +155,7 @@ class Follower:
 
     @property
     def is_over(self) -> bool:
-        """Whether the journal is complete, that is, contains the outcome of the run."""
+        """True if the journal is complete, that is, contains the outcome of the run."""
         return self._is_over
 
     def _next(self) -> Sequence[JournalEntry] | None:

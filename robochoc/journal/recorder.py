@@ -95,7 +95,7 @@ class JournalRecorder:
 
     @property
     def is_empty(self) -> bool:
-        """Whether no event was recorded. Then no file is written, and an existing file is kept."""
+        """True if no event was recorded. Then no file is written, and an existing file is kept."""
         return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:

@@ -60,7 +60,7 @@ class Worker:
         together: The additional profit of pairs of tasks if the robot does both.
         tours: The length of the tour for each set of tasks that the robot can do together, by task numbers. With tours,
             `profit` does not include distances; tasks in no tour have no location.
-        has_deadlines: Whether the robot can do only these sets of tasks, because the tasks have deadlines.
+        has_deadlines: True if the robot can do only these sets of tasks, because the tasks have deadlines.
     """
 
     name: str

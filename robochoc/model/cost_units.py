@@ -18,7 +18,7 @@ class CostUnits:
     """The unit of costs, and the objective.
 
     Attributes:
-        maximize: Whether the sum is maximised. Otherwise it is minimised.
+        maximize: True if the sum is maximised. Otherwise it is minimised.
         places: The decimal places of the costs: with 3, an integer cost of 1 is 0.001 for the user.
         constant: An integer that is added to the sum, in the same unit.
     """

@@ -161,7 +161,7 @@ class Answer:
         cost: The exact cost of the assignment, or the utility if it is maximised. None: there is no assignment.
         withdrawn: The names of the withdrawn robots; in an `Outcome` including lost robots.
         metrics: The messages, checks and time spent.
-        verified: Whether the checker has compared the assignment with every constraint of a team that was validated
+        verified: True if the checker has compared the assignment with every constraint of a team that was validated
             before. For `no-solution`: whether the central solver has also found `no-solution`.
         witness: The robot that ended the search. For `no-solution`: the robot that has `RULED_OUT`.
         reason: The reason for the verdict, if it is not obvious: a robot without a local solution, or a limit.
@@ -169,7 +169,7 @@ class Answer:
         bound: A lower bound on the cost of any assignment (an upper bound on the utility if it is maximised); with
             withdrawal, a bound on the weight of the withdrawn robots. None: unknown.
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
-        confirmed: Whether the central solver was called, and has found the same `no-solution` or the same minimum cost.
+        confirmed: True if the central solver was called, and has found the same `no-solution` or the same minimum cost.
         confirmed_by: The names of the solvers that have found the same result, on the machine of the run.
         checked: The number of checked constraints in a run across machines, by the robots that checked them.
         preprocessing: The result of preprocessing, if it was requested.

@@ -39,7 +39,7 @@ def without_robots(team: Team, names: Iterable[str], *, with_files: bool = False
     Args:
         team: The team.
         names: The robots that leave. Names not in the team are ignored.
-        with_files: Whether the constraints held by these robots are lost too, since no other robot knows them.
+        with_files: True if the constraints held by these robots are lost too, since no other robot knows them.
     """
     gone = {name for name in names if name in team}
     if not gone:

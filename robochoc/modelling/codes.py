@@ -80,7 +80,7 @@ class DomainCodes:
 
     @property
     def symbolic(self) -> bool:
-        """Whether the codes are codes of symbols."""
+        """True if the codes are codes of symbols."""
         return self.kind not in {NUMBER, BOOLEAN}
 
     def value(self, code: int) -> object:

@@ -154,7 +154,7 @@ class Translation:
 
         Args:
             term: The global constraint or function.
-            must_hold: Whether `term` is a constraint that must hold. Its decomposition may then be smaller.
+            must_hold: True if `term` is a constraint that must hold. Its decomposition may then be smaller.
         """
         for argument in _leaves(term.args):
             self.integer(argument)

@@ -43,10 +43,10 @@ class Draft:
         body: The expression for a condition or a cost, in which `X0`, `X1`, ... are the variables.
         rows: The rows, if the constraint is a table.
         semantics: The meaning of the rows. None: `body` is a condition or a cost.
-        is_cost: Whether the value of `body` is a cost.
+        is_cost: True if the value of `body` is a cost.
         cost: The cost of violating a condition. None: the condition is hard.
         default: The cost of rows that are not listed in a soft table.
-        is_penalty: Whether the costs in a soft table are costs of violating a condition, which are subtracted from a
+        is_penalty: True if the costs in a soft table are costs of violating a condition, which are subtracted from a
             sum that is maximised.
         when_absent: The constraint's meaning when a robot is absent. None: the default for its form.
     """
@@ -78,7 +78,7 @@ class Draft:
 
     @property
     def soft(self) -> bool:
-        """Whether the draft has costs."""
+        """True if the draft has costs."""
         return self.is_cost or self.cost is not None or self.semantics == Semantics.SOFT
 
     @property

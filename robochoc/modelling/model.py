@@ -364,7 +364,7 @@ class Model(Solvable):
 
         Args:
             folder: The folder to write. Its name becomes the team's name when the files are read.
-            replace: Whether to replace an existing team.
+            replace: True to replace an existing team.
 
         Raises:
             ModelError: if the model is invalid.

@@ -100,7 +100,7 @@ class ModelRobot:
             domain: A range, an `Enum`, `bool`, or a list of values of one kind: numbers, texts, tuples, or other
                 hashable values. Numbers support arithmetic; all other values can be compared by `==` and `!=`, and
                 listed in tables.
-            qualified: Whether the variable's name in the team begins with the robot's name. False: it is `name`, which
+            qualified: True if the variable's name in the team begins with the robot's name. False: it is `name`, which
                 must be unique in the team.
 
         Returns:

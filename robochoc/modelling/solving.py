@@ -103,10 +103,10 @@ class Solvable(ABC):
             messages: A limit on the number of messages. None: no limit.
             ncccs: A limit on non-concurrent constraint checks, for the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
-            verify: Whether the central solver checks a `no-solution` or a minimum cost found by the robots.
-            count: Whether the central solver counts all solutions, or `count-dpop` all optima.
+            verify: True if the central solver checks a `no-solution` or a minimum cost found by the robots.
+            count: True if the central solver counts all solutions, or `count-dpop` all optima.
             central_with: The solver of the protocol `central`: `ace` or `ortools`.
-            cache: Whether solutions of local problems are stored in the user's cache folder.
+            cache: True if solutions of local problems are stored in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The maximum delay of a message in the simulator, in constraint checks.
@@ -118,7 +118,7 @@ class Solvable(ABC):
             patience: A robot whose process is suspended for this many seconds counts as lost. None: never.
             kill: The robots whose processes are killed, and when.
             filters: The names of the channel filters of messages on a network, in the order of application.
-            bounds: Whether events report the proven lower bound of the cost (with processes and in the simulator).
+            bounds: True if events report the proven lower bound of the cost (with processes and in the simulator).
             preprocess: The preprocessing before the protocol: `ac` makes domains arc consistent. None: no
                 preprocessing.
             journal: The file to which the journal of the run is written: all messages and decisions.
@@ -193,7 +193,7 @@ class Solvable(ABC):
 
     @property
     def _is_ordered(self) -> bool:
-        """Whether the user determined the priority order."""
+        """True if the user determined the priority order."""
         return True
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:

@@ -57,7 +57,7 @@ class Term:
 
     @cached_property
     def is_partial(self) -> bool:
-        """Whether the term can be undefined: it contains a division, a power, an element or a function call."""
+        """True if the term can be undefined: it contains a division, a power, an element or a function call."""
         return any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
@@ -289,7 +289,7 @@ class Operation(Term):
 
     @cached_property
     def is_partial(self) -> bool:
-        """Whether the operation can be undefined."""
+        """True if the operation can be undefined."""
         return self.operator in PARTIAL or any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:

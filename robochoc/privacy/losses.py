@@ -117,7 +117,7 @@ def loss_between(
         subject: The robot whose secrets the messages concern.
         kind: The kind of secrets.
         numbers: For each secret, the number of its states, and the number of states that are still possible.
-        known: Whether the loss is known.
+        known: True if the loss is known.
     """
     hidden = [(states, possible) for states, possible in numbers if states > 1]
     if not hidden:

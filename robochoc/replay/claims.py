@@ -68,7 +68,7 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_com
     Args:
         journal: The journal.
         runs: The replayed runs in the journal.
-        is_complete: Whether all robots were replayed to the end. Otherwise the runs' answers are unknown.
+        is_complete: True if all robots were replayed to the end. Otherwise the runs' answers are unknown.
     """
     header, outcome = journal.header, journal.outcome
     yield from _header_contradictions(header, [one.run for one in runs], outcome.placed_by if outcome else None)

@@ -65,7 +65,7 @@ class StepComparison:
         Args:
             step: The recorded step.
             replayed: The events of the replayed step.
-            raised: Whether the protocol has raised an exception; then further events may be missing.
+            raised: True if the protocol has raised an exception; then further events may be missing.
         """
         recorded = [*step.received, *step.done]
         if self._stamped_late:

@@ -80,7 +80,7 @@ class RebuiltRobots(NamedTuple):
         protocol: The protocol of the robots.
         hosts: The hosts of the robots, by robot name.
         parts: Each robot's part of the problem.
-        lossless: Whether no message of the previous epoch was lost.
+        lossless: True if no message of the previous epoch was lost.
         continuing: Robots that continue with their results from the previous epoch.
         compiled: The compiled team of the robots.
     """

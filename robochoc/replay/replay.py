@@ -49,10 +49,10 @@ class ReplayResult:
         difference: The first difference; None if there is none.
         stopped: Robots that could not be replayed to the end.
         damage: The reason why the journal ends early; None if it does not.
-        ended: Whether the journal contains the end of the run.
+        ended: True if the journal contains the end of the run.
         contradictions: Claims in the header and the outcome that differ from the results of the steps.
-        truncated: Whether the only damage is that the end of the journal is missing.
-        decided_before: Whether the run was decided without any step, because a robot has no solution by itself.
+        truncated: True if the only damage is that the end of the journal is missing.
+        decided_before: True if the run was decided without any step, because a robot has no solution by itself.
     """
 
     runs: int
@@ -70,12 +70,12 @@ class ReplayResult:
 
     @property
     def identical(self) -> bool:
-        """Whether at least one step was replayed, and all steps were equal."""
+        """True if at least one step was replayed, and all steps were equal."""
         return self.steps > 0 and not self.differs
 
     @property
     def differs(self) -> bool:
-        """Whether there is a difference in the steps, or a contradiction."""
+        """True if there is a difference in the steps, or a contradiction."""
         return self.difference is not None or bool(self.contradictions)
 
 

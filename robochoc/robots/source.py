@@ -52,7 +52,7 @@ class Source(ABC):
 
     @property
     def is_busy(self) -> bool:
-        """Whether robots are still flying: the wait for their reports begins after their arrival."""
+        """True if robots are still flying: the wait for their reports begins after their arrival."""
         return False
 
     def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only sources that know robots by name need them

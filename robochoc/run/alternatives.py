@@ -33,9 +33,9 @@ def alternatives(
     Args:
         team: The team with its scenario.
         options: The refused options.
-        complete: Whether the protocol must be complete.
-        costs: Whether it must minimise costs.
-        narrow: Whether its tables must be narrower than those of DPOP, which was refused for their memory.
+        complete: True if the protocol must be complete.
+        costs: True if it must minimise costs.
+        narrow: True if its tables must be narrower than those of DPOP, which was refused for their memory.
     """
     names = [
         offer.name

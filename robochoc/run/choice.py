@@ -58,8 +58,8 @@ def choose(team: Team, options: Options, *, environment: bool = False, ordered: 
     Args:
         team: The valid team with its scenario.
         options: How to run.
-        environment: Whether an environment changes the problem.
-        ordered: Whether the user chose the order of the team. Otherwise an order is chosen too, for any protocol.
+        environment: True if an environment changes the problem.
+        ordered: True if the user chose the order of the team. Otherwise an order is chosen too, for any protocol.
     """
     if options.protocol == AUTO:
         choice = _decided(team, options, environment=environment)

@@ -29,7 +29,7 @@ class Facts:
 
     Attributes:
         team: The team with its scenario.
-        environment: Whether an environment changes the problem.
+        environment: True if an environment changes the problem.
         compiled_sizes: Returns the sizes of the robots' compiled domains; None if only the declared sizes are known.
             It is called only if these are large.
         loss: The probability that a message is lost.
@@ -47,12 +47,12 @@ class Facts:
 
     @property
     def has_costs(self) -> bool:
-        """Whether costs are minimised."""
+        """True if costs are minimised."""
         return self.team.kind == ProblemKind.DISWCSP
 
     @property
     def changes(self) -> bool:
-        """Whether the problem changes over time."""
+        """True if the problem changes over time."""
         return self.team.dynamic or self.environment
 
     @cached_property
@@ -62,7 +62,7 @@ class Facts:
 
     @cached_property
     def partially_known(self) -> bool:
-        """Whether a constraint is partially known (PKC), at any time."""
+        """True if a constraint is partially known (PKC), at any time."""
         epochs = (team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
         return any(one.model == ConstraintModel.PKC for team in epochs for one in team.constraints())
 
@@ -109,7 +109,7 @@ class Facts:
 
     @cached_property
     def forbids(self) -> bool:
-        """Whether a constraint forbids something, so that not every assignment is a solution."""
+        """True if a constraint forbids something, so that not every assignment is a solution."""
         return any(map(_forbids, self.first.constraints()))
 
     @cached_property

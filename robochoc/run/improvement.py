@@ -77,8 +77,8 @@ class Improvements(SearchWatch):
         deadline: The time at which the first answer is due, on the same clock.
         evaluate: Returns the checked answer of a snapshot.
         rank: The ranking of answers.
-        has_costs: Whether there are costs. Without them all solutions without withdrawals are equally good.
-        bounded: Whether the bounds refer to costs. (If robots may withdraw, the bounds refer to weights.)
+        has_costs: True if there are costs. Without them all solutions without withdrawals are equally good.
+        bounded: True if the bounds refer to costs. (If robots may withdraw, the bounds refer to weights.)
         publish: Publishes an answer.
         has_news: Returns whether the problem has changed.
         earlier: The answers published by earlier searches in the epoch.

@@ -110,10 +110,10 @@ class Options:
         schedule: The order of events in the simulator.
         delay: The longest delay of a message in the simulator, in constraint checks.
         local: Limits on the compilation of each robot's domain.
-        cache: Whether solutions of local problems are stored in the user's cache folder.
-        count: Whether solutions, or optima, are counted.
+        cache: True if solutions of local problems are stored in the user's cache folder.
+        count: True if solutions, or optima, are counted.
         central_with: The central solver of `CENTRAL`.
-        verify: Whether the central solver, and OR-Tools if it is installed, check a `no-solution` or a minimum cost
+        verify: True if the central solver, and OR-Tools if it is installed, check a `no-solution` or a minimum cost
             that robots have found.
         order: The total priority order of the robots: its name, or the robots' names (None: the order of the files).
         messages: A limit on the number of messages (None: no limit).
@@ -130,7 +130,7 @@ class Options:
         filters: The names of the channel filters for messages on a network, in order of application.
         chosen: The reasons for a `protocol` or an `order` that was chosen for the user.
         preprocess: The preprocessing before the protocol (None: no preprocessing).
-        bounds: Whether events report lower bounds of the cost that robots have proven (processes and simulator).
+        bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
     protocol: str = AUTO

@@ -127,8 +127,8 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
     Args:
         team: The team with its scenario.
         options: How to run. They must have passed `refuse_options`.
-        environment: Whether an environment changes the problem.
-        ordered: Whether the user chose the priority order of `team`. Otherwise an order is chosen too, for any
+        environment: True if an environment changes the problem.
+        ordered: True if the user chose the priority order of `team`. Otherwise an order is chosen too, for any
             protocol.
 
     Raises:

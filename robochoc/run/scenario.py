@@ -119,7 +119,7 @@ class ScenarioRun:
                 and they join at the end of the order.
             parameters: The parameters common to all robots.
             prepare: The preparation before each search (None: no preparation).
-            with_files: Whether the constraints held by lost robots are lost too.
+            with_files: True if the constraints held by lost robots are lost too.
         """
         self.team = self._full = team_after_events(team, events=0)
         self.lost_for_good: list[str] = []

@@ -28,7 +28,7 @@ def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title:
     """Return the page in UTF-8. Equal arguments give equal pages.
 
     Args:
-        mode: Whether the page is served by a server, or embedded: one file with all data.
+        mode: The source of the data: a server, or the page itself (embedded: one file with all data).
         embedded: The page's data by name (`columns`, `details:0`), zlib-compressed. The names are trusted, but not the
             data.
         title: The title as untrusted plain text.

@@ -203,7 +203,7 @@ class AceProcess:
         Args:
             network: The network.
             limit: The maximum number of solutions. None: all.
-            count_only: Whether to return only their number.
+            count_only: True to return only their number.
             strategy: ACE's search strategy.
             deadline: The deadline on the monotonic clock.
 
@@ -230,7 +230,7 @@ class AceProcess:
         With `costs`, the answer is one solution that minimises the sum of the codes at these positions.
 
         Returns:
-            Whether the answer is pending. If False, propagation or enumeration has found it without ACE.
+            True if the answer is pending. If False, propagation or enumeration has found it without ACE.
 
         Raises:
             SolverMissingError: if Java is not available.

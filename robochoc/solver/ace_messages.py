@@ -45,7 +45,7 @@ class AceTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
         rows: The rows of the tables.
         different: Scopes in which all values differ.
         limit: The maximum number of solutions.
-        count_only: Whether only the number is returned.
+        count_only: True if only the number is returned.
         strategy: ACE's search strategy.
         costs: Positions of variables, with units: the cost is the sum of their codes times the units.
         formulas: XCSP3 predicates over `x0`, `x1`, ...

@@ -128,8 +128,8 @@ def agent_problems(
     Args:
         team: The team. Only compiled robots get a problem.
         parameters: The parameters of the run.
-        shared_scopes: Whether every robot in a constraint's scope knows the constraint.
-        tree: Whether all robots know the parents of each robot.
+        shared_scopes: True if every robot in a constraint's scope knows the constraint.
+        tree: True if all robots know the parents of each robot.
     """
     compiled = ensure_compiled(team)
     team = compiled.team

@@ -114,7 +114,7 @@ class CentralSolver:
 
         Args:
             team: The team. The cost of a DCOP is minimised.
-            count: Whether to return the number of solutions instead of one.
+            count: True to return the number of solutions instead of one.
             withdrawal_cost: The cost of withdrawing a robot of weight 1, if robots may withdraw. Costs and withdrawals
                 are then minimised together. Withdrawn robots have no values.
 

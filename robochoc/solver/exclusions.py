@@ -58,7 +58,7 @@ def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tupl
 
     Args:
         part: The robot's problem.
-        congestion: Whether several robots may do a task at a cost.
+        congestion: True if several robots may do a task at a cost.
 
     Raises:
         UnsupportedError: if a shared constraint of the robot is not an exclusion.

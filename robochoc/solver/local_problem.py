@@ -408,7 +408,7 @@ class LocalProblem:
 
     @property
     def has_costs(self) -> bool:
-        """Whether costs or withdrawals are minimised."""
+        """True if costs or withdrawals are minimised."""
         return self._part.robot.kind == ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
 
     def allowed(

@@ -5,5 +5,5 @@ from __future__ import annotations
 import os
 
 IS_POSIX = hasattr(os, "fork")
-"""Whether processes can be forked, signals blocked, open files renamed, and descriptors passed to other programs."""
+"""True if processes can be forked, signals blocked, open files renamed, and descriptors passed to other programs."""
 REQUIREMENT = "requires a POSIX system such as Linux or macOS"

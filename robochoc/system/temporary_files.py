@@ -36,7 +36,7 @@ def unnamed_file(*, buffered: bool = True) -> IO[bytes]:
     """Open a new unnamed binary file for writing and reading. It is deleted when all its descriptors are closed.
 
     Args:
-        buffered: Whether written bytes may be buffered in this process.
+        buffered: True if written bytes may be buffered in this process.
 
     Raises:
         OSError: if no folder for temporary files is writable.

@@ -44,7 +44,7 @@ class Telemetry:
 
     @property
     def has_heartbeat(self) -> bool:
-        """Whether heartbeats arrive. Without them, MAVSDK reports stopped motors."""
+        """True if heartbeats arrive. Without them, MAVSDK reports stopped motors."""
         return self.silent_s <= SILENCE_S
 
     @property
@@ -54,7 +54,7 @@ class Telemetry:
 
     @property
     def is_flown_by_others(self) -> bool:
-        """Whether a person flies the vehicle, or its autopilot flies without our commands."""
+        """True if a person flies the vehicle, or its autopilot flies without our commands."""
         return self.armed and self.mode in MANUAL | AWAY
 
     @property

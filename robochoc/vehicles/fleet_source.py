@@ -47,7 +47,7 @@ class FleetSource(Source):
 
     @property
     def is_busy(self) -> bool:
-        """Whether vehicles are still flying the newest decision."""
+        """True if vehicles are still flying the newest decision."""
         return self._guard.is_flying
 
     def assign(self, namespaces: Mapping[str, str]) -> None:

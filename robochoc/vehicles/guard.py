@@ -148,7 +148,7 @@ class VehicleGuard:
 
     @property
     def ended(self) -> bool:
-        """Whether all flights have ended."""
+        """True if all flights have ended."""
         return not self.hanging
 
     @property
@@ -168,7 +168,7 @@ class Orders:
 
     @property
     def ended(self) -> bool:
-        """Whether the input has ended or the parent has died; robots' processes may keep the pipe open after that."""
+        """True if the input has ended or the parent has died; robots' processes may keep the pipe open after that."""
         return self._is_closed or os.getppid() != self._parent
 
     def next(self, wait_s: float) -> ToGuard | None:

@@ -149,7 +149,7 @@ class GuardClient:
 
     @property
     def is_flying(self) -> bool:
-        """Whether vehicles are on their way to their targets, within the time limit."""
+        """True if vehicles are on their way to their targets, within the time limit."""
         in_time = time.monotonic() - self._sent_s < self.fleet.time_s
         return in_time and not all(map(self.is_done, self._orders))
 

@@ -74,10 +74,10 @@ class VehicleState(msgspec.Struct, frozen=True, tag=True):
     battery: float | None = None
     """The charge of the battery; 1 is full. None: not measured."""
     healthy: bool = False
-    """Whether the autopilot would allow arming."""
+    """True if the autopilot would allow arming."""
     in_air: bool = False
     commanded: bool = False
-    """Whether the vehicle was ever commanded."""
+    """True if the vehicle was ever commanded."""
     why: str = ""
     waits_for: str = ""
     """The name of another vehicle that has to move out of the way first."""

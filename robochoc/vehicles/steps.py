@@ -40,7 +40,7 @@ class RouteStep:
     begin: Point
     end: Point
     is_corner: bool
-    """Whether this is the last step of its straight piece."""
+    """True if this is the last step of its straight piece."""
     needs: dict[str, int] = field(default_factory=dict)
     """The number of steps that other vehicles must have completed before this step, by vehicle name."""
 

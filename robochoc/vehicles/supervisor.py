@@ -31,32 +31,32 @@ class Supervisor:
 
     @property
     def arms_itself(self) -> bool:
-        """Whether motors are always armed, like brushed motors."""
+        """True if motors are always armed, like brushed motors."""
         return self._has(ARMS_ITSELF)
 
     @property
     def can_fly(self) -> bool:
-        """Whether commands to fly are accepted."""
+        """True if commands to fly are accepted."""
         return self._has(CAN_FLY)
 
     @property
     def flies(self) -> bool:
-        """Whether motors had thrust within the last 2 s."""
+        """True if motors had thrust within the last 2 s."""
         return self._has(FLIES)
 
     @property
     def commands(self) -> bool:
-        """Whether the high-level commander flies the Crazyflie."""
+        """True if the high-level commander flies the Crazyflie."""
         return self._has(COMMANDS)
 
     @property
     def finished(self) -> bool:
-        """Whether the high-level commander has reached the end of its path."""
+        """True if the high-level commander has reached the end of its path."""
         return self._has(FINISHED)
 
     @property
     def armed(self) -> bool:
-        """Whether motors run, or one of our commands can start them."""
+        """True if motors run, or one of our commands can start them."""
         return self.flies or self.commands or (self._has(IS_ARMED) and not self.arms_itself)
 
     @property

@@ -35,7 +35,7 @@ class Takeover:
 
     @property
     def lasts(self) -> bool:
-        """Whether another mode has lasted for some time: some autopilots report one briefly after a landing."""
+        """True if another mode has lasted for some time: some autopilots report one briefly after a landing."""
         return self._clock() - self._foreign_s > MODE_S
 
     def detect(self, telemetry: Telemetry) -> bool:

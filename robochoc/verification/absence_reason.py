@@ -17,7 +17,7 @@ def absence_reason(team: Team, *, withdrawal: bool = False) -> str:
 
     Args:
         team: The team without the robots that were lost or removed.
-        withdrawal: Whether robots may withdraw.
+        withdrawal: True if robots may withdraw.
     """
     constraints = list(team.constraints())
     restated = [one for one in constraints if one.original is not None]

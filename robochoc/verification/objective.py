@@ -21,7 +21,7 @@ class Objective:
         team: The team, with normalised costs (`model/costs.py`).
         withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. If None, no
             robot may withdraw, and the cost is infinite until all robots have values.
-        in_step: Whether decisions with equal times are simultaneous, so that the states between them do not count.
+        in_step: True if decisions with equal times are simultaneous, so that the states between them do not count.
 
     Attributes:
         interfaces: The interface variables of each robot. Runs that reorder the team replace this mapping.

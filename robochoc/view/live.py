@@ -27,7 +27,7 @@ def serve_scene(
     Args:
         scene: The scene.
         port: The port; 0 selects any free port.
-        open_browser: Whether to open the scene in the user's browser.
+        open_browser: True to open the scene in the user's browser.
         ready: Called with the URL once it can be opened.
 
     Raises:

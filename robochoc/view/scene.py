@@ -95,7 +95,7 @@ def scene_of(
         flown_mission: The flown mission, if it is `mission` with cells of another size. Distances are then not to
             scale, and are omitted in the scene.
         why_not: The reason why nothing was flown, for the caption.
-        weighted: Whether robots differ in weight; None: unknown.
+        weighted: True if robots differ in weight; None: unknown.
     """
     flown_mission = flown_mission or mission
     drones = tuple(_drones(flown_mission))

@@ -38,7 +38,7 @@ class Conflict(msgspec.Struct, frozen=True):
         rules: The ids of a minimal set of rules that cannot be satisfied together. Empty: a decision has no values.
             None: all rules can be satisfied together, or no conflict was found in time.
         finder: The tool that found the conflict.
-        late: Whether the time limit was reached.
+        late: True if the time limit was reached.
         why: The error if the search failed, otherwise empty.
         words: The conflicting constraints of an imported team, in words.
     """

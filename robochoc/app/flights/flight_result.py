@@ -72,7 +72,7 @@ class FlightResult(msgspec.Struct, frozen=True):
     """The result of a flight.
 
     Attributes:
-        as_planned: Whether all drones arrived and kept their distances.
+        as_planned: True if all drones arrived and kept their distances.
         refused: The reason why there was no flight. Empty: there was a flight.
         drones: The drones at the end of the flight.
         happenings: The events during the flight.

@@ -95,7 +95,7 @@ def unpack_run(file: Path, folder: Path) -> bool:
         folder: The team's folder.
 
     Returns:
-        Whether the file contained a complete run.
+        True if the file contained a complete run.
 
     Raises:
         OSError: if the run cannot be written.

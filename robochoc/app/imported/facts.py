@@ -54,7 +54,7 @@ class RobotFacts(msgspec.Struct, frozen=True):
         name: The robot's name.
         decides: The robot's decisions.
         weight: The weight of the robot's withdrawal.
-        joins: Whether the robot joins later.
+        joins: True if the robot joins later.
     """
 
     name: str
@@ -75,10 +75,10 @@ class ImportedFacts(msgspec.Struct, frozen=True):
         partial: The number of parts of partially known constraints.
         links: The pairs of robots with a common constraint, up to a maximum number.
         linked: The number of all such pairs.
-        costs: Whether there are costs.
-        maximised: Whether costs are utilities, whose sum is maximised.
+        costs: True if there are costs.
+        maximised: True if costs are utilities, whose sum is maximised.
         events: The events in words.
-        flies: Whether the team's files contain positions of robots.
+        flies: True if the team's files contain positions of robots.
         files: For a team that was drawn here, the files that were changed later; otherwise empty.
         notes: The changes made by the import.
         origin: The name of the opened file.

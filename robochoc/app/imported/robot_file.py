@@ -25,7 +25,7 @@ class ShownRobotFile(msgspec.Struct, frozen=True):
     Attributes:
         name: The file's name.
         text: The content of the file, or its beginning.
-        is_cut: Whether `text` is only the beginning.
+        is_cut: True if `text` is only the beginning.
         neighbours: The robots that share constraints with this robot.
         sentences: The robot's constraints in words, up to a maximum number.
         count: The number of the robot's constraints.

@@ -34,7 +34,7 @@ class Command:
         given: The standard input.
         out: The file for the standard output. None: the output is returned in `Finished.out`.
         errors: The file for the standard error. None: no file.
-        can_be_asked: Whether the signal `STOP` asks the process to stop. The signal is blocked until the process
+        can_be_asked: True if the signal `STOP` asks the process to stop. The signal is blocked until the process
             handles it.
     """
 

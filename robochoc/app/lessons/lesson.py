@@ -26,10 +26,10 @@ class TeamSpec(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=
         values: The levels of all robots, except those in `values_of`.
         apart: The pairs of robots that must be at different levels.
         broken_costs: The cost if a pair has the same level. 0: this is forbidden.
-        low: Whether a robot's level number is also a cost.
+        low: True if a robot's level number is also a cost.
         chain: The number of robots in a row, instead of the four robots.
-        partly_known: Whether only the first robot in each rule knows the rule.
-        changes: Whether a level is removed after the first solution.
+        partly_known: True if only the first robot in each rule knows the rule.
+        changes: True if a level is removed after the first solution.
         places: The positions of the drawn robots.
         names: The side on which a robot's name is drawn: `left` or `right`; by default above or below.
     """
@@ -71,7 +71,7 @@ class AnswerChoice(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     Attributes:
         text: The text of the answer. Messages are shown unchanged.
         why: The reason why the answer is right or wrong.
-        right: Whether this is the correct answer.
+        right: True if this is the correct answer.
         to, words: The claim that the robot sends this message to that robot.
         silent: The claim that the robot sends nothing.
         undecided: The claim that the robot chooses no level.

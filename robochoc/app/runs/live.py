@@ -44,7 +44,7 @@ class Live:
         costs: The decreasing costs of the answers so far: pairs of seconds since the start and cost.
         bound: The lower bound on the cost. None: unknown.
         recent: The number of messages in the last second, by sender and receiver.
-        is_cut: Whether the last messages were skipped because too many remained after the end of the run.
+        is_cut: True if the last messages were skipped because too many remained after the end of the run.
         last_messages: The last messages in words, the last one first.
     """
 

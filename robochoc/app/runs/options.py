@@ -27,7 +27,7 @@ class RunOptions(msgspec.Struct, frozen=True):
         runtime: `simulator` or `processes`.
         seed: The random seed.
         timeout: The time limit in seconds. None: no limit.
-        withdraw: Whether robots withdraw if there is no solution, with the least total weight.
+        withdraw: True if robots withdraw if there is no solution, with the least total weight.
         more: Further arguments of `robochoc solve`.
     """
 

@@ -16,7 +16,7 @@ class Player:
 
     Attributes:
         count: The number of moments.
-        playing: Whether the player is running.
+        playing: True if the player is running.
         speed: The speed, relative to the normal speed.
     """
 
@@ -81,8 +81,8 @@ class Frames:
 
         Args:
             now: A time in seconds.
-            large: Whether the team is large.
-            playing: Whether the player is running. If not, the picture is always drawn, since it stays visible.
+            large: True if the team is large.
+            playing: True if the player is running. If not, the picture is always drawn, since it stays visible.
         """
         if large and playing and now - self._drawn < LARGE_S:
             return False

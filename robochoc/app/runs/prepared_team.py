@@ -46,8 +46,8 @@ class TeamFiles:
 
     Attributes:
         folder: The folder with the files.
-        flies: Whether the team's decisions are robots' positions.
-        maximised: Whether the costs are utilities, whose sum is maximised.
+        flies: True if the team's decisions are robots' positions.
+        maximised: True if the costs are utilities, whose sum is maximised.
         then: Changes in the team after the problem in the files and its scenario have been solved.
     """
 

@@ -29,12 +29,12 @@ class RunResult(Outcome):
 
     @property
     def has_decided(self) -> bool:
-        """Whether there is an answer at the end, or was an answer in an earlier epoch."""
+        """True if there is an answer at the end, or was an answer in an earlier epoch."""
         return bool(self.assignment) or self.ends_unsolved
 
     @property
     def ends_unsolved(self) -> bool:
-        """Whether there was an answer before an event, but is none at the end."""
+        """True if there was an answer before an event, but is none at the end."""
         return not self.assignment and any(
             epoch.assignment and epoch.verdict != Verdict.NO_SOLUTION for epoch in self.epochs
         )

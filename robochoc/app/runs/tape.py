@@ -59,7 +59,7 @@ class Moment:
         last_messages: The last messages, in words.
         links: The number of messages, by sender and receiver.
         values: The values that changed since the previous moment, by robot and `ROBOT.DECISION`.
-        begins: Whether a run or an epoch begins at this moment, so that earlier decisions are void.
+        begins: True if a run or an epoch begins at this moment, so that earlier decisions are void.
     """
 
     count: int = 0
@@ -91,7 +91,7 @@ class Tape:
     Attributes:
         moments: The moments, in order.
         messages: The total number of messages.
-        is_whole: Whether all messages are included; otherwise only the first ones are.
+        is_whole: True if all messages are included; otherwise only the first ones are.
     """
 
     def __init__(self, robots: Collection[str], label: Callable[[str, int], Value], called: ValueLabel) -> None:

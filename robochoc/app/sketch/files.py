@@ -53,7 +53,7 @@ def save(sketch: Sketch, folder: Path, *, replace: bool = False) -> None:
     Args:
         sketch: The sketch.
         folder: The folder to write.
-        replace: Whether to replace an existing team.
+        replace: True to replace an existing team.
 
     Raises:
         InvalidInputError: if the sketch has errors, or the folder exists and must not be replaced.

@@ -120,8 +120,8 @@ class PaletteRule:
         condition: Returns the condition over the decisions of the robots in one link; for a graded rule, the cost.
         fewest: The minimum number of robots.
         most: The maximum number of robots. None: any number.
-        graded: Whether the rule has graded costs instead of being satisfied or violated.
-        has_order: Whether the order of the robots matters.
+        graded: True if the rule has graded costs instead of being satisfied or violated.
+        has_order: True if the order of the robots matters.
     """
 
     key: str

@@ -125,9 +125,9 @@ class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
             robot.
         settings: The values of the rule's fields, by name: numbers, values, or lists of values.
         cost: The cost of a violation. None: a hard rule.
-        private: Whether only the rule's owner knows it, which is the first of the two robots. (Rules for a single
+        private: True if only the rule's owner knows it, which is the first of the two robots. (Rules for a single
             robot are never disclosed.)
-        on: Whether the rule is active.
+        on: True if the rule is active.
     """
 
     id: str

@@ -28,10 +28,10 @@ class StudyQuestion(msgspec.Struct, frozen=True):
 
     Attributes:
         protocols: The protocols, at least two.
-        family: Whether the problems are from the most similar family, instead of the team's own problem.
+        family: True if the problems are from the most similar family, instead of the team's own problem.
         runs: The number of runs of each protocol, or of problems of each kind.
         timeout: The time limit for a run in seconds.
-        ordered: Whether the team's order is used: for a partially known constraint, the order determines which of the
+        ordered: True if the team's order is used: for a partially known constraint, the order determines which of the
             two robots asks the other.
     """
 
@@ -48,9 +48,9 @@ class PossibleQuestions(msgspec.Struct, frozen=True):
     Attributes:
         protocols: The suitable protocols, complete ones first, each with whether it is complete.
         usual: The two protocols that are selected at first.
-        costs: Whether there are costs.
+        costs: True if there are costs.
         family: The most similar family, if there is one.
-        ordered: Whether the team's order is fixed.
+        ordered: True if the team's order is fixed.
     """
 
     protocols: tuple[tuple[str, bool], ...]

@@ -241,7 +241,7 @@ class RosOptions:
 
     @property
     def simulates_flight(self) -> bool:
-        """Whether the robots' situation is taken from a simulated flight."""
+        """True if the robots' situation is taken from a simulated flight."""
         return self.situation == FLIGHT
 
 

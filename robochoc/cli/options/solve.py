@@ -226,7 +226,7 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
 
     Args:
         arguments: The command's arguments. Those that are used are removed, except the protocol and the order.
-        environment: Whether the robots' situation changes the problem.
+        environment: True if the robots' situation changes the problem.
 
     Raises:
         click.UsageError: if options cannot be combined (`robochoc.run.compatibility.option_rules`).

@@ -34,7 +34,7 @@ def report_flight(loop: ClosedLoop, failures: Sequence[tuple[str, float]], *, qu
     Args:
         loop: The closed loop with a simulated flight.
         failures: The drones given by --fail, with the times in seconds at which they fail.
-        quiet: Whether to print nothing.
+        quiet: True to print nothing.
     """
     from robochoc.cli.reports.flight import as_planned, flight_summary, late_failures
 

@@ -106,7 +106,7 @@ class CycleRun(ABC):
 
     @property
     def is_over(self) -> bool:
-        """Whether the run has ended."""
+        """True if the run has ended."""
         return self.verdict is not None or self.cycle >= self.settings.cycles or not self._active
 
     def start(self) -> None:

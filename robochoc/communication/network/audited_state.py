@@ -37,7 +37,7 @@ class AuditedSearchState(SearchState):
     """The state of a search whose robots are not trusted: their messages are checked for plausibility.
 
     stuck: The reason why the search can never end; empty if it can end.
-    drops: Whether robots must drop messages.
+    drops: True if robots must drop messages.
     duration_s: The duration of the search in seconds, after `note_end` was called.
     """
 
@@ -146,12 +146,12 @@ class AuditedSearchState(SearchState):
 
     @property
     def broken_off(self) -> bool:
-        """Whether the search must end without a verdict: see `SearchState.broken_off`, or it is stuck."""
+        """True if the search must end without a verdict: see `SearchState.broken_off`, or it is stuck."""
         return bool(self.stuck) or super().broken_off
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave is useful: for the reasons in `SearchState.wave_due`, or because messages are missing."""
+        """True if a wave is useful: for the reasons in `SearchState.wave_due`, or because messages are missing."""
         return super().wave_due or (bool(self._asked) and not self.counters.is_wave_open)
 
     def missing(self, now: float, patience_s: float) -> int:
@@ -176,17 +176,17 @@ class AuditedSearchState(SearchState):
 
     @property
     def by_quiescence(self) -> bool:
-        """Whether the search ended by quiescence, not by the conclusion of a single robot."""
+        """True if the search ended by quiescence, not by the conclusion of a single robot."""
         return self.counters.quiescent and self.witness is None
 
     @property
     def unchecked(self) -> bool:
-        """Whether a robot has not yet checked its constraints against the decision."""
+        """True if a robot has not yet checked its constraints against the decision."""
         return bool(self._present - self._checks.keys())
 
     @property
     def held(self) -> bool:
-        """Whether all robots have checked their constraints, and no constraint is violated."""
+        """True if all robots have checked their constraints, and no constraint is violated."""
         return not self.unchecked and all(check.allowed for check in self._checks.values())
 
     @property

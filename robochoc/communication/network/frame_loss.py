@@ -37,7 +37,7 @@ class LossTracker:
 
     @property
     def is_reported(self) -> bool:
-        """Whether a robot has reported a loss of frames from another robot in this search."""
+        """True if a robot has reported a loss of frames from another robot in this search."""
         return bool(self._said)
 
     def note_at_master(self, missed: FramesLost) -> None:

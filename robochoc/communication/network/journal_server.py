@@ -99,7 +99,7 @@ class Publication:
 
     @property
     def lagging(self) -> bool:
-        """Whether a follower has not yet received the end of the journal."""
+        """True if a follower has not yet received the end of the journal."""
         now = time.monotonic()
         with self._lock:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
@@ -176,7 +176,7 @@ class JournalServer:
 
     @property
     def lagging(self) -> bool:
-        """Whether a follower has not yet received the end of the journal."""
+        """True if a follower has not yet received the end of the journal."""
         return self.publication is not None and self.publication.lagging
 
     def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:

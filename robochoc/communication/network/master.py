@@ -70,7 +70,7 @@ class Registrar:
         facilitator: The directory of robots.
         events: Receives registrations and refusals.
         settings: The settings of the run. A welcome contains some of them.
-        watched: Whether robots are to report their events.
+        watched: True if robots are to report their events.
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class Master(MasterLoop):
         members: The expected robots; later also the registered ones.
         settings: The settings of the run.
         observer: Receives all events, including refusals, which come from other threads.
-        watched: Whether the observer receives the robots' events too.
+        watched: True if the observer receives the robots' events too.
         progress: Receives the message count from time to time.
     """
 
@@ -186,7 +186,7 @@ class Master(MasterLoop):
 
     @property
     def is_private(self) -> bool:
-        """Whether robots do not disclose their values."""
+        """True if robots do not disclose their values."""
         return self._settings.private
 
     def publish(self, publication: Publication) -> None:
@@ -285,7 +285,7 @@ class Master(MasterLoop):
         """Let every robot check its constraints against `assignments`. Not available in private runs.
 
         Returns:
-            Whether all constraints are satisfied, and the sum of their costs.
+            True if all constraints are satisfied, and the sum of their costs.
 
         Raises:
             RobotsLostError: if robots are lost, or do not finish the check in time.

@@ -50,7 +50,7 @@ class ConnectionPolicy:
         self.admitted: tuple[str, ...] = ()
         """The names that may connect under the router's current rules."""
         self.sniffable = False
-        """Whether sniffers may receive the journal of this run."""
+        """True if sniffers may receive the journal of this run."""
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:

@@ -25,7 +25,7 @@ class MasterEvents:
 
     @property
     def observed(self) -> bool:
-        """Whether there is an observer."""
+        """True if there is an observer."""
         return self._observer is not None
 
     def start_search(self) -> None:

@@ -48,11 +48,11 @@ class Member:
         incarnation: The name of the registered process of the robot.
         shown_later: Variables that the robot has disclosed later, on request.
         card: The robot's key card in this run.
-        joined: Whether the robot has confirmed the welcome.
+        joined: True if the robot has confirmed the welcome.
         away_since: The start of its absence, on the monotonic clock; None while it is present.
-        unconfirmed: Whether the robot was absent since its last message, and may have been restarted.
+        unconfirmed: True if the robot was absent since its last message, and may have been restarted.
         asked: Variables that were requested from the robot.
-        left: Whether the robot has confirmed that the run is over.
+        left: True if the robot has confirmed that the run is over.
     """
 
     profile: Profile
@@ -182,7 +182,7 @@ class NetworkMembers:
 
     @property
     def complete(self) -> bool:
-        """Whether the team is complete: all requested robots and all named neighbours are present."""
+        """True if the team is complete: all requested robots and all named neighbours are present."""
         enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
         return enough and not self.awaited and all(m.joined and not m.unconfirmed for m in self.robots.values())
 

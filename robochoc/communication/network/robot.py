@@ -157,7 +157,7 @@ class Ending(NamedTuple):
 
     Attributes:
         why: The reason sent by the master, or the reason why the robot ended by itself.
-        failed: Whether the run was not completed.
+        failed: True if the run was not completed.
         assignment: The values that the robot has decided on.
     """
 

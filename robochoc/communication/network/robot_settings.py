@@ -19,7 +19,7 @@ class RobotSettings:
 
     Attributes:
         patience_s: The seconds for which the master may be absent.
-        sniffed: Whether the master's observers always receive all events of the robot.
+        sniffed: True if the master's observers always receive all events of the robot.
         set_rank: Called before each search with the robot's index in the priority order, and the number of robots.
         stage: Called with a short text on the robot's progress.
         decided: Called with the verdict in words and the robot's values when the team has a decision but continues.

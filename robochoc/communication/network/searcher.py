@@ -106,8 +106,8 @@ class RobotContext:
         send_to_master: Sends a control message to the master.
         send: Sends a message to another robot.
         set_rank: Called with the robot's index in the priority order, and the number of robots.
-        observed: Whether the robot reports its events.
-        private: Whether robots do not disclose their values in this run.
+        observed: True if the robot reports its events.
+        private: True if robots do not disclose their values in this run.
     """
 
     send_to_master: Callable[[ToMaster], None]
@@ -357,7 +357,7 @@ class SnapshotValues:
 
     @property
     def is_used(self) -> bool:
-        """Whether a snapshot was requested from the robot."""
+        """True if a snapshot was requested from the robot."""
         return self._last[0] > 0
 
     def note(self, number: int, values: _Values) -> None:

@@ -16,10 +16,10 @@ class NetworkSettings:
 
     Attributes:
         filters: The channel filters for messages.
-        private: Whether robots do not disclose their values.
+        private: True if robots do not disclose their values.
         patience_s: The seconds for which a robot may be absent.
         lease_ms: The milliseconds of silence after which a link counts as down.
-        survive: Whether the loss of robots only ends the search, whose result names them. Otherwise it raises
+        survive: True if the loss of robots only ends the search, whose result names them. Otherwise it raises
             `RobotsLostError`.
         protocol: The protocol in the robots' entries in the Directory Facilitator.
         listen: The address on which the router listens (`HOST:PORT`), if it differs from the address at which the

@@ -67,11 +67,11 @@ class ProcessesRun(Session, MasterLoop):
         observer: Receives all events.
         progress: Receives the message count from time to time.
         start_method: The start method of processes.
-        survive: Whether the end of a robot's process only ends the search, whose result names the lost robots.
+        survive: True if the end of a robot's process only ends the search, whose result names the lost robots.
             Otherwise it raises `RobotsLostError`.
         patience_s: The seconds after which a robot with a stopped process (SIGSTOP) is lost. None: the team waits.
         parameters: The robots' parameters besides the problem.
-        bounds: Whether the observer receives lower bounds, too.
+        bounds: True if the observer receives lower bounds, too.
     """
 
     def __init__(  # noqa: PLR0913 - keyword options

@@ -153,7 +153,7 @@ class QueueWriter:
     def __init__(self, fd: int | None = None) -> None:
         self.fd: int | None = None
         self.broken = False
-        """Whether the reader is gone. Further bodies are then dropped."""
+        """True if the reader is gone. Further bodies are then dropped."""
         self._waiting = bytearray()
         if fd is not None:
             self.open(fd)

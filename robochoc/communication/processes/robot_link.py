@@ -43,7 +43,7 @@ class RobotLink:
 
     @property
     def hung_up(self) -> bool:
-        """Whether the other end of the control pipe is closed."""
+        """True if the other end of the control pipe is closed."""
         return self._reader.ended
 
     def send(self, order: FromParent, fds: Sequence[int] = ()) -> None:
@@ -76,7 +76,7 @@ class RobotLink:
 
     @property
     def is_computing(self) -> bool:
-        """Whether the process uses the processor, or waits for it."""
+        """True if the process uses the processor, or waits for it."""
         return is_computing(self.process.pid)
 
     def describe_end(self) -> str:

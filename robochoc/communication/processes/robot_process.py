@@ -295,8 +295,8 @@ class RobotStart(NamedTuple):
         part: The robot's part of the problem.
         protocol: The protocol of the robot.
         epoch: The number of the current epoch.
-        observed: Whether the robot reports events.
-        bounds: Whether the events include lower bounds.
+        observed: True if the robot reports events.
+        bounds: True if the events include lower bounds.
     """
 
     part: AgentProblem

@@ -130,7 +130,7 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     @property
     def by_distance(self) -> bool:
-        """Whether message loss depends on the distance between sender and receiver."""
+        """True if message loss depends on the distance between sender and receiver."""
         return self.path_loss is not None or bool(self.distance_loss)
 
     def loss_at(self, distance: float) -> float:

@@ -68,7 +68,7 @@ class Simulation(Session):
         parameters: The robots' parameters besides the problem.
         limits: The limits on the effort of the searches, checked after each packet.
         deadline: The end of the run's time, on the monotonic clock.
-        bounds: Whether the observer receives lower bounds, too.
+        bounds: True if the observer receives lower bounds, too.
         losses: Draws the messages that are lost; None if no messages are lost.
 
     Raises:

@@ -76,7 +76,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
         delays: (N,): the earliest start time of each drone, in seconds.
         limits: The maximum speed and acceleration of the drones.
         ground: The lowest height of drones, except for starts and goals.
-        rises: Whether drones take off and land vertically where possible.
+        rises: True if drones take off and land vertically where possible.
         downwash: The vertical distance, as a multiple of `distance`; at least 1.
         floor_plan: Walls that no drone flies over; or walls in three dimensions, with floors and ceilings.
 

@@ -95,7 +95,7 @@ class QuadrotorSimulation:
 
     @property
     def is_sampled(self) -> bool:
-        """Whether the present state has just been logged."""
+        """True if the present state has just been logged."""
         return self._steps % STEPS_PER_SAMPLE == 0
 
     @property

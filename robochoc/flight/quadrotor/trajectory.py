@@ -45,7 +45,7 @@ class Trajectory:
 
     @property
     def has_ended(self) -> bool:
-        """Whether setpoints no longer move: the end is reached, or the clock has stopped."""
+        """True if setpoints no longer move: the end is reached, or the clock has stopped."""
         return self._s >= self.plan.duration_s or self._slow >= STOP_S
 
     def stop(self) -> None:

@@ -26,7 +26,7 @@ class ImportOptions:
         infinity: Costs of at least this value are hard; if costs are maximised, costs of at most its negative. None: no
             finite cost is hard.
         owner: A regular expression. Variables whose names have the same first group (or match) belong to one robot.
-        allow_code: Whether Python files named by a problem may be executed.
+        allow_code: True if Python files named by a problem may be executed.
         name: The name of the team. None: the name of the file, or of its problem.
     """
 
@@ -75,7 +75,7 @@ class ExportOptions:
     """The options of an export.
 
     Attributes:
-        intension: Whether predicates and functions are written as such if the format allows it, not as tables.
+        intension: True if predicates and functions are written as such if the format allows it, not as tables.
     """
 
     intension: bool = False

@@ -117,7 +117,7 @@ def apply_infinity(amount: Amount, infinity: int | None, *, maximize: bool) -> A
         amount: A cost. It may be an infinity of either sign.
         infinity: Costs of at least this are infinite; when maximising, costs of at most its negative. None: no finite
             cost is.
-        maximize: Whether costs are maximised.
+        maximize: True if costs are maximised.
 
     Raises:
         MistakeError: if `amount` is an infinity that would be the best possible cost.

@@ -52,7 +52,7 @@ def read_image(content: bytes, *, adds_alpha: bool) -> Image:
 
     Args:
         content: The content of the file.
-        adds_alpha: Whether alpha counts as a channel, as in map_server's mode trinary.
+        adds_alpha: True if alpha counts as a channel, as in map_server's mode trinary.
 
     Raises:
         MistakeError: The image has another format, is damaged, or has more than `MAX_PIXELS`.

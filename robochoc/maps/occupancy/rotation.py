@@ -27,7 +27,7 @@ class Rotation:
 
     @property
     def is_zero(self) -> bool:
-        """Whether the angle is 0."""
+        """True if the angle is 0."""
         return not self.sine
 
     def rotated(self, place: Place) -> Place:

@@ -58,11 +58,11 @@ class Operator(NamedTuple):
     gives: Type
     meaning: Callable[..., int]
     variadic: bool = False
-    """Whether the operator has two or more arguments. `meaning` folds them from the left, unless `takes_all` is set."""
+    """True if the operator has two or more arguments. `meaning` folds them from the left, unless `takes_all` is set."""
     infix: str = ""
     """A sign. If the only argument is an infix term with this sign, its operands are the arguments: `minus(i-j)`."""
     takes_all: bool = False
-    """Whether `meaning` receives all arguments at once."""
+    """True if `meaning` receives all arguments at once."""
 
 
 _I, _B = Type.INTEGER, Type.BOOLEAN

@@ -170,7 +170,7 @@ class IncomingNumbers:
 
     @property
     def complete(self) -> bool:
-        """Whether the whole table has arrived."""
+        """True if the whole table has arrived."""
         return len(self._numbers) == self._costs.size
 
     @property

@@ -458,7 +458,7 @@ class DPOP(TreeProtocol):
 
     @property
     def _all_arrived(self) -> bool:
-        """Whether all children's tables of costs are complete."""
+        """True if all children's tables of costs are complete."""
         return len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values())
 
     def _table_axes(self, child: str) -> Sequence[str]:

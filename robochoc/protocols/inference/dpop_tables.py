@@ -136,7 +136,7 @@ class IncomingTable:
 
     @property
     def complete(self) -> bool:
-        """Whether the whole table has arrived."""
+        """True if the whole table has arrived."""
         return not self._left
 
     @property

@@ -154,7 +154,7 @@ class MaxSumAD(FactorGraphProtocol):
 
     @property
     def _sends_values(self) -> bool:
-        """Whether values are sent in this phase (value propagation)."""
+        """True if values are sent in this phase (value propagation)."""
         phase, variant = self.cycle, self.settings.variant
         if variant == "AD" or phase < FIRST_WITH_VALUES:
             return False

@@ -344,7 +344,7 @@ class RMBDPOP(MBDPOP):
 
     @property
     def _is_in_cluster(self) -> bool:
-        """Whether the separator is too large: the robot is in a cluster, below its root."""
+        """True if the separator is too large: the robot is in a cluster, below its root."""
         return len(self._sizes) > self.settings.k
 
     def _store_cluster_label(self, child: str, label: ClusterLabel) -> None:

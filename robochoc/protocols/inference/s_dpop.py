@@ -125,7 +125,7 @@ class SDPOP(DPOP, DynamicProtocol):
         """The inputs to the tables of this robot's constraints."""
         self._has_new_values = False
         self._is_old_tree = False
-        """Whether the tree is that of the previous epoch."""
+        """True if the tree is that of the previous epoch."""
         self._needs_tree = False
         self._before_wave: set[str] = set()
         """Neighbours whose first wave has not arrived yet; their earlier messages belong to an old tree."""

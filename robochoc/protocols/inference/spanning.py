@@ -71,7 +71,7 @@ class Choice(Message, frozen=True):
 
 
 class Merged(Message, frozen=True):
-    """Whether the sender's tree is joined with the receiver's tree by their common function."""
+    """True if the sender's tree is joined with the receiver's tree by their common function."""
 
     joined: bool
 

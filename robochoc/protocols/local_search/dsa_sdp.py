@@ -116,7 +116,7 @@ class DSASDP(StochasticSearch):
 
     @property
     def _explores(self) -> bool:
-        """Whether the next cycle is a cycle of exploration."""
+        """True if the next cycle is a cycle of exploration."""
         return (self.cycle + 1) % self.settings.period == 0
 
 

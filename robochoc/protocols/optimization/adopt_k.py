@@ -138,12 +138,12 @@ class ADOPTk(BnBADOPT):
 
     @property
     def settled(self) -> bool:
-        """Whether the value with the least upper bound is good enough: TH^A = UB."""
+        """True if the value with the least upper bound is good enough: TH^A = UB."""
         return self.ub <= (self.lb if self._searches_depth_first else self.allowance)
 
     @property
     def leaves(self) -> bool:
-        """Whether to leave the value: LB(d) is k above TH^A, or has reached UB or TH^B."""
+        """True if the value must be left: LB(d) is k above TH^A, or has reached UB or TH^B."""
         return self.lower[self.index] >= self.allowance + self.settings.k or super().leaves
 
     # The children's shares of the allowance
@@ -190,5 +190,5 @@ class ADOPTk(BnBADOPT):
 
     @property
     def _searches_depth_first(self) -> bool:
-        """Whether this is BnB-ADOPT, in which the allowance does not matter."""
+        """True if this is BnB-ADOPT, in which the allowance does not matter."""
         return self.settings.k == INFINITE

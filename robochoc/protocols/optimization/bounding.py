@@ -197,7 +197,7 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def may_end(self) -> bool:
-        """Whether all ancestors' values are final."""
+        """True if all ancestors' values are final."""
         return self.parent is None or self.last_values
 
     def terminate(self) -> None:

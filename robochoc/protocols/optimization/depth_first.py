@@ -91,12 +91,12 @@ class DepthFirstProtocol(BoundingProtocol):
 
     @property
     def settled(self) -> bool:
-        """Whether the value with the least upper bound is good enough."""
+        """True if the value with the least upper bound is good enough."""
         return self.ub <= self.lb
 
     @property
     def leaves(self) -> bool:
-        """Whether to leave the value: its lower bound reaches UB or TH."""
+        """True if the value must be left: its lower bound reaches UB or TH."""
         return self.lower[self.index] >= min(self.threshold, self.ub)
 
     # Sending

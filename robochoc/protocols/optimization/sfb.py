@@ -337,7 +337,7 @@ class Batch:
 
     @property
     def left(self) -> bool:
-        """Whether some rows have not been sent yet."""
+        """True if some rows have not been sent yet."""
         return bool(len(self.rows) or len(self.ready))
 
     @property
@@ -450,7 +450,7 @@ class SFB(Protocol):
 
     @property
     def _priced(self) -> bool:
-        """Whether the values of all robots are known, and the constraints with them have been evaluated."""
+        """True if the values of all robots are known, and the constraints with them have been evaluated."""
         return hasattr(self, "bounds")
 
     def settle(self) -> None:

@@ -247,5 +247,5 @@ class SyncBB(Protocol):
 
     @property
     def _known(self) -> bool:
-        """Whether a best path is known."""
+        """True if a best path is known."""
         return self.best.bound < math.inf

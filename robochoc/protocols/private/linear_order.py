@@ -248,7 +248,7 @@ class LinearOrderProtocol(RerootingProtocol):
         self.axes: dict[int, OwnAxis] = {}
         self.places: dict[int, EliminationStep] = {}
         self.is_root = False
-        """Whether this robot is the root of the present turn."""
+        """True if this robot is the root of the present turn."""
         self._mask = CostSum(0, 0)
         self._pending: Plan | None = None
         self._answers: dict[str, Axis | None] = {}
@@ -274,7 +274,7 @@ class LinearOrderProtocol(RerootingProtocol):
 
     @property
     def planning(self) -> bool:
-        """Whether the turns are still executed without tables."""
+        """True if the turns are still executed without tables."""
         return self.step < self.turns
 
     @property

@@ -121,7 +121,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
         super().__init__(problem, order)
         self.turn = 0
         self._done = False
-        """Whether this robot has sent its table in this turn, or chosen its value."""
+        """True if this robot has sent its table in this turn, or chosen its value."""
         self._waiting: list[tuple[str, Message]] = []
 
     @property

@@ -17,7 +17,7 @@ class Ring:
 
     @property
     def is_first(self) -> bool:
-        """Whether the circle begins at this robot, the root of the tree."""
+        """True if the circle begins at this robot, the root of the tree."""
         return self._parent is None
 
     @property

@@ -137,7 +137,7 @@ class AFCng(Protocol):
 
     @property
     def over(self) -> bool:
-        """Whether this robot knows the result of the search, and so sends no more messages."""
+        """True if this robot knows the result of the search, and so sends no more messages."""
         return self.solved or self.verdict is not None
 
     @property

@@ -282,7 +282,7 @@ class CompAPO(Protocol):
         self.replies: dict[str, Evaluation] = {}
         self.waits_for: str | None = None
         self._conflict: bool | None = None
-        """Whether this robot is the highest in a conflict; None if not known since the last change."""
+        """True if this robot is the highest in a conflict; None if not known since the last change."""
 
     def start(self) -> None:
         """Choose the first value, and send the domain to all neighbours."""

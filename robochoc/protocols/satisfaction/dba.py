@@ -94,7 +94,7 @@ class Improve(wire.Message, frozen=True):
         return f"what I violate weighs {self.weight:,}, and my move would make that {self.reduction:,} less"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
-        # Whether the two values are consistent; an inconsistency is proven only if no other robot can have caused it.
+        # True if the two values are consistent. An inconsistency is proven only if no other robot can have caused it.
         own = reception.last(Value, reception.receiver, reception.sender)
         theirs = reception.last(Value, reception.sender, reception.receiver)
         if own is None or theirs is None:

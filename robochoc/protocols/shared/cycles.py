@@ -292,7 +292,7 @@ class CycleProtocol(Protocol):
 
     @property
     def finished(self) -> bool:
-        """Whether this was the last cycle."""
+        """True if this was the last cycle."""
         return self.cycle >= self.settings.cycles
 
     def _receive_report(self, sender: str, message: Place | Step | Paid | Best) -> None:

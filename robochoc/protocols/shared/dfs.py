@@ -45,7 +45,7 @@ class TreeProtocol(Protocol):
         self.children: tuple[str, ...] = ()
         self.pseudo_children: tuple[str, ...] = ()
         self.placed = False
-        """Whether this robot, and all robots below it, have their positions in the tree."""
+        """True if this robot, and all robots below it, have their positions in the tree."""
         self._election = _Election(problem.agent, problem.neighbours, order)
         self._met: set[str] = set()
         """The neighbours that this robot knows to be in the tree."""

@@ -135,7 +135,7 @@ def run_master(
         plan: The plan of the run.
         observer: Receives all events of the master.
         audience: Receives each answer that is published during the search (`plan.improve`).
-        watched: Whether the observer also receives the robots' events.
+        watched: True if the observer also receives the robots' events.
         progress: Receives the number of messages so far, from time to time.
         listening: Called as soon as robots can connect.
         publication: The journal for members that may sniff. It is served until shortly after `concluded`.

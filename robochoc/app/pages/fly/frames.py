@@ -11,8 +11,8 @@ class RunFrames(Element, component="frames.js"):
     """The frames of a run.
 
     Args:
-        flies: Whether there is or will be a flight.
-        talks: Whether there is or will be a conversation.
+        flies: True if there is or will be a flight.
+        talks: True if there is or will be a conversation.
     """
 
     def __init__(self, *, flies: bool, talks: bool) -> None:

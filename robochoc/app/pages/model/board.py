@@ -77,7 +77,7 @@ class Board(Element, component="board.js"):
 
     Args:
         events: The handlers for clicks, drags and keys.
-        movable: Whether robots can be moved, by dragging or with the arrow keys.
+        movable: True if robots can be moved, by dragging or with the arrow keys.
     """
 
     def __init__(self, events: BoardEvents, *, movable: bool = True) -> None:

@@ -1,4 +1,4 @@
-"""What the board shows for a sketch: robots with their marks, and rules as links."""
+"""The contents of the board for a sketch: robots with their marks, and rules as links."""
 
 from __future__ import annotations
 

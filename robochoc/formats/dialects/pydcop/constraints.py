@@ -50,7 +50,7 @@ class ConstraintReader:
         values: The values of each variable.
         fixed: The values of external variables.
         infinity: Costs of at least this are infinite. None: no finite cost is.
-        maximize: Whether costs are maximised.
+        maximize: True if costs are maximised.
         folder: The folder of Python files. None: these may not be executed.
         incomplete: The constraints whose tables lack tuples and a default.
     """

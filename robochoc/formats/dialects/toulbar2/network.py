@@ -47,7 +47,7 @@ class CostFunctionNetwork:
         variables: Its variables by name: the number of their values, or the names of the values.
         functions: Its cost functions. A scope may be empty.
         bound: A bound on the total cost of a solution: an exclusive upper bound, or lower bound if costs are maximised.
-        maximize: Whether costs are maximised.
+        maximize: True if costs are maximised.
         notes: The changes made when reading the file.
     """
 

@@ -82,7 +82,7 @@ class Instance:
     Attributes:
         file: The path of the file.
         name: The name of the problem.
-        maximize: Whether the costs are utilities.
+        maximize: True if the costs are utilities.
         agents: The agents, the highest first.
         self_agent: The agent whose file this is, if each agent has its own file.
         variables: The variables, by their names.

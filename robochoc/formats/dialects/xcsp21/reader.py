@@ -70,11 +70,11 @@ class FileHead:
     """The properties of a file by its first bytes, without parsing it.
 
     Attributes:
-        is_instance: Whether its root element is `instance`, and not XCSP3's.
+        is_instance: True if its root element is `instance`, and not XCSP3's.
         format: The format stated in its presentation, or an empty text.
         type: The type stated in its presentation, or an empty text.
-        has_agents: Whether it has a section of agents, which robots' files do not have.
-        is_network: Whether it has domains and variables, and no part that only robots' files have.
+        has_agents: True if it has a section of agents, which robots' files do not have.
+        is_network: True if it has domains and variables, and no part that only robots' files have.
     """
 
     def __init__(self, beginning: bytes) -> None:
