@@ -27,7 +27,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Metrics:
-    """The metrics of a run. They are defined in `docs/reference/metrics.md`.
+    """The metrics of a run. Their definitions: documentation, page Metrics.
 
     Attributes:
         messages: The number of protocol messages sent, by type.

@@ -175,7 +175,7 @@ class Model(Solvable):
             name: A name by which an event can remove the constraints.
             when_absent: The meaning of the constraints when a robot in their scopes withdraws, is lost or leaves:
                 `restate` them for the other robots, `drop` them, or `fail`. None: the default for their form
-                (docs/reference/absence.md).
+                (documentation, page When a robot is absent).
 
         Returns:
             One constraint that stands for all of them.

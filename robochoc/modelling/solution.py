@@ -141,7 +141,7 @@ class Solution(Outcome, Mapping[str, object]):
         return iter(self.assignment)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON result as a dictionary (docs/reference/result.md)."""
+        """Return the JSON result as a dictionary (documentation, page JSON result)."""
         numbers = {name: one for name, one in self.values.items() if isinstance(one, Real | Decimal)}
         changed = {name: _in_json(one) for name, one in numbers.items() if one != self.assignment[name]}
         result: dict[str, Any] = json.loads(result_json(self, values=changed))

@@ -32,7 +32,7 @@ def authority() -> None:
     """Manage the Authority, which enrols robots and observers and certifies their keys.
 
     Its folder contains the key that signs all certificates. Store it on the master's machine only
-    (docs/guides/security.md).
+    (documentation, page Security on several machines).
 
     \b
     robochoc authority init

@@ -30,7 +30,7 @@ PAGES = (".html", ".htm", ".md")
 
 @click.group()
 def experiment() -> None:
-    """Run studies of protocols on problems, and report their results (docs/guides/experiments.md).
+    """Run studies of protocols on problems, and report their results (documentation, page Experiments).
 
     \b
     robochoc experiment run study.toml

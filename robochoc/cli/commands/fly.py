@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 _SECTIONS: Sections = {
     COMMON: ("--html", "--serve", "--json", "--team", "--map", "--help"),
     "Simulated flight": ("--fail", "--distance", "--downwash", "--wind", "--gusts", "--seed"),
-    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics"),
+    "ROS (documentation, page ROS)": ("--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics"),
 }
 
 

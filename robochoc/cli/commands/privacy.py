@@ -50,7 +50,7 @@ def privacy(
     and their costs (domain), and the entries of constraints that it shares with third robots (constraints).
 
     Losses are lower bounds: they count only what the rules of the messages prove. If a robot received a message without
-    a rule, the loss is not known. See docs/guides/privacy.md.
+    a rule, the loss is not known (documentation, page How much robots learn of each other).
     """
     from robochoc.formats import read_team
     from robochoc.privacy import Measure

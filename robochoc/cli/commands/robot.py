@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 _SECTIONS: Sections = {
     COMMON: ("--master", "--token-file", "--token", "--identity", "--patience", "--sniff", "--json", "--help"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
-    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics"),
+    "ROS (documentation, page ROS)": ("--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics"),
 }
 
 

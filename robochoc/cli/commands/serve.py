@@ -80,7 +80,7 @@ def serve(
     (std_srvs/srv/Trigger) ends the current decision.
 
     \b
-    robochoc serve docs/examples/hangar
+    robochoc serve hangar
     ros2 service call /robochoc/hangar/decide std_srvs/srv/Trigger
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     kind, _, where = place.partition(":")

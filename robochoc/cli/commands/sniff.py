@@ -108,7 +108,7 @@ def sniff(
     """Show all messages of a run, with their reasons, on a page of this machine until Ctrl-C.
 
     JOURNAL is a file of 'robochoc solve --journal'; the page is updated while the run continues. With --master, the
-    page shows the run of a master on another machine (docs/guides/several-machines.md).
+    page shows the run of a master on another machine (documentation, page Several machines).
 
     \b
     robochoc sniff out/run.journal --robots 'Robot2.*' --open

@@ -55,9 +55,9 @@ _SECTIONS: Sections = {
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
-    "Files of other tools (docs/guides/import.md)": ("--format", "--infinity", "--owner"),
+    "Input (documentation, page Files of other tools)": ("--format", "--infinity", "--owner"),
     "Output": ("--explain", "--bounds", "--serve", "--open"),
-    "ROS (docs/guides/ros.md)": (
+    "ROS (documentation, page ROS)": (
         "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics", "--arm",
         "--situation", "--report-timeout", "--battery", "--use-sim-time", "--improve",
     ),

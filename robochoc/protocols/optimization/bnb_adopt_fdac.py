@@ -37,7 +37,8 @@ Choices that the papers leave open, and differences:
 - The tree replaces the papers' total order: costs are moved up along branches.
 - In the papers a copy of the costs is kept consistent, and the search uses the given costs: consistency serves to
   delete values during the search. Here the search uses the moved costs, and nothing is deleted, because in measurements
-  deletions cost as many messages as they save (docs/explanation/replications/complete-search.md).
+  deletions cost as many messages as they save (documentation, page Replications: complete search for
+  costs).
 - All binary constraints between two robots form one arc, even if robots have several variables. Costs of constraints
   between more than two robots are not moved, and neither are tables with more than 65,536 entries. The parent receives
   the cost of the cheapest value even if there is no constraint.

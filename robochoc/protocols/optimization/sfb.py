@@ -32,7 +32,7 @@ comes back up, with the charges of the values and an upper bound on all costs. T
 A solution that is cheaper than all before goes up the order, and every robot stores its value in this solution; CPAs
 carry its cost down. When the first robot has nothing left to extend, the last solution is optimal, or there is none.
 
-For the proof, and a comparison with other protocols, see docs/explanation/sfb.md.
+For the proof, and a comparison with other protocols, see the documentation, page SFB.
 
 Without costs, a value is either consistent or not, so CPAs contain bits instead of costs (`sfb_bits`). The rest is the
 same.

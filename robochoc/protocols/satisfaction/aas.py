@@ -6,8 +6,8 @@ all robots remain a Cartesian product of solutions, a robot has values in reserv
 
 - **When to use**: no costs, hard problems over numbers, with constraints such as x + 2 <= y, or times that must not
   overlap. On constraints without such a structure, and on easy problems, ABT does as well or better; it nearly always
-  makes fewer constraint checks, because AAS checks whole sets (docs/explanation/replications/satisfaction.md has
-  figures).
+  makes fewer constraint checks, because AAS checks whole sets (figures: documentation, page
+  Replications: constraint satisfaction).
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. At the end every
   combination of values from the robots' aggregates is a solution; each robot takes the first value of its aggregate.
   Space is polynomial: one nogood for each value.

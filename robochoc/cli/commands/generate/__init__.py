@@ -17,8 +17,8 @@ __all__ = ["generate"]
 def generate() -> None:
     """Write a team of a problem family as a folder of XML files.
 
-    Each seed gives one team, the same on every machine. docs/guides/generate.md describes the families, their sizes and
-    papers.
+    Each seed gives one team, the same on every machine. For the families, their sizes and papers, see the
+    documentation, page Generated problems.
     """
 
 

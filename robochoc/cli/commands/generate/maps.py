@@ -126,7 +126,7 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
     walls. On an OctoMap all places have a Z: cells are cubes, and drones fly through free ones.
 
     \b
-    robochoc generate formation --map docs/examples/building/building.yaml --agents 4 --shape wedge --anchor 3,2
+    robochoc generate formation --map building.yaml --agents 4 --shape wedge --anchor 3,2
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.maps.formation import formation as on_map
 
@@ -155,7 +155,7 @@ def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
     counts once; an area that three see counts less. A robot's values are the cells that it can reach.
 
     \b
-    robochoc generate coverage --map docs/examples/building/building.yaml --agents 3 --cells 40 --within 12
+    robochoc generate coverage --map building.yaml --agents 3 --cells 40 --within 12
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.maps.coverage import coverage as on_map
 
@@ -187,8 +187,8 @@ def patrol(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `patrol`'s own
     twice. With --rounds, a robot has one variable per round; it flies to the point of the first.
 
     \b
-    robochoc generate patrol --map docs/examples/building/building.yaml --agents 3 --points 8
-    robochoc generate patrol --map docs/examples/building/building.yaml --agents 2 --points 6 --rounds 2
+    robochoc generate patrol --map building.yaml --agents 3 --points 8
+    robochoc generate patrol --map building.yaml --agents 2 --points 6 --rounds 2
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.generators.maps.patrol import patrol as on_map
 
