@@ -278,6 +278,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
     reader = TeamReader()
     now: Mapping[str, Mapping[str, int]] | None
     decided: dict[str, dict[str, int]] = {}
+    names: list[str] = []
     several = list(events)
     for event, following in zip(several, [*several[1:], None], strict=True):
         yield event
@@ -297,7 +298,9 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
                 continue
         if cost < best and now is not None:
             best = cost
-            values = {name: value for robot in sorted(now, key=natural_key) for name, value in now[robot].items()}
+            if now.keys() != set(names):
+                names = sorted(now, key=natural_key)
+            values = {name: value for robot in names for name, value in now[robot].items()}
             yield Improved(t=event.t, cost=objective.in_user_units(best), assignment=values)
 
 

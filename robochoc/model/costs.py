@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 
 from robochoc.model.absence import can_be_restated, restated
@@ -111,8 +111,14 @@ def user_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
         total: A sum of normalised costs of the constraints of `team`.
         without: The withdrawn robots. Their constraints were restated or dropped.
     """
+    return cost_converter(team, without)(total)
+
+
+def cost_converter(team: Team, without: Collection[str] = ()) -> Callable[[float], Cost]:
+    """Return `user_cost` for many sums: the offsets of all constraints are added once."""
     sign = -1 if team.user_units.maximize else 1
-    return team.user_units.in_user_units(sign * (int(total) + _taken_out(team, without)))
+    offset = _taken_out(team, without)
+    return lambda total: team.user_units.in_user_units(sign * (int(total) + offset))
 
 
 def flat_units(team: Team) -> CostUnits:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost
-from robochoc.model.costs import user_cost
+from robochoc.model.costs import cost_converter
 from robochoc.model.problem import INFINITE, Constraint, Team, Value
 from robochoc.solver.encoding import cost_function, max_cost
 
@@ -28,7 +28,7 @@ class Objective:
     """
 
     def __init__(self, team: Team, withdrawal_cost: float | None = None, *, in_step: bool = False) -> None:
-        self._team = team
+        self._in_user_units = cost_converter(team)
         self.in_step = in_step
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._withdrawal_cost = withdrawal_cost
@@ -109,7 +109,7 @@ class Objective:
 
     def in_user_units(self, cost: float) -> Cost:
         """Convert `cost`, which includes withdrawal costs, to the user's units."""
-        return user_cost(self._team, cost)
+        return self._in_user_units(cost)
 
 
 def withdrawal_cost(team: Team) -> float:
