@@ -185,7 +185,7 @@ sbom: $(TOOLS)/.ready  ## what robochoc consists of, with its extras network and
 	@mkdir -p out && rm -rf $(VENV)/sbom
 	@$(PYTHON) -m venv --without-pip $(VENV)/sbom
 	@$(TOOLS)/bin/uv pip install --quiet --python $(VENV)/sbom/bin/python --require-hashes --no-build -r requirements/extras.txt
-	@sed 's/^dynamic = \["version"\].*/version = "$(VERSION)"/' pyproject.toml >$(VENV)/sbom/pyproject.toml
+	@sed 's/^dynamic = .*/version = "$(VERSION)"/' pyproject.toml >$(VENV)/sbom/pyproject.toml
 	@$(TOOLS)/bin/cyclonedx-py environment --pyproject $(VENV)/sbom/pyproject.toml --output-reproducible -o out/sbom.cdx.json $(VENV)/sbom
 	@rm -rf $(VENV)/sbom
 	@echo out/sbom.cdx.json

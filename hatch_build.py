@@ -1,4 +1,4 @@
-"""Puts compiled modules into the wheel, where there is a C compiler.
+"""Puts compiled modules into the wheel, where there is a C compiler, and README.md into the metadata, as PyPI shows it.
 
 The reasons are in docs/explanation/design/development.md, "Compiled core".
 
@@ -11,6 +11,7 @@ ROBOCHOC_COMPILE=1: a build that cannot compile fails. ROBOCHOC_COMPILE=0: nothi
 from __future__ import annotations
 
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -21,11 +22,45 @@ from pathlib import Path
 from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 NEEDED = ["msgspec>=0.18", "mypy[mypyc]>=1.13"]
 """mypyc sees the types of what is imported: without msgspec it would know nothing of messages."""
 NEXT = "A C compiler and Python's headers are needed. Without ROBOCHOC_COMPILE=1, a build without them is plain Python."
 MYPY = ["--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
+
+ONLY_REPOSITORY = re.compile(r"<!-- repository -->.*?<!-- end -->\n*", re.DOTALL)
+ONLY_PYPI = re.compile(r"<!-- PyPI: (.*?) -->")
+RELATIVE_LINK = r"\[([^\]]*)\]\((?![a-z]+:|#)([^)\s]+)\)"
+
+
+class LongDescription(MetadataHookInterface):
+    """hatchling asks it for the fields of the metadata that `pyproject.toml` declares as dynamic."""
+
+    def update(self, metadata: dict[str, Any]) -> None:
+        """Add the long description."""
+        readme = Path(self.root, "README.md").read_text(encoding="utf-8")
+        repository = metadata.get("urls", {}).get("Repository", "")
+        text = long_description(readme, repository, metadata["version"])
+        metadata["readme"] = {"content-type": "text/markdown", "text": text}
+
+
+def long_description(readme: str, repository: str, version: str) -> str:
+    """Return README.md as PyPI shows it, where relative links lead nowhere.
+
+    Links and pictures lead to the version's tag in the repository. Without a repository, pictures and references in
+    parentheses are removed, and other links are replaced by their text.
+    """
+    text = ONLY_PYPI.sub(r"\1", ONLY_REPOSITORY.sub("", readme))
+    if not repository:
+        text = re.sub(rf" \({RELATIVE_LINK}\)|!{RELATIVE_LINK}\n*", "", text)
+        return re.sub(RELATIVE_LINK, r"\1", text)
+
+    def absolute(found: re.Match[str]) -> str:
+        view = "raw" if found[1] else "blob"
+        return f"{found[1]}[{found[2]}]({repository.rstrip('/')}/{view}/v{version}/{found[3]})"
+
+    return re.sub(rf"(!?){RELATIVE_LINK}", absolute, text)
 
 
 class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]

@@ -10,7 +10,10 @@ from typing import Any
 
 import pytest
 import yaml
+from hatchling.metadata.core import ProjectMetadata
+from hatchling.plugin.manager import PluginManager
 
+from hatch_build import long_description
 from robochoc import __version__
 from tests.support.program import ROOT
 from tests.support.release import NEEDED, faults_of, package_files, too_large
@@ -20,7 +23,7 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 def test_the_version_is_written_in_one_place_and_the_same_where_others_need_it() -> None:
     assert "version" not in PROJECT["project"]
-    assert PROJECT["project"]["dynamic"] == ["version"]
+    assert "version" in PROJECT["project"]["dynamic"]
     assert PROJECT["tool"]["hatch"]["version"] == {"path": "robochoc/__init__.py"}
     quoted = {
         "CITATION.cff": r"^version: (.+)$",
@@ -70,17 +73,57 @@ def test_only_the_job_that_publishes_may_publish() -> None:
     assert workflow["jobs"]["publish"]["environment"]["name"] == "pypi"
 
 
+def test_the_classifiers_name_the_systems_and_pythons_that_the_workflow_tests() -> None:
+    jobs = yaml.safe_load((ROOT / ".github" / "workflows" / "tests.yml").read_text())["jobs"]
+    systems = {"ubuntu-latest": "POSIX :: Linux", "macos-latest": "MacOS", "windows-latest": "Microsoft :: Windows"}
+    tested = {jobs["linux"]["runs-on"], *jobs["other-systems"]["strategy"]["matrix"]["os"]}
+    pythons = jobs["linux"]["strategy"]["matrix"]["python"]
+    named = {line for line in PROJECT["project"]["classifiers"] if line.startswith(("Operating", "Programming"))}
+    assert named - {"Programming Language :: Python :: 3 :: Only"} == {
+        *(f"Operating System :: {systems[system]}" for system in tested),
+        *(f"Programming Language :: Python :: {python}" for python in pythons),
+    }
+
+
+# The long description
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def test_without_a_repository_the_long_description_has_no_links_into_it() -> None:
+    shown = long_description(README, "", "1.0.0")
+    assert "![" not in shown
+    assert re.findall(r"\]\((?!https?://)", shown) == []
+    assert "pip install robochoc" in shown
+    assert re.findall(r"pip install '?\.|make demo|<!--", shown) == []
+
+
+def test_with_a_repository_links_and_the_picture_lead_to_the_tag() -> None:
+    shown = long_description(README, "https://example.org/team/robochoc/", "1.0.0")
+    images, links = re.findall(r"!\[[^]]*\]\((\S+)\)", shown), re.findall(r"(?<!!)\[[^]]*\]\((\S+)\)", shown)
+    assert images == ["https://example.org/team/robochoc/raw/v1.0.0/docs/images/nogood.png"]
+    assert "https://example.org/team/robochoc/blob/v1.0.0/docs/guides/import.md" in links
+    assert [link for link in links if not link.startswith("https://")] == []
+
+
+def test_the_build_has_the_long_description_and_its_type() -> None:
+    core = ProjectMetadata(str(ROOT), PluginManager()).core
+    assert (core.readme_content_type, core.dynamic) == ("text/markdown", [])
+    repository = PROJECT["project"].get("urls", {}).get("Repository", "")
+    assert core.readme == long_description(README, repository, __version__)
+
+
 # `make release`
 
 PURE, COMPILED = "robochoc-1.0.0-py3-none-any.whl", "robochoc-1.0.0-cp311-cp311-linux_x86_64.whl"
 TRACKED = ["tests/conftest.py", "robochoc/__init__.py", "robochoc/abt.py", "xsd/robot.xsd", *NEEDED]
 
 
-def wheel_with(name: str, version: str, folder: Path, *files: str) -> Path:
+def wheel_with(name: str, version: str, folder: Path, *files: str, description: str = "") -> Path:
     with zipfile.ZipFile(folder / name, "w") as packed:
         for file in files:
             packed.writestr(file, "")
-        packed.writestr(f"robochoc-{version}.dist-info/METADATA", f"Version: {version}\n")
+        packed.writestr(f"robochoc-{version}.dist-info/METADATA", f"Version: {version}\n\n{description}")
     return folder / name
 
 
@@ -110,6 +153,14 @@ def test_a_wheel_that_is_not_as_it_should_be(
     files = (package_files(TRACKED) | {with_}) - {without, ""}
     (found,) = faults_of(wheel_with(name, version, tmp_path, *files), package_files(TRACKED))
     assert fault in found
+
+
+def test_a_relative_link_in_the_description_is_noticed(tmp_path: Path) -> None:
+    files = package_files(TRACKED)
+    wheel = wheel_with(
+        PURE, __version__, tmp_path, *files, description="See [a](https://b.c/d) and [guide](docs/e.md)."
+    )
+    assert [*faults_of(wheel, files)] == [f"{PURE}: its description has a relative link, docs/e.md"]
 
 
 def test_a_wheel_that_has_grown_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ import hashlib
 import itertools
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -22,6 +23,7 @@ from collections.abc import Iterator, Sequence
 from email.parser import HeaderParser
 from pathlib import Path
 
+from hatch_build import RELATIVE_LINK
 from robochoc import __version__
 from tests.support.snippets import blocks_of
 
@@ -87,6 +89,8 @@ def faults_of(wheel: Path, expected: set[str]) -> Iterator[str]:
         yield f"{wheel.name}: {len(modules)} compiled modules"
     if metadata["Version"] != __version__:
         yield f"{wheel.name}: its version is {metadata['Version']}, and not {__version__}"
+    for link in re.findall(RELATIVE_LINK, str(metadata.get_payload())):
+        yield f"{wheel.name}: its description has a relative link, {link[1]}"
 
 
 def too_large(files: Sequence[Path]) -> Iterator[str]:
