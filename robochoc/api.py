@@ -154,7 +154,9 @@ class AgentsContainer:
             UnknownProtocolError: if no such protocol is installed.
         """
         if not kind.startswith((_MASTER, _AGENT)):
-            raise ValueError(f"{kind!r} is not a type of agent: MasterABT or AgentABT, or with another protocol's name")
+            raise ValueError(
+                f"{kind!r} is not a type of agent: write MasterABT or AgentABT, with any protocol's name for ABT"
+            )
         protocol_called(kind.removeprefix(_MASTER).removeprefix(_AGENT))
         self._type = kind
 
@@ -227,7 +229,9 @@ class AgentsContainer:
                 f"a run on several machines {REQUIREMENT}: solve the problem with runtime='simulator'"
             )
         if not self._type:
-            raise ValueError("say first what this container is: set_agent_type('MasterABT') or ('AgentABT')")
+            raise ValueError(
+                "the container has no type: call set_agent_type('MasterABT') or set_agent_type('AgentABT') first"
+            )
         if self._type.startswith(_MASTER):
             return self._lead(observer, plan)
         return self._join()
@@ -247,7 +251,10 @@ class AgentsContainer:
         from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - robots' machines only
 
         if self._main is None or not self._agents:
-            raise ValueError("a robot needs its file and its master: add_agent(name, file), set_main_container(host)")
+            raise ValueError(
+                "the container has no agents or no master: call add_agent(name, file)"
+                " and set_main_container(host) first"
+            )
         with ThreadPoolExecutor(len(self._agents)) as pool:
             running = {name: pool.submit(self._robot, name, self._main) for name in self._agents}
             return {name: robot.result() for name, robot in running.items()}
@@ -259,7 +266,7 @@ class AgentsContainer:
 
         file, sniff = self._agents[name]
         if file is None or file.stem != name:
-            raise ValueError(f"{name} needs its file, {name}.xml")
+            raise ValueError(f"the file of {name} must be called {name}.xml, not {file}")
         robot = read_robot(file)
         identity = identity_of(name, main, *self._identities.get(name, (None, None)))
         with errors_in_python(("identity",)), Compiler() as compiler:

@@ -113,7 +113,8 @@ class Authority:
         with locked(folder):
             if (folder / _KEY).exists() or (folder / _CERTIFICATE).exists():
                 raise AuthorityError(
-                    f"there is already an Authority in {folder}; without it, all robots would have to enrol again"
+                    f"an Authority already exists in {folder}: choose another folder"
+                    " (all robots would have to enrol again with a new Authority)"
                 )
             key = new_key()
             certificate = ca_certificate(key, utc_time(clock()))
@@ -143,12 +144,15 @@ class Authority:
             raise AuthorityError(f"the Authority in {folder} is damaged: {error}") from error
         if mode & _OTHERS:
             raise AuthorityError(
-                f"others can read the key of the Authority (mode {mode & 0o777:o}); run: chmod 600 {folder / _KEY}"
+                f"other users can read the key of the Authority (mode {mode & 0o777:o}); run: chmod 600 {folder / _KEY}"
             )
         if certificate.public_key() != key.public_key():
             raise AuthorityError(f"the Authority in {folder} is damaged: {_KEY} is not the key of {_CERTIFICATE}")
         if not certificate.not_valid_before_utc <= utc_time(clock()) < certificate.not_valid_after_utc:
-            raise AuthorityError(f"the Authority in {folder} has expired, or the clock is wrong")
+            raise AuthorityError(
+                f"the certificate of the Authority in {folder} is not valid now:"
+                " check the clock, or create a new Authority"
+            )
         return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
 
     def enrol(
@@ -227,14 +231,14 @@ class Authority:
             except CertificateError as error:
                 raise NotGrantedError(str(error)) from error
             if proven != name:
-                raise NotGrantedError("the request is in another name than the certificate")
+                raise NotGrantedError("the name in the request differs from the name in the certificate")
             if name == MASTER:
                 raise NotGrantedError(f"the certificate of {MASTER} can only be renewed on the Authority's machine")
             if self.is_revoked(current.serial_number):
                 raise NotGrantedError("the certificate has been revoked")
             member = members[name].without_expired(now)
             if len(member.certificates) >= IN_FORCE_AT_MOST:
-                raise NotGrantedError(f"{IN_FORCE_AT_MOST} certificates of this name are in force: no more are allowed")
+                raise NotGrantedError(f"this name already has {IN_FORCE_AT_MOST} valid certificates, the maximum")
             certificate, issued = self._issue(holder, name)
             members[name] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
         self.report(Granted(t=now, who=name, what=what, origin=origin))
@@ -270,7 +274,7 @@ class Authority:
         with self._registry.change() as members:
             member = members.get(name)
             if member is None:
-                problem = f"no '{on_one_line(shortened(name))}' is enrolled"
+                problem = f"'{on_one_line(shortened(name))}' is not enrolled"
                 raise NotEnrolledError(f"{problem} ({describe_enrolled(name, members)})")
             withdrawn = (*member.withdrawn, *member.certificates)
             members[name] = EnrolledName(name, member.role, None, (), withdrawn, revoked=True).without_expired(
@@ -348,9 +352,9 @@ def _redeemable(
         if now >= invitation.expires:
             raise NotGrantedError("the token has expired")
         if member.name != name:
-            raise NotGrantedError("the token is not for this name")
+            raise NotGrantedError("the token was issued for another name")
         return member, invitation
-    raise NotGrantedError("the token is unknown, or was replaced by a newer one")
+    raise NotGrantedError("the token is unknown, or has been replaced by a newer one")
 
 
 def default_authority_folder() -> Path:

@@ -186,7 +186,7 @@ def common_name(subject: x509.Name) -> str:
     """Return the name in a subject with a single common name. Raises `CertificateError`."""
     attributes = list(subject)
     if len(attributes) != 1 or attributes[0].oid != NameOID.COMMON_NAME or not isinstance(attributes[0].value, str):
-        raise CertificateError("its subject is not one common name")
+        raise CertificateError("the subject must be a single common name")
     return attributes[0].value
 
 
@@ -203,11 +203,11 @@ def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datet
     if not certificate.not_valid_before_utc <= now <= certificate.not_valid_after_utc:
         times = f"{certificate.not_valid_before_utc:%Y-%m-%d %H:%M} to {certificate.not_valid_after_utc:%Y-%m-%d %H:%M}"
         who = on_one_line(shortened(name))
-        raise CertificateError(f"the certificate of {who} is valid from {times} (UTC), not now; is the clock right?")
+        raise CertificateError(f"the certificate of {who} is valid from {times} (UTC), not now: check the clock")
     try:
         PolicyBuilder().store(Store([ca])).time(now).build_client_verifier().verify(certificate, [])
     except VerificationError as error:
-        raise CertificateError("the certificate is not valid for a client of this Authority") from error
+        raise CertificateError("the certificate is not valid for clients of this Authority") from error
     return name
 
 

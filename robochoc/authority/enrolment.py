@@ -109,8 +109,8 @@ def _request_ca(place: tuple[str, int], token: EnrolmentToken, patience_s: float
         ca = None
     if ca is None or not hmac.compare_digest(fingerprint(ca), token.fingerprint):
         raise NotTrustedError(
-            f"the server at {_as_text(place)} does not belong to the Authority of the token: it is the address of "
-            "another one, or the connection is intercepted; the token was not sent"
+            f"the server at {_as_text(place)} does not belong to the Authority of the token: the address is wrong, "
+            "or the connection is intercepted; the token was not sent"
         )
     return ca
 
@@ -145,8 +145,8 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
         ) from error
     except ssl.SSLError as error:
         raise EnrolmentError(
-            f"the Authority at {_as_text(place)} has ended the connection ({error.reason or error}); "
-            "is the robot's certificate still valid?"
+            f"the Authority at {_as_text(place)} has closed the connection ({error.reason or error}); "
+            "check that the robot's certificate is still valid"
         ) from error
     except (OSError, FrameError) as error:
         raise EnrolmentError(_no_answer_message(place, error)) from error
@@ -154,7 +154,7 @@ def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, pa
 
 def _no_answer_message(place: tuple[str, int], error: Exception) -> str:
     why = error.strerror if isinstance(error, OSError) and error.strerror else error
-    return f"no answer from the Authority at {_as_text(place)}: {why}; is 'robochoc master' running there?"
+    return f"no answer from the Authority at {_as_text(place)}: {why}; check that 'robochoc master' is running there"
 
 
 def _checked_certificate(
@@ -163,7 +163,7 @@ def _checked_certificate(
     """Return the certificate in `answer` after checking that `ca` has issued it for `name` and `key`."""
     match answer:
         case EnrolmentDenied():
-            raise EnrolmentError(f"the Authority refuses: {on_one_line(answer.why)}")
+            raise EnrolmentError(f"the Authority has refused the request: {on_one_line(answer.why)}")
         case Certified():
             try:
                 certificate = read_certificate(answer.certificate)
@@ -174,7 +174,7 @@ def _checked_certificate(
                 return certificate
             raise EnrolmentError("the Authority issued a certificate for another name or key")
         case _:
-            raise EnrolmentError("the Authority sent an answer of the wrong kind")
+            raise EnrolmentError("the Authority sent a response of the wrong type")
 
 
 def _as_text(place: tuple[str, int]) -> str:

@@ -153,9 +153,9 @@ class EnrolmentServer:
             why = error.verify_message if isinstance(error, ssl.SSLCertVerificationError) else error.reason
             self._refuse(origin, f"TLS failed: {why or error}")
         except TimeoutError:
-            self._refuse(origin, f"it took more than {self._patience_s:g} s")
+            self._refuse(origin, f"no complete request within {self._patience_s:g} s")
         except OSError as error:
-            self._refuse(origin, f"the connection broke: {error.strerror or error}")
+            self._refuse(origin, f"the connection failed: {error.strerror or error}")
 
     def _answer_or_denial(self, exchange: Exchange, connection: ssl.SSLSocket, origin: str) -> Answer:
         try:
@@ -167,7 +167,7 @@ class EnrolmentServer:
             return EnrolmentDenied(str(error))
         except AuthorityError as error:
             self._refuse(origin, str(error))
-            return EnrolmentDenied("the Authority cannot answer now; ask its operator")
+            return EnrolmentDenied("the Authority cannot answer now: ask its operator")
 
     def _answer(self, question: Question, shown: bytes | None, origin: str) -> Answer:
         """Return the answer to a robot; `shown` is its certificate (DER) in the handshake, None without one."""
@@ -178,7 +178,9 @@ class EnrolmentServer:
                 return Certified(self._authority.redeem(question.secret, question.request, origin))
             case Renew():
                 if shown is None:
-                    raise FrameError("the connection to renew a certificate must use this certificate")
+                    raise FrameError(
+                        "a certificate can only be renewed over a connection that uses the same certificate"
+                    )
                 current = x509.load_der_x509_certificate(shown)
                 return Certified(self._authority.renew(question.request, current, origin))
             case _:

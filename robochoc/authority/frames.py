@@ -72,7 +72,7 @@ def decode_question(content: bytes) -> Question:
     try:
         question: Question = _questions.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise FrameError(f"not a valid question: {error}") from error
+        raise FrameError(f"invalid request: {error}") from error
     return question
 
 
@@ -81,7 +81,7 @@ def decode_answer(content: bytes) -> Answer:
     try:
         answer: Answer = _answers.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-        raise FrameError(f"not a valid answer: {error}") from error
+        raise FrameError(f"invalid response: {error}") from error
     return answer
 
 
@@ -96,7 +96,7 @@ class Exchange:
         """Limit the socket's next operation to the remaining time. Raises `TimeoutError` if none remains."""
         left = self._deadline - time.monotonic()
         if left <= 0:
-            raise TimeoutError("it took too long")
+            raise TimeoutError("the time limit is exceeded")
         self._connection.settimeout(left)
 
     def send(self, frame: Question | Answer) -> None:
@@ -116,7 +116,7 @@ class Exchange:
     def _receive(self) -> bytes:
         length = int.from_bytes(self._exactly(_LENGTH_BYTES), "big")
         if length > LARGEST_BYTES:
-            raise FrameError(f"{length} bytes were announced, but at most {LARGEST_BYTES} are allowed")
+            raise FrameError(f"the frame has {length} bytes, more than the maximum of {LARGEST_BYTES}")
         return self._exactly(length)
 
     def _exactly(self, size: int) -> bytes:
@@ -125,6 +125,6 @@ class Exchange:
             self.wait()
             part = self._connection.recv(size - len(content))
             if not part:
-                raise FrameError("the other side has closed the connection within a frame")
+                raise FrameError("the connection was closed in the middle of a frame")
             content += part
         return bytes(content)

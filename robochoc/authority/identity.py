@@ -141,7 +141,7 @@ def private_folder(folder: Path) -> None:
     if not mode & _OTHERS:
         return
     if any(folder.iterdir()):
-        raise PermissionError(f"{folder} is open to others (mode {mode & 0o777:o}); use a separate folder for keys")
+        raise PermissionError(f"other users can open {folder} (mode {mode & 0o777:o}); use a separate folder for keys")
     folder.chmod(0o700)
 
 
@@ -156,7 +156,7 @@ def _secret(path: Path) -> bytes:
     content = _read(path)
     mode = path.stat().st_mode
     if mode & _OTHERS:
-        raise IdentityError(f"{path} can be read by others (mode {mode & 0o777:o}); run: chmod 600 {path}")
+        raise IdentityError(f"other users can read {path} (mode {mode & 0o777:o}); run: chmod 600 {path}")
     return content
 
 
@@ -165,7 +165,7 @@ def _read(path: Path) -> bytes:
         with path.open("rb") as file:
             content = file.read(_LARGEST_BYTES + 1)
     except FileNotFoundError:
-        raise IdentityError(f"{path} is missing: there is no identity yet, enrol with a token") from None
+        raise IdentityError(f"{path} is missing: enrol this robot with a token first") from None
     except OSError as error:
         raise IdentityError(f"{path} cannot be read: {error.strerror}") from error
     if len(content) > _LARGEST_BYTES:

@@ -59,11 +59,11 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def decode(cls, content: bytes) -> Self:
         """Return the card in `content`, to be checked by `KeyRing.admit`. Raises `KeyCardError`."""
         if len(content) > _LARGEST_CARD_BYTES:
-            raise KeyCardError(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
+            raise KeyCardError(f"the key card has {len(content)} bytes, more than the maximum of {_LARGEST_CARD_BYTES}")
         try:
             return msgspec.msgpack.decode(content, type=cls)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise KeyCardError(f"not a valid key card: {error}") from error
+            raise KeyCardError(f"invalid key card: {error}") from error
 
     def signed_part(self) -> bytes:
         """Return the signed bytes of the card."""
@@ -105,13 +105,13 @@ class KeyRing:
         except CertificateError as error:
             raise KeyCardError(f"the key card of {who}: {error}") from error
         except (InvalidSignature, UnicodeEncodeError) as error:
-            raise KeyCardError(f"the key card of {who} is not signed with the key of its certificate") from error
+            raise KeyCardError(f"the key card of {who} is not signed with the key in its certificate") from error
         if proven != card.name:
-            raise KeyCardError(f"the key card of {who} has the certificate of {on_one_line(shortened(proven))}")
+            raise KeyCardError(f"the key card of {who} contains the certificate of {on_one_line(shortened(proven))}")
         if card.run != self.run:
             raise KeyCardError(f"the key card of {who} is from another run")
         if {len(card.signing), len(card.sealing)} != {_PUBLIC_BYTES}:
-            raise KeyCardError(f"the keys on the card of {who} do not have {_PUBLIC_BYTES} bytes")
+            raise KeyCardError(f"the keys on the card of {who} must have {_PUBLIC_BYTES} bytes each")
         try:
             self._sealing.exchange(X25519PublicKey.from_public_bytes(card.sealing))
         except ValueError as error:  # a point of small order, for which the agreed secret would be public
@@ -127,7 +127,7 @@ class KeyRing:
         try:
             return self._peers[name]
         except KeyError:
-            raise UnknownPeerError(f"no key card of {on_one_line(shortened(name))} was admitted") from None
+            raise UnknownPeerError(f"no key card of {on_one_line(shortened(name))} has been accepted") from None
 
     def sign(self, content: bytes) -> bytes:
         """Return an Ed25519 signature of `content` (64 bytes)."""
@@ -162,11 +162,13 @@ class KeyRing:
         Raises `RuntimeError` in a forked child, where numbers would be repeated.
         """
         if os.getpid() != self._process:
-            raise RuntimeError("a key ring can only be used in the process that created it: create one in the child")
+            raise RuntimeError(
+                "a key ring can only be used in the process that created it: create another one in the child process"
+            )
         return next(self._numbers)
 
     def __reduce_ex__(self, _protocol: SupportsIndex) -> NoReturn:
-        raise TypeError("a key ring cannot be copied: its numbers would be repeated")
+        raise TypeError("a key ring cannot be copied, since the copy would repeat its nonces: create another key ring")
 
 
 def bound(*parts: bytes) -> bytes:

@@ -221,7 +221,7 @@ class Host:
         try:
             self.protocol.settle()
         except _UNUSABLE as error:
-            raise _refusal(f"{self.name} was sent something", error) from None
+            raise _refusal(f"{self.name} has received messages", error) from None
         return self._said()
 
     def handle_lossy(

@@ -401,7 +401,7 @@ def _distance(places: Sequence[Array], downwash: float) -> float:
 def check_homes(names: Sequence[str], homes: Array) -> None:
     """Raise `ValueError` if there are no drones, too many, or one is too far away."""
     if not names:
-        raise ValueError("there are no drones to fly: the run has no decision for any")
+        raise ValueError("there are no drones to fly: the run has decided no position")
     if len(names) > DRONES_MAX:
         raise ValueError(f"there are {len(names):,} drones, more than the maximum of {DRONES_MAX:,}")
     check_near(names, homes)
@@ -414,7 +414,8 @@ def check_near(names: Sequence[str], places: npt.ArrayLike) -> None:
     if len(far):
         place = ", ".join(f"{part:g}" for part in places[far[0]])
         raise ValueError(
-            f"{names[far[0]]}: the place ({place}) m is over {COORDINATE_MAX_M:,.0f} m away; use a smaller scale"
+            f"{names[far[0]]}: the position ({place}) m is more than {COORDINATE_MAX_M:,.0f} m from the origin;"
+            " use a smaller scale"
         )
 
 

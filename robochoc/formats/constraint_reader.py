@@ -108,7 +108,7 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
 
 def _refuse_elements(parameters: etree._Element | None) -> None:
     for child in () if parameters is None else parameters:
-        message = f"<{child.tag}/> in the parameters: only global constraints have elements there"
+        message = f"<{child.tag}/> is not allowed in these parameters: only global constraints have elements there"
         raise MistakeError(message, "write variables and integers")
 
 

@@ -81,13 +81,19 @@ def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> 
 def check_units(units: CostUnits, kind: ProblemKind) -> None:
     """Raise `MistakeError` unless `units` are valid for a robot of that `kind`."""
     if not 0 <= units.places <= MAX_PLACES:
-        raise MistakeError(f"costs with {units.places} decimal places", f"use 0 to {MAX_PLACES}")
+        raise MistakeError(f"the costs have {units.places} decimal places", f"use 0 to {MAX_PLACES}")
     if not -BEYOND < units.constant < BEYOND:
         message = f"the constant of the costs has {digits(units.constant)} digits"
-        raise MistakeError(message, "at most 18 are allowed, decimal places included: use smaller constants")
+        raise MistakeError(message, "use at most 18 digits, decimal places included")
     if kind != ProblemKind.DISWCSP and units != CostUnits():
-        what = "maximize" if units.maximize else "a constant cost" if units.constant else "a scale of costs"
-        raise MistakeError(f"{what} in a DisCSP", 'write type="DisWCSP" in the presentation, or delete it')
+        what = (
+            "an objective to maximise"
+            if units.maximize
+            else "a constant cost"
+            if units.constant
+            else "a scale of costs"
+        )
+        raise MistakeError(f"a DisCSP cannot have {what}", 'write type="DisWCSP" in the presentation, or delete it')
 
 
 class CostConversion:

@@ -100,8 +100,10 @@ def _values(row: list[str], symbolic: tuple[int, ...], code: Callable[[str], int
         return tuple([read_integer(word) for word in row])
     for place in symbolic:
         if place < len(row) and _NUMERIC.match(row[place]):
-            message = f"'{shortened(row[place])}' in a column of symbols"
-            raise MistakeError(message, "a column holds symbols or integers, as the first tuple does")
+            message = f"'{shortened(row[place])}' is a number in a column of symbols"
+            raise MistakeError(
+                message, "use only symbols or only integers in a column; the first tuple determines which"
+            )
     return tuple([code(word) if place in symbolic else read_integer(word) for place, word in enumerate(row)])
 
 
@@ -124,8 +126,8 @@ def _default_cost(given: str, semantics: Semantics, units: CostUnits) -> float:
     if semantics == Semantics.SOFT:
         return read_cost(given, units) if given else INFINITE
     if given:
-        hint = 'write semantics="soft", or delete it: supports and conflicts forbid, and cost nothing'
-        raise MistakeError(f"defaultCost in a {semantics} relation", hint)
+        hint = 'write semantics="soft", or delete it: supports and conflicts have no costs'
+        raise MistakeError(f"a {semantics} relation cannot have a defaultCost", hint)
     return 0
 
 
@@ -133,7 +135,7 @@ def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
     """Return the specified arity, or the length of the first tuple. Raises `MistakeError` if there is neither."""
     given = attribute(element, "arity")
     if not given and not tuples:
-        raise MistakeError("a relation without tuples lacks its arity", 'write arity="2"')
+        raise MistakeError("the relation has neither tuples nor an arity", 'write arity="2"')
     return int(given) if given else len(tuples[0])
 
 

@@ -71,30 +71,30 @@ def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:
     """Raise `MistakeError` if a robot of that `kind` cannot have relations with this `semantics`."""
     if semantics == Semantics.SOFT and kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
-        raise MistakeError("a soft relation in a DisCSP", hint)
+        raise MistakeError("a DisCSP cannot have a soft relation", hint)
 
 
 def refuse_function(kind: ProblemKind) -> None:
     """Raise `MistakeError` if a robot of that `kind` cannot have functions, whose values are costs."""
     if kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or a predicate'
-        raise MistakeError("a function, whose value is a cost, in a DisCSP", hint)
+        raise MistakeError("a DisCSP cannot have a function, whose value is a cost", hint)
 
 
 def check_relation(relation: Relation) -> None:
     """Raise `MistakeError` unless the tuples have the relation's arity and are distinct, with costs if it is soft."""
     check_tuple_count(len(relation.tuples))
     if relation.semantics != Semantics.SOFT and (relation.default_cost != 0 or relation.costs):
-        wrong = "defaultCost" if relation.default_cost != 0 else "costs"
+        wrong = "a defaultCost" if relation.default_cost != 0 else "costs"
         hint = "only soft relations have costs: make it soft, or delete them"
-        raise MistakeError(f"{wrong} in a {relation.semantics} relation", hint)
+        raise MistakeError(f"a {relation.semantics} relation cannot have {wrong}", hint)
     if relation.arity < 1:
-        message = f"a relation of arity {in_short(relation.arity)}"
+        message = f"a relation cannot have the arity {in_short(relation.arity)}"
         raise MistakeError(message, "each tuple has a value for each variable of the scope: use 1 or more")
     _check_tuples(relation)
     if relation.semantics == Semantics.SOFT:
         if len(relation.costs) != len(relation.tuples):
-            message = f"{len(relation.tuples)} tuples, but {len(relation.costs)} costs"
+            message = f"the relation has {len(relation.tuples)} tuples, but {len(relation.costs)} costs"
             raise MistakeError(message, "write cost:tuple, 5:1 2|3:2 2")
         for cost in (*relation.costs, relation.default_cost):
             check_cost(cost)
@@ -103,7 +103,9 @@ def check_relation(relation: Relation) -> None:
 def check_tuple_count(number: int) -> None:
     """Raise `MistakeError` if a relation has too many tuples."""
     if number > MAX_TUPLES:
-        raise MistakeError(f"{number} tuples, more than {MAX_TUPLES}", "write a predicate instead")
+        raise MistakeError(
+            f"the relation has {number} tuples, more than the maximum of {MAX_TUPLES}", "write a predicate instead"
+        )
 
 
 def _check_tuples(relation: Relation) -> None:
@@ -207,9 +209,9 @@ def _check_size(expression: object) -> None:
         node, depth = waiting.pop()
         nodes += 1
         if nodes > MAX_NODES:
-            raise ExpressionError("the expression is too long", 0, f"{MAX_NODES} operators and terms are allowed")
+            raise ExpressionError("the expression is too long", 0, f"use at most {MAX_NODES} operators and terms")
         if depth > MAX_DEPTH:
-            raise ExpressionError("the expression is nested too deeply", 0, f"{MAX_DEPTH} levels are allowed")
+            raise ExpressionError("the expression is nested too deeply", 0, f"use at most {MAX_DEPTH} levels")
         match node:
             case Apply(operator=str(), arguments=tuple(arguments)):
                 waiting += [(argument, depth + 1) for argument in reversed(arguments)]
@@ -217,9 +219,11 @@ def _check_size(expression: object) -> None:
                 pass
             case Constant(value=int(value)) if not isinstance(value, bool):
                 if not -BEYOND < value < BEYOND:
-                    raise ExpressionError(f"an integer of {digits(value)} digits", 0, "18 digits are allowed")
+                    raise ExpressionError(f"an integer has {digits(value)} digits", 0, "use at most 18 digits")
             case _:
-                raise ExpressionError(f"a {type(node).__name__} instead of a term", 0, "use Constant, Name or Apply")
+                raise ExpressionError(
+                    f"expected a term, found a {type(node).__name__}", 0, "use Constant, Name or Apply"
+                )
 
 
 def terms_text(terms: Sequence[Term]) -> str:

@@ -93,7 +93,9 @@ class ElementView:
     def text(self) -> str:
         """Return the text of an element. Raises `MistakeError` if it has child elements."""
         for child in self._element:
-            raise MistakeError(f"<{child.tag}> inside <{self.tag}>", "only text is expected there", line(child))
+            raise MistakeError(
+                f"<{child.tag}> is not allowed inside <{self.tag}>", "write only text there", line(child)
+            )
         self._is_text_read = True
         return (self._element.text or "").strip(BLANKS)
 
@@ -126,7 +128,7 @@ class ElementView:
         """Return the child element called `name`, or None. Raises `MistakeError` if there are several."""
         found = self.children(name)
         if len(found) > 1:
-            raise found[1].mistake(f"a second <{name}> in <{self.tag}>", "write one of them")
+            raise found[1].mistake(f"<{self.tag}> has a second <{name}>", "keep one of them")
         return found[0] if found else None
 
     def required(self, name: str) -> ElementView:
@@ -134,7 +136,7 @@ class ElementView:
         found = self.child(name)
         if found is None:
             unread = [child.tag for child in self._views() if not child._is_read and child.tag not in self._asked]
-            raise self.mistake(f"<{self.tag}> without <{name}>", _hint_on_missing(name, unread))
+            raise self.mistake(f"<{self.tag}> has no <{name}>", _hint_on_missing(name, unread))
         return found
 
     def one_of(self, *names: str) -> ElementView:
@@ -143,7 +145,7 @@ class ElementView:
         if len(found) == 1:
             return found[0]
         for child in found[1:]:
-            raise child.mistake(f"a second element in <{self.tag}>: <{child.tag}>", "write one of them")
+            raise child.mistake(f"<{self.tag}> has a second element, <{child.tag}>", "keep one of them")
         for child in self._views():
             if not child._is_read:
                 raise self._unread_element(child)
@@ -186,7 +188,7 @@ class ElementView:
         """Return views of all child elements. Raises `MistakeError` if elements are nested too deeply."""
         if self._children is None:
             if self._depth == MAX_DEPTH and len(self._element):
-                raise self.mistake(f"elements nested deeper than {MAX_DEPTH} levels", "write fewer levels")
+                raise self.mistake(f"elements are nested deeper than {MAX_DEPTH} levels", "use fewer levels")
             self._children = [ElementView(child, self.report, self._depth + 1) for child in self._element]
         return self._children
 
@@ -231,7 +233,9 @@ class ElementView:
         ]:
             if text and text.strip(BLANKS):
                 shown = shortened(" ".join(text.split()))
-                self.report.add(number, f"text inside <{self.tag}>: '{shown}'", "no text is expected there: delete it")
+                self.report.add(
+                    number, f"<{self.tag}> contains the text '{shown}'", "delete it: only elements are expected there"
+                )
 
 
 def _hint_on_missing(name: str, unread: Sequence[str]) -> str:

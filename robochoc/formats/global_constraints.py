@@ -76,7 +76,7 @@ def check_global(predicate: GlobalPredicate) -> None:
         message = f"the body of {shortened(predicate.name)} does not follow from its form"
         raise MistakeError(message, "create it with `read_form`")
     if predicate.symbolic and predicate.name != f"{PREFIX}allDifferent":
-        raise MistakeError(f"{shortened(predicate.name)} over symbols", "only allDifferent accepts symbols")
+        raise MistakeError(f"{shortened(predicate.name)} cannot contain symbols", "only allDifferent accepts symbols")
 
 
 def read_form(reference: str, form: str) -> GlobalPredicate:
@@ -111,7 +111,7 @@ def _expanded(reference: str, form: Sequence[str]) -> GlobalPredicate:
         known = " ".join(PREFIX + one for one in _KINDS)
         raise MistakeError(f"unknown global constraint '{shortened(reference)}'", f"supported: {known}")
     if len(form) > MAX_NODES:
-        raise MistakeError(f"{reference} has {len(form)} words", f"{MAX_NODES} are allowed: {_SPLIT}")
+        raise MistakeError(f"{reference} has {len(form)} words", f"use at most {MAX_NODES}: {_SPLIT}")
     words = _WordReader(reference, form)
     body = _KINDS[kind](words)
     words.end()
@@ -166,7 +166,7 @@ class _WordReader:
     def check_number(self, number: int, most: int, items: str) -> None:
         """Raise `MistakeError` if the number of items would make the expression too long."""
         if number > most:
-            raise MistakeError(f"{self._reference} with {number} {items}", f"{most} are allowed: {_SPLIT}")
+            raise MistakeError(f"{self._reference} has {number} {items}", f"use at most {most}: {_SPLIT}")
 
     def end(self) -> None:
         if self._next < len(self._words):
@@ -176,7 +176,7 @@ class _WordReader:
         """Return the error for an unexpected next word."""
         found = f"'{shortened(self._words[self._next])}'" if self._next < len(self._words) else "the end"
         hint = f"write {_EXAMPLES[self._reference.removeprefix(PREFIX)]}"
-        return MistakeError(f"the parameters of {self._reference}: {found} instead of {wanted}", hint)
+        return MistakeError(f"in the parameters of {self._reference}: expected {wanted}, found {found}", hint)
 
 
 def _all_different(words: _WordReader) -> Expression:

@@ -53,7 +53,7 @@ def check_word(word: str) -> None:
 def check_integer(value: int) -> None:
     """Raise `MistakeError` if `value` has more than 18 digits."""
     if not -BEYOND < value < BEYOND:
-        raise MistakeError(f"an integer of {digits(value)} digits", "use at most 18 digits")
+        raise MistakeError(f"an integer has {digits(value)} digits", "use at most 18 digits")
 
 
 def check_cost(cost: float) -> None:

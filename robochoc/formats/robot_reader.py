@@ -127,8 +127,8 @@ def read_robot_again(path: Path, symbols: tuple[str, ...], units: CostUnits) -> 
         units.maximize,
         units.places,
     ):
-        hint = "the other robots do not read it again: write the costs as before"
-        raise invalid_input(path, "another objective, or more decimal places of costs than the team has", hint)
+        hint = "write the costs as in the team's files: the other robots do not read this file"
+        raise invalid_input(path, "the objective differs from the team's, or costs have more decimal places", hint)
     return with_table(file.in_places(units.places).robot, symbols)
 
 

@@ -50,19 +50,23 @@ def check_terms(terms: Sequence[Term]) -> None:
 def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits = PLAIN_COSTS) -> None:
     """Raise `MistakeError` unless the definition fits the terms, and the cost is valid for a robot of that `kind`."""
     if not constraint.variables:
-        raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
+        raise MistakeError("the scope of the constraint has no variables", 'write scope="V1.1 V2.1"')
     _check_application(constraint.definition, constraint.scope, constraint.parameters)
     if constraint.when_absent == WhenAbsent.RESTATE and not can_be_restated(constraint):
         message = "the constraint cannot be restated for fewer robots (when_absent)"
-        raise MistakeError(message, "use a sum, count, and, or, min or max of alike terms, compared with numbers")
+        raise MistakeError(
+            message, "use a sum, count, and, or, min or max of terms of one form, compared with a number"
+        )
     if constraint.cost == INFINITE:
         return
     if kind != ProblemKind.DISWCSP:
-        raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
+        raise MistakeError("a DisCSP cannot have costs", 'write type="DisWCSP" in the presentation, or delete the cost')
     if isinstance(constraint.definition, Relation):
-        raise MistakeError("a cost on a relation", 'write the costs of its tuples, with semantics="soft"')
+        raise MistakeError("a relation cannot have a cost", 'write the costs of its tuples, with semantics="soft"')
     if isinstance(constraint.definition, Function):
-        raise MistakeError("a cost on a function", "delete it: the function's value is the cost; or use a predicate")
+        raise MistakeError(
+            "a function cannot have a cost", "delete it: the function's value is the cost; or use a predicate"
+        )
     check_cost(constraint.cost)
     if constraint.cost * (-1 if units.maximize else 1) < 0:
         _refuse_undefined(constraint.definition)
@@ -124,11 +128,14 @@ def _check_application(definition: Definition, scope: tuple[Term, ...], paramete
             "a relation's tuples follow the scope: leave the parameters out",
         )
     if isinstance(definition, GlobalPredicate) and not all(isinstance(term, str) for term in parameters):
-        raise MistakeError(f"an integer as parameter of {definition.name}", "write the integer into its form")
+        raise MistakeError(
+            f"{definition.name} has an integer as a parameter", "write the integer into the form of the constraint"
+        )
     arity = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
     if len(parameters) != arity:
         raise MistakeError(
-            f"{shortened(definition.name)} takes {arity} terms, but '{terms_text(parameters)}' has {len(parameters)}",
+            f"{shortened(definition.name)} requires {arity} terms, but there are {len(parameters)}:"
+            f" '{terms_text(parameters)}'",
             f"write {arity} terms",
         )
     if parameters == scope:
@@ -141,7 +148,7 @@ def _check_application(definition: Definition, scope: tuple[Term, ...], paramete
         if term not in passed:
             raise MistakeError(
                 f"'{shortened(str(term))}' is in the scope but not among the parameters",
-                "delete it there, or add it to the parameters",
+                "delete it from the scope, or add it to the parameters",
             )
 
 

@@ -37,7 +37,7 @@ _PARTS = (
 """The parts of libxml2's messages."""
 
 _PHRASES = (
-    ("[duplicate]", "a second <{element}>", "only one is allowed: merge the two"),
+    ("[duplicate]", "there is a second <{element}>", "only one is allowed: merge the two"),
     ("This element is not expected. Expected", "<{element}> does not belong in <{parent}>", "expected {expected}"),
     ("This element is not expected", "<{element}> does not belong in <{parent}>", "correct its spelling or delete it"),
     ("Missing child element", "<{element}> lacks {lacking}", "add it, even if it is empty"),
@@ -45,8 +45,8 @@ _PHRASES = (
     ("' is not allowed.", "<{element}> has no attribute '{attribute}'", "correct its spelling or delete it"),
     ("[facet", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
     ("is not a valid value of", '{attribute}="{value}" in <{element}> is not allowed', "expected {rule}"),
-    ("Element content is not allowed", "an element inside <{element}>, which contains only text", "delete it"),
-    ("Character content", "text inside <{element}>, where no text is allowed", "delete it"),
+    ("Element content is not allowed", "<{element}> contains an element, but only text is allowed there", "delete it"),
+    ("Character content", "<{element}> contains text, but only elements are allowed there", "delete it"),
     ("", "{message}", "see the schemas in xsd/"),
 )
 """A part of libxml2's message, the message in plain words, and a suggestion. The first match counts."""

@@ -77,7 +77,7 @@ def _check_size(path: str, content: bytes) -> None:
 
 def _check_replaceable(folder: Path, *, replace: bool) -> None:
     if not replace:
-        raise invalid_input(folder, "it exists already", "choose another folder, or replace it with --force")
+        raise invalid_input(folder, "the folder exists already", "choose another folder, or replace it with --force")
     if folder.is_symlink() or not folder.is_dir() or folder.resolve() == Path(folder.resolve().anchor):
         raise invalid_input(folder, "it is not a folder, and is not replaced", "choose another folder")
     if foreign := sorted(entry.name for entry in folder.iterdir() if not _is_team_file(entry)):

@@ -319,7 +319,9 @@ class _Composer:
                 case yaml.DocumentStartEvent():
                     documents += 1
                     if documents > 1:
-                        raise MistakeError("a second document", "write one document: delete the '---'", line)
+                        raise MistakeError(
+                            "the file has a second document", "keep one document: delete the '---'", line
+                        )
                 case yaml.AliasEvent():
                     self._add(self._alias(str(event.anchor), line))
                 case yaml.ScalarEvent():
@@ -338,7 +340,9 @@ class _Composer:
         node = self._anchors.get(anchor)
         if node is None:
             raise MistakeError(
-                f"the alias *{shortened(anchor)} has no anchor before it", "write & before its name", line
+                f"the alias *{shortened(anchor)} has no anchor before it",
+                f"define the anchor &{shortened(anchor)} above",
+                line,
             )
         node.is_named = True
         return node.copy(line)
@@ -348,7 +352,7 @@ class _Composer:
         if event.tag not in (None, "!", _CORE + ("seq" if is_list else "map")):
             raise _tag_mistake(event.tag, line)
         if len(self._open) == MAX_DEPTH:
-            raise MistakeError("is nested too deeply", f"{MAX_DEPTH} levels are allowed", line)
+            raise MistakeError("is nested too deeply", f"use at most {MAX_DEPTH} levels", line)
         node = Node(line, []) if is_list else Node(line, {})
         self._open.append(_Open(node, event.anchor))
 
@@ -392,7 +396,7 @@ class _Composer:
 
     def _key(self, node: Node) -> Scalar:
         if not node.is_scalar:
-            raise MistakeError("a list or a mapping as a key", "use a name or a number", node.line)
+            raise MistakeError("a key is a list or a mapping", "use a name or a number", node.line)
         return node.scalar
 
     def _is_merge(self, event: Any) -> bool:  # noqa: ANN401 - a scalar's event
@@ -406,7 +410,9 @@ class _Composer:
             return "<<"
         if tag not in _SCALARS:
             if tag == _CORE + "timestamp":
-                raise MistakeError(f"the date {shortened(event.value)}", "write it in quotes", line)
+                raise MistakeError(
+                    f"{shortened(event.value)} is a date, which is not supported", "write it in quotes", line
+                )
             raise _tag_mistake(tag, line)
         try:
             value = self._constructed(tag, event.value)

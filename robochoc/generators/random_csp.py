@@ -109,7 +109,7 @@ def random_on(
     check_bounds({"domain": (domain, 1, MAX_VALUES), "tightness": (tightness, 0, 1)})
     check_places(costs.places)
     if max_cost is None and costs != PLAIN_COSTS:
-        raise ValueError("decimal places, and maximising, require costs; give a maximum cost")
+        raise ValueError("decimal places and maximising require costs; give a maximum cost")
     if max_cost is None and asymmetric:
         raise ValueError("an asymmetric problem requires costs; give a maximum cost")
     chance = seeded(seed)
@@ -167,14 +167,18 @@ def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None
     forbidden = round(tightness * domain**2)
     if edges * forbidden > MAX_FORBIDDEN_PAIRS:
         raise ValueError(
-            f"{edges:,} constraints with {forbidden:,} forbidden pairs each: more than {MAX_FORBIDDEN_PAIRS:,} together"
+            f"{edges:,} constraints with {forbidden:,} forbidden pairs each have more than"
+            f" {MAX_FORBIDDEN_PAIRS:,} together; use smaller domains, or fewer constraints"
         )
     if max_cost is None:
         return
     check_bounds({"max-cost": (max_cost, 0, MAX_COST)})
     pairs = edges * domain**2
     if pairs > MAX_FORBIDDEN_PAIRS:
-        raise ValueError(f"all constraints together have {pairs:,} pairs of values, more than {MAX_FORBIDDEN_PAIRS:,}")
+        raise ValueError(
+            f"all constraints together have {pairs:,} pairs of values, more than {MAX_FORBIDDEN_PAIRS:,};"
+            " use smaller domains, or fewer constraints"
+        )
 
 
 def _drawn(chance: Random, edge: Edge, domain: int, forbidden: int, sides: Sequence[int | None]) -> list[Constraint]:

@@ -177,7 +177,7 @@ class Follower:
     def _stop_at(self, damaged: JournalDamagedError) -> None:
         if not self._has_header:
             raise JournalError(str(damaged)) from damaged
-        self.damage = f"{self._place}: more follows the end" if self._is_over else str(damaged)
+        self.damage = f"{self._place}: there are entries after the end" if self._is_over else str(damaged)
         self.truncated = isinstance(damaged, JournalTruncatedError) and not self._is_over
 
     @property
@@ -194,10 +194,10 @@ class Follower:
         has_header, is_over = self._has_header, self._is_over
         for line in lines:
             if is_over:
-                raise JournalDamagedError(f"{self._place}: more follows the end")
+                raise JournalDamagedError(f"{self._place}: there are entries after the end")
             if isinstance(line, Header) == has_header:
                 if has_header:
-                    raise JournalDamagedError(f"{self._place}: a second header")
+                    raise JournalDamagedError(f"{self._place}: there is a second header")
                 raise JournalError(f"{self._place}: expected the header of a journal")
             if isinstance(line, Header) and line.version not in READ:
                 known = " and ".join(map(str, READ))

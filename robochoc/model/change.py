@@ -174,7 +174,7 @@ def _check_newcomer(team: Team, robot: Robot) -> None:
     """Raise `ChangeError` for errors in a new robot that do not depend on its constraints."""
     own = quoted(robot.name)
     if robot.name in team:
-        raise ChangeError(f"the robot {own} is in the team already", "remove it before it joins again")
+        raise ChangeError(f"the robot {own} is already in the team", "remove it before it joins again")
     if team.robots and robot.kind is not team.kind:
         raise ChangeError(f"{own} is a {robot.kind} in a team of {team.kind}", "write the same type in both")
     if team.robots and robot.costs.maximize is not team.robots[0].costs.maximize:
@@ -248,9 +248,7 @@ def _without_value(team: Team, variable: str, value: int) -> Domain:
 def _with_value(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value in domain:
-        raise ChangeError(
-            f"{quoted(variable)} has the value {domain.label(value)} already", "add one that it does not have"
-        )
+        raise ChangeError(f"{quoted(variable)} already has the value {domain.label(value)}", "add another value")
     ranges = sorted((*domain.ranges, range(value, value + 1)), key=lambda part: part.start)
     return replace(domain, ranges=tuple(ranges))
 

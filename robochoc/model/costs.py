@@ -147,7 +147,9 @@ def normalized_joining(team: Team, robot: Robot) -> Robot:
     wider = {name for name in own if name in before and len(domains[name]) > len(before[name])}
     for constraint in _held_by_others(team, robot.name):
         if isinstance(constraint.definition, Function) and (new := wider.intersection(constraint.variables)):
-            raise UnboundedCostError(f"{min(new)} has new values, but functions of others are bounded for the old ones")
+            raise UnboundedCostError(
+                f"{min(new)} has new values, but bounds of other robots' functions hold for its old values only"
+            )
     return normalized_robot(robot, team.user_units, domains)
 
 
@@ -165,8 +167,8 @@ def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
             for constraint in team.constraints()
         ):
             raise UnboundedCostError(
-                f"the value {change.value} of {change.variable} is new, but its functions are bounded for the values in"
-                " the files and the scenario only"
+                f"the value {change.value} of {change.variable} is new, but the bounds of its functions hold for the"
+                " values in the files and the scenario only"
             )
     changes = tuple(_normalized_change(change, team.user_units, domains) for change in event.changes)
     return replace(event, changes=changes)

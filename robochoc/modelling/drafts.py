@@ -71,7 +71,7 @@ class Draft:
             body = None if self.body is None else Predicate("", formals, self.body)
             if body is None or not can_be_restated(Constraint(self.name, body, names, names)):
                 hint = (
-                    "it must be a sum, count, all_of, any_of, minimum or maximum of alike terms, compared with a number"
+                    "use a sum, count, all_of, any_of, minimum or maximum of terms of one form, compared with a number"
                 )
                 raise ModelError(f"{self.name} cannot be restated for fewer robots", hint, self.place)
         return replace(self, when_absent=when_absent) if when_absent else self
@@ -175,7 +175,7 @@ def _check_digits(found: Mapping[Row, Price], term: Term, place: SourceLine) -> 
     """Raise `ModelError` if a cost has more digits than files allow."""
     for price in found.values():
         if price != math.inf and not -MAX_COST <= price <= MAX_COST:
-            message = f"the cost {in_short(term)} reaches {shown(exact(price))}"
+            message = f"the cost {in_short(term)} can be {shown(exact(price))}"
             raise ModelError(message, "costs have at most 18 digits: use smaller values or coefficients", place)
 
 

@@ -277,7 +277,9 @@ class _Changing:
             for other in (one for one in there if one is not removal.removed):
                 if self._builder.shared_by(other, self._order) & found:
                     hint = "give it another name: an event removes a constraint by its name and robots"
-                    raise ModelError(f"{removal.removed!r} has the name and robots of {other!r}", hint, removal.place)
+                    raise ModelError(
+                        f"{removal.removed!r} has the same name and robots as {other!r}", hint, removal.place
+                    )
             there = [removal.removed]
         if not found:
             hint = did_you_mean(

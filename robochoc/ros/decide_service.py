@@ -96,7 +96,7 @@ class DecideService:
             return next(iter(self._teams.values()))
         if name not in self._teams:
             known = shortened(", ".join(self._teams))
-            raise RequestError(f"unknown team {shortened(name)!r}; known are {known}")
+            raise RequestError(f"unknown team {shortened(name)!r}; known teams: {known}")
         return self._teams[name]
 
     def _timeout_s(self, requested: object) -> float | None:

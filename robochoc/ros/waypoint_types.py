@@ -88,7 +88,7 @@ def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
     if found is None:
         subject = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
         problem = f"{subject} has the type {kind!r}, to which waypoints cannot be converted"
-        known = f"known are {', '.join(kinds())}; packages may add others ({GROUP}){_suggestion(kind)}"
+        known = f"known types: {', '.join(kinds())}; packages may add others ({GROUP}){_suggestion(kind)}"
         raise NoMappingError(on_one_line(f"{problem}: {known}"))
     return found
 

@@ -99,7 +99,7 @@ def register(name: str, protocol: type[Protocol]) -> None:
     if not _NAME.fullmatch(name):
         raise OptionError(f"{name!r} is not a valid name of a protocol; use letters, digits and hyphens")
     if name in {CENTRAL, AUTO, *_STAGES} or entry_points_named(GROUP, name):
-        raise OptionError(f"the name {name!r} is taken by an installed protocol; register it under another name")
+        raise OptionError(f"an installed protocol is called {name!r}: register this one under another name")
     _REGISTERED[name] = _Registered(name, protocol)
 
 

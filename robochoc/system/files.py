@@ -212,7 +212,7 @@ class AppendableFile:
             return
         try:
             if not self._stream.finish(READER_PATIENCE_S):
-                raise OSError(errno.ETIMEDOUT, f"its reader has not read anything for {READER_PATIENCE_S:g} s")
+                raise OSError(errno.ETIMEDOUT, f"its reader has not read any data for {READER_PATIENCE_S:g} s")
         finally:
             self._stream.close()
 

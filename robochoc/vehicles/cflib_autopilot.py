@@ -161,7 +161,7 @@ class CflibAutopilot(Autopilot):
         """
         supervisor = self._current_supervisor("fly to its place")
         if self._climbs and not supervisor.finished:
-            raise RefusedError("it did not fly to its place (it still takes off)")
+            raise RefusedError("it did not fly to its place (it is still taking off)")
         x, y, z = (at - own for at, own in zip(place, self._own, strict=True))
         here = self._here(self._values)
         left_m = math.dist(here, (x, y, z))

@@ -72,7 +72,7 @@ class FleetSink(Sink):
         fence = self._fleet.fence
         for one in waypoints:
             if not one.lands and not fence.contains(one.at):
-                problem = f"the waypoint of {self._names[one.drone]}, {point_text(one.at)}, is outside of the fence"
+                problem = f"the waypoint of {self._names[one.drone]}, {point_text(one.at)}, is outside the fence"
                 raise self._error(problem, f"the fence is from {fence}; the decision is not flown")
         self._check_distances([one for one in waypoints if not one.lands])
         targets = {self._names[one.drone]: VehicleTarget(one.at, one.lands) for one in waypoints}
@@ -141,12 +141,12 @@ class FleetSink(Sink):
         if missing:
             state = guard.states.get(missing[0])
             why = state.why if state and state.why else "it has reported no state"
-            others = f"; nor can {', '.join(missing[1:])}" if missing[1:] else ""
-            raise self._error(f"{missing[0]} cannot be flown: {why}{others}", "nothing was armed")
+            others = f"; {', '.join(missing[1:])} cannot fly either" if missing[1:] else ""
+            raise self._error(f"{missing[0]} cannot fly: {why}{others}", "nothing was armed")
         for name in names:
             state = guard.states[name]
             if self._may_arm and state.place and not state.in_air and not self._fleet.fence.covers(state.place):
-                where = f"{name} stands at {point_text(state.place)}, outside of the fence"
+                where = f"{name} is at {point_text(state.place)}, outside the fence"
                 raise self._error(where, f"the fence is from {self._fleet.fence}; nothing was armed")
 
     def _await_arrival(self, names: Iterable[str]) -> None:
@@ -163,7 +163,7 @@ class FleetSink(Sink):
             state = self._guard.states.get(late[0])
             waits = f"; it waits for {state.waits_for}" if state and state.waits_for else ""
             problem = f"{late[0]} has not arrived after {self._fleet.time_s:g} s{waits}"
-            raise self._error(problem, "'time' in the fleet file is the limit")
+            raise self._error(problem, "increase 'time' in the fleet file, or shorten the flight")
 
     def _out_of_order(self, names: Iterable[str]) -> Iterator[VehicleState]:
         for name in names:

@@ -318,7 +318,7 @@ class Pilot:
         if telemetry.place is not None and self._fleet.fence.covers(telemetry.place):
             return ""
         where = point_text(telemetry.place) if telemetry.place else "an unknown place"
-        return f"it stands at {where}, outside of the fence ({self._fleet.fence})"
+        return f"it is at {where}, outside the fence ({self._fleet.fence})"
 
     def _may_climb(self, telemetry: Telemetry) -> bool:
         self._clearance = self._traffic.clearance(self.name)

@@ -209,7 +209,7 @@ class RoutePlanner:
             for x, y, z in leg.path[1:].tolist():
                 rises = [x, y] == leg.path[0, :2].tolist() and z <= self._fence.high[2]
                 if not rises and not self._fence.covers((x, y, z), _ROUNDING_M):
-                    yield f"{_BY} {point_text((x, y, z))} for {leg.name}, outside of the fence ({self._fence})"
+                    yield f"{_BY} {point_text((x, y, z))} for {leg.name}, outside the fence ({self._fence})"
 
     def _flat(self, points: Sequence[Point] | Array) -> Array:
         """Return points (N, 3) with their heights divided by the downwash."""

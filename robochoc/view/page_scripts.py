@@ -21,7 +21,7 @@ def viewer_script() -> str:
     """
     found = find_spec("meshcat")
     if found is None or not found.submodule_search_locations:
-        raise ModuleNotFoundError("meshcat, whose viewer draws the scene, is not installed", name="meshcat")
+        raise ModuleNotFoundError("the 3D scene requires the viewer of meshcat, which is not installed", name="meshcat")
     viewer = Path(found.submodule_search_locations[0]) / "viewer" / "dist" / "main.min.js"
     return viewer.read_text(encoding="utf-8")
 

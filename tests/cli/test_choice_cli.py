@@ -34,7 +34,7 @@ def test_what_was_chosen_is_said_with_the_reason_and_more_on_request(four: Path)
 def test_who_refuses_the_options_is_told_with_the_reason(four: Path) -> None:
     said = robochoc_within("solve", four, "--runtime", "arrays", "--explain").stdout
     assert "  chosen: dsa, as it accepts the team with these options" in said
-    assert "  not sfb: the problem does not change; sfb has no form as arrays; add --runtime simulator" in said
+    assert "  not sfb: the problem does not change; sfb has no array implementation; add --runtime simulator" in said
     assert "  not dsa" not in said
 
 

@@ -87,7 +87,7 @@ def test_what_goes_to_standard_output_does_not_replace_it(four: Path) -> None:
     found = read_journal(journal)
     assert found.outcome is not None
     assert found.outcome.verdict == "no-solution"
-    assert str(found.damage).endswith("more follows the end")
+    assert str(found.damage).endswith("there are entries after the end")
     told = journal[journal.rindex(b'{"team":') :]
     assert json.loads(told)["verdict"] == "no-solution"
 

@@ -238,17 +238,17 @@ def test_what_cannot_be_flown_is_one_clear_line(two: Path) -> None:
             (
                 ("--distance", 9),
                 1,
-                "the homes of V1.1 and V1.2 are 1.00 m apart, and 9 m are to be kept: use a smaller",
+                "the homes of V1.1 and V1.2 are 1.00 m apart, and the minimum is 9 m: use a smaller",
             ),
             (
                 ("--distance", 1),
                 1,
-                "are 1.00 m apart, and 1 m are to be kept, which requires 1.1 m: use a smaller distance",
+                "are 1.00 m apart, and the minimum is 1 m, which requires 1.1 m: use a smaller distance",
             ),
             (
                 ("--scale", 1e-6),
                 1,
-                "the homes of V1.1 and V1.2 are 1e-06 m apart, and 0.01 m are to be kept: use a l",
+                "the homes of V1.1 and V1.2 are 1e-06 m apart, and the minimum is 0.01 m: use a l",
             ),
             (("--scale", 1e9), 2, "--scale"),
             (("--scale", 1e5), 1, "m: use a smaller scale"),

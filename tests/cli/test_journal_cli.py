@@ -254,7 +254,7 @@ def test_a_page_holds_the_whole_run_and_shows_some_robots_at_first(file: Path) -
     assert (told["messages"], told["chosen"]) == (len(trace_of(file).messages.t), ["Robot1.*"])
     refused = journal("export", file, "--format", "html", "--types", "Nogood")
     assert refused.exit_code == USAGE
-    assert "--format html exports all messages: filter on the page" in refused.output
+    assert "--format html exports all messages: remove --types" in refused.output
 
 
 def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,7 +92,7 @@ REFUSED = {
         ("--ros mcap:a --journal a", "--journal a and --ros mcap:a are the same place"),
         ("--ros mcap:a --html a", "--html a and --ros mcap:a are the same place"),
         ("--situation flight --wind 1e9", "is faster than 200 m/s"),
-        ("--situation flight --gusts 1e9", "it must be a number from 0 to 200 m/s"),
+        ("--situation flight --gusts 1e9", "they must be from 0 to 200 m/s"),
         ("--scale 1e300 --ros mcap:a", "--scale"),
         ("--situation flight --fail Wing", "no drone 'Wing' to fail"),
         ("--situation flight --fail Fin@soon", "is not of the form ROBOT or ROBOT@SECONDS"),

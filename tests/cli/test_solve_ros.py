@@ -187,7 +187,7 @@ def test_a_run_that_fails_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     assert "none.mcap: No such file" in result.stderr
     refused = solved(HANGAR, "--ros", f"mcap:{place}", "--situation", "flight", "--distance", "5")
     assert refused.exit_code == 1
-    assert "5 m are to be kept" in refused.stderr
+    assert "the minimum is 5 m" in refused.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
     assert place.read_text() == "of another run"
 

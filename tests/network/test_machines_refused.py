@@ -34,7 +34,7 @@ def test_tokens_that_do_not_work(site: Deployment) -> None:
         assert robot.status() == (1 if "token is incomplete" in robot.errors else 4), robot.errors
         return one_line(robot)
 
-    assert "not for this name" in refused(files / "RA.xml", tokens["RB"])
+    assert "for another name" in refused(files / "RA.xml", tokens["RB"])
     assert "token is incomplete" in refused(files / "RA.xml", tokens["RA"][:20])
     assert "expired" in refused(site.folder / "other" / "Late.xml", expired)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"])
@@ -53,7 +53,7 @@ def test_identities_that_do_not_fit(site: Deployment) -> None:
     master = site.master("--gather", 60)
     nobody = site.robot(files / "RA.xml")
     assert nobody.status() == 1
-    assert "enrol with a token" in one_line(nobody)
+    assert "enrol this robot with a token" in one_line(nobody)
     first = site.robot(files / "RA.xml", "--token", tokens["RA"], "--identity", site.folder / "RA.id")
     master.wait_to_say("RA has registered")
     borrowed = site.robot(files / "RB.xml", "--identity", site.folder / "RA.id")
@@ -79,7 +79,7 @@ def test_no_master_there(site: Deployment) -> None:
     watcher = site.start("desk", "directory", "--master", site.place, "--as", "RA", "--token", token, *patient)
     for program in (stranger, watcher):
         assert program.hurried_status() == 4
-        assert "is 'robochoc master' running there?" in one_line(program)
+        assert "check that 'robochoc master' is running there" in one_line(program)
     master = site.master("--gather", 60)
     known = site.robot(files / "RA.xml", "--token", token)
     master.wait_to_say("RA has registered")
@@ -173,7 +173,7 @@ def test_a_port_in_use(higher: int, site: Deployment) -> None:
         (["robot", "RA.xml", "--master", "[::1"], 2, "not of the form HOST:PORT"),
         (["robot", "RA.xml", "--master", "[::1]7447"], 2, "not of the form HOST:PORT"),
         (["robot", "RA.xml", "--master", "127.0.0.1:65535"], 2, "not of the form HOST:PORT"),
-        (["directory", "--master", "127.0.0.1:17000", "--as", "Watcher"], 1, "enrol with a token"),
+        (["directory", "--master", "127.0.0.1:17000", "--as", "Watcher"], 1, "enrol this robot with a token"),
         (["directory", "--master", "127.0.0.1:17000", "--as", "../up"], 2, "../up"),
         (["directory", "--master", "h", "--as", "A", "--search", "colour=red"], 2, "slots are name, protocol"),
         (

@@ -60,7 +60,7 @@ def test_an_unknown_protocol_is_told() -> None:
 
 def test_lost_frames_are_told() -> None:
     failed = failing(FramesLost(MASTER, 3))
-    assert (failed.why, failed.unsupported) == ("3 frames of the master to RB were lost for good", True)
+    assert (failed.why, failed.unsupported) == ("3 frames from the master to RB were lost", True)
 
 
 def test_who_says_too_much_ahead_of_the_task_takes_nobodys_place(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -94,7 +94,7 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
     [
         ([copies("RC", copy(body="ne(X,"))], "the definition 'p'"),
         ([copies("RC", copy(body="(" * 9000))], "the definition 'p'"),
-        ([copies("RC", copy(scope=("B", "B", "C")))], "3 arguments where 2"),
+        ([copies("RC", copy(scope=("B", "B", "C")))], "3 arguments, but requires 2"),
         ([copies("RC", copy(cost=-1.0))], "the cost -1.0 of 'C' must be 0 or more"),
         ([copies("RC", copy(cost=float("nan")))], "the cost nan of 'C' must be 0 or more"),
         ([copies("RC", copy(scope=("B", "Z")))], "RC has sent 'C', whose scope is not allowed"),

@@ -49,7 +49,7 @@ def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filter
     assert result.verdict is Verdict.UNKNOWN
     assert result.lost == {"RX2": "its certificate was revoked"}
     assert [lost.robot for lost in run.losses] == ["RX2"]
-    assert run.endings["RX2"].why == "the master does not answer RX2: is it enrolled there, and not revoked?"
+    assert run.endings["RX2"].why == "the master does not answer RX2: check that it is enrolled there, and not revoked"
     assert not any(run.endings[name].failed for name in ("RX0", "RX1", "RX3")), run.endings
 
 

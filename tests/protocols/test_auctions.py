@@ -209,12 +209,12 @@ def test_other_teams_are_refused_with_the_reason(protocol: str) -> None:
             solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
         assert why in str(refused.value)
         assert "; these do: " in str(refused.value)
-    with pytest.raises(UnsupportedError, match="RA has no value without a task"):
+    with pytest.raises(UnsupportedError, match="RA has no value that stands for no task"):
         solve(team_with([(NOT_BOTH, "AB"), (MUST, "A")]), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
 
 
 def test_a_robot_that_must_do_a_task_is_refused_among_processes_too() -> None:
-    with pytest.raises(UnsupportedError, match="RA has no value without a task"):
+    with pytest.raises(UnsupportedError, match="RA has no value that stands for no task"):
         solve(team_with([(NOT_BOTH, "AB"), (MUST, "A")]), Options(protocol="cbba", timeout=HANG_S))
 
 

@@ -168,7 +168,7 @@ def test_a_run_ends_with_one_sentence() -> None:
     with pytest.raises(RobotsLostError) as lost:
         ProcessesRun(TEAMS[0], Liar).run()
     said = str(lost.value)
-    why = r"BadMessageError: (RB|RC) was sent something that cannot be used: ValueError: a value of RA has 1 parts"
+    why = r"BadMessageError: (RB|RC) has received messages that cannot be used: ValueError: a value of RA has 1 parts"
     assert re.search(why, said)
     assert "shared_constraint.py:" in said
     assert "\n" not in said

@@ -267,7 +267,7 @@ def test_split_or_not_what_is_proven_is_true_and_no_cycle_is_cheaper_than_the_op
 def test_where_functions_are_to_be_split_there_is_no_form_as_arrays() -> None:
     team = random_cost_team(Random(1), n_ary=False)
     options = Options(protocol="maxsum", runtime=Runtime.ARRAYS, settings={"split": "0.4"})
-    with pytest.raises(UnsupportedError, match="maxsum with --set split has no form as arrays"):
+    with pytest.raises(UnsupportedError, match="maxsum with --set split has no array implementation"):
         solve(team, options)
     assert solve(team, replace(options, settings={"split": "0"})).verdict is not Verdict.UNKNOWN
 

@@ -65,7 +65,7 @@ def test_a_refusal_is_a_failure(pool: ThreadPoolExecutor) -> None:
     tree = behaviour(Client(DecideService([hangar()], CancellableDecision(), SIMULATED), pool), {"team": "yard"})
     ticked(tree)
     assert tree.status.value == "FAILURE"
-    assert tree.feedback_message == "unknown team 'yard'; known are hangar"
+    assert tree.feedback_message == "unknown team 'yard'; known teams: hangar"
 
 
 def test_what_is_not_wanted_any_more_is_cancelled(pool: ThreadPoolExecutor) -> None:

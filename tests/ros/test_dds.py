@@ -82,19 +82,19 @@ def test_places(monkeypatch: pytest.MonkeyPatch, place: str, found: DdsPlace) ->
         ("٣", "is not a DDS domain"),
         ("5/6", "'5/6' is not a DDS domain"),
         ("1" * 5000, r"is not a DDS domain|'1{50,}\.\.\."),
-        ("5?a=b", "'a' is not an option of this place; known are partition, reliability, durability, depth, wait"),
+        ("5?a=b", "'a' is not an option of DDS; known options: partition, reliability, durability, depth, wait"),
         ("5?depth", "the options 'depth' cannot be read; expected OPTION=VALUE&OPTION=VALUE"),
         ("5?partition=a&", "cannot be read"),
         ("5?partition=%ff", "cannot be read"),
-        ("?depth=0", "depth=0 is not a depth; expected a number from 1 to 1,000"),
-        ("?depth=9999", "depth=9999 is not a depth"),
-        ("?reliability=no", "reliability=no is unknown; expected reliable or best_effort"),
-        ("?durability=persistent", "durability=persistent is unknown; expected transient_local or volatile"),
-        ("?wait=nan", "wait=nan is not a time; expected seconds from 0 to 600"),
-        ("?wait=1e9", "wait=1e9 is not a time"),
-        ("?partition=", "partition= is not a name; expected 1 to 255 characters of ASCII"),
-        ("?partition=%1b[31m", r"partition=\\x1b\[31m is not a name"),
-        ("?" + "&".join(["partition=a"] * 17), "a place has at most 16 partitions"),
+        ("?depth=0", "depth=0 is not valid; expected a number from 1 to 1,000"),
+        ("?depth=9999", "depth=9999 is not valid"),
+        ("?reliability=no", "reliability=no is not valid; expected reliable or best_effort"),
+        ("?durability=persistent", "durability=persistent is not valid; expected transient_local or volatile"),
+        ("?wait=nan", "wait=nan is not a valid time; expected seconds from 0 to 600"),
+        ("?wait=1e9", "wait=1e9 is not a valid time"),
+        ("?partition=", "partition= is not a valid name; expected 1 to 255 characters of ASCII"),
+        ("?partition=%1b[31m", r"partition=\\x1b\[31m is not a valid name"),
+        ("?" + "&".join(["partition=a"] * 17), "at most 16 partitions are allowed"),
     ],
 )
 def test_places_that_are_none(place: str, told: str) -> None:
@@ -103,7 +103,7 @@ def test_places_that_are_none(place: str, told: str) -> None:
 
 
 def test_a_source_waits_for_nobody() -> None:
-    with pytest.raises(SourceError, match="'wait' is not an option of this place"):
+    with pytest.raises(SourceError, match="'wait' is not an option of DDS"):
         DdsSource("5?wait=1")
 
 
@@ -234,7 +234,7 @@ def test_a_subscriber_that_stands_still_ends_it(domain: int, monkeypatch: pytest
         threads = Path(f"/proc/{peer.process.pid}/task")
         wait_until(lambda: all(_stands(thread) for thread in threads.iterdir()), "it has not stopped")
         sink.publish("/a/waypoint", POSE, pose(1), STAMP)
-        with pytest.raises(SinkError, match=r"has acknowledged nothing for 0\.3 s; end it, or publish with"):
+        with pytest.raises(SinkError, match=r"has not acknowledged any message for 0\.3 s; end it, or publish with"):
             sink.close()
         sink.discard()
 

@@ -98,8 +98,8 @@ def test_a_trigger_tells_the_assignment() -> None:
 @looped(
     ("fields", "told"),
     lambda: [
-        ({"team": "yard\x1b"}, r"unknown team 'yard\\x1b'; known are hangar, rescue"),
-        ({}, r"unknown team ''; known are hangar, rescue"),
+        ({"team": "yard\x1b"}, r"unknown team 'yard\\x1b'; known teams: hangar, rescue"),
+        ({}, r"unknown team ''; known teams: hangar, rescue"),
         ({"timeout": -1.0}, "timeout is -1.0: it must be seconds, or 0 for the longest time"),
         ({"timeout": float("nan")}, "it must be seconds"),
         ({"timeout": float("inf")}, "it must be seconds"),
@@ -316,7 +316,7 @@ def test_the_command_answers_whoever_asks() -> None:
     ):
         first = client.ask(SERVICE, team="hangar")
         assert dict(zip(first["variables"], first["values"], strict=True)) == expected
-        assert client.ask(SERVICE, team="yard")["message"] == "unknown team 'yard'; known are hangar"
+        assert client.ask(SERVICE, team="yard")["message"] == "unknown team 'yard'; known teams: hangar"
         assert json.loads(client.ask("/robochoc/hangar/decide")["message"])["assignment"] == expected
         _, told = server.communicate(timeout=HANG_S)
         assert server.returncode == 0

@@ -174,7 +174,7 @@ def test_the_command_answers(router: Router, end: FarEnd) -> None:
         wait_until(lambda: SERVICE in dict(end.ask("services")), "the service is not seen")
         wrong = {"team": "yard", "changes": "", "timeout": 0.0}
         end.begin("call", service=SERVICE, kind="robochoc_msgs/srv/Decide", fields=wrong, timeout=HANG_S)
-        assert end.answer()[1]["message"] == "unknown team 'yard'; known are hangar"
+        assert end.answer()[1]["message"] == "unknown team 'yard'; known teams: hangar"
         end.begin("call", service=CANCEL, kind="std_srvs/srv/Trigger", fields=NOTHING, timeout=HANG_S)
         assert end.answer() == [CANCEL, {"success": False, "message": "no team is deciding"}]
         name = "/robochoc/hangar/decide"

@@ -168,7 +168,7 @@ def test_the_server_reads_nothing(impatient: Callable[..., None]) -> None:
     impatient("DRAIN_S", "CONFIRM_S", "CLOSE_S")
     with Server(Manner(stalls=True)) as server:
         sink = RosbridgeSink(server.place)
-        with pytest.raises(SinkError, match=r"has read nothing for 0\.1 s"):
+        with pytest.raises(SinkError, match=r"has not read any data for 0\.1 s"):
             publish_long(sink, 2000)
         sink.discard()
 

@@ -172,7 +172,7 @@ def test_one_that_stands_still_does_not_keep_us(core: Core, tmp_path: Path) -> N
     listener.send_signal(signal.SIGSTOP)
     began = time.monotonic()
     said, errors = publisher.communicate(timeout=HANG_S)
-    assert "a subscriber has read nothing for 10 s; find it by `rostopic info`" in said
+    assert "a subscriber has not read any message for 10 s; find it by `rostopic info`" in said
     assert (publisher.returncode, errors) == (0, "")
     assert time.monotonic() - began < 40
     listener.kill()

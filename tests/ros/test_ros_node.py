@@ -47,7 +47,7 @@ def test_without_rospy(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("_rospy")
 def test_rospy_takes_no_place() -> None:
     with pytest.raises(
-        SinkError, match=r"rospy has no place, but 'localhost:11311' was given; set the master in ROS_MASTER_URI"
+        SinkError, match=r"rospy accepts no address, but 'localhost:11311' was given: remove it, and set ROS_MASTER_URI"
     ):
         RospySink("localhost:11311")
 

@@ -123,7 +123,9 @@ def test_an_rclpy_for_another_python(
 
 @pytest.mark.usefixtures("_rclpy")
 def test_it_takes_no_place() -> None:
-    with pytest.raises(SinkError, match="rclpy has no place, but '5' was given; set the domain in ROS_DOMAIN_ID"):
+    with pytest.raises(
+        SinkError, match="rclpy accepts no address, but '5' was given: remove it, and set ROS_DOMAIN_ID"
+    ):
         RclpySink("5")
 
 
@@ -179,7 +181,9 @@ def test_a_subscriber_that_stands_still_ends_it(monkeypatch: pytest.MonkeyPatch)
         sink = RclpySink("")
         sink.publish("/a/waypoint", POSE, pose(1), STAMP)
         monkeypatch.setattr(rclpy_stand_in.subscribed("/a/waypoint")[0], "stands_still", True)
-        with pytest.raises(SinkError, match=r"a subscriber of /a/waypoint has acknowledged nothing for 0\.05 s; see"):
+        with pytest.raises(
+            SinkError, match=r"a subscriber of /a/waypoint has not acknowledged any message for 0\.05 s; see"
+        ):
             sink.publish("/a/waypoint", POSE, pose(2), STAMP)
         with pytest.raises(SinkError, match="has acknowledged nothing"):
             sink.close()

@@ -152,5 +152,5 @@ MANY = [
     ),
     case("two broken files, and two that disagree",
          [(R2, "</instance>", ""), (R3, 'scope="V1 V3"', 'scope="V1,V3"'), (R1, 'scope="V1 W1"', 'scope="V1"')],
-         (R1, 'name="C0"', "lt takes 2 terms"), (R2, "", ":38: is not well-formed XML"), (R3, 'name="C4"', "'V1,V3'")),
+         (R1, 'name="C0"', "lt requires 2 terms"), (R2, "", ":38: is not well-formed"), (R3, 'name="C4"', "'V1,V3'")),
 ]  # fmt: skip

@@ -23,7 +23,7 @@ _LONGEST_TTL_HOURS = 24 * 366
 
 def _checked_hours(_context: click.Context, _parameter: click.Parameter, hours: float) -> float:
     if not 0 < hours <= _LONGEST_TTL_HOURS:  # also rejects NaN, which click's ranges accept
-        raise click.BadParameter(f"{hours:g} is not greater than 0 and at most {_LONGEST_TTL_HOURS} (a year).")
+        raise click.BadParameter(f"{hours:g} must be greater than 0 and at most {_LONGEST_TTL_HOURS} (a year).")
     return hours
 
 

@@ -191,7 +191,7 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
 
     if output.suffix.lower() not in PAGES and output.suffix[1:].isalpha() and not output.is_dir():
         raise click.UsageError(
-            f"-o {output}: name a page (.html or .md), or a folder for figures in SVG and PDF (without an ending)."
+            f"-o {output}: name a page (.html or .md), or a folder (without an extension) for figures in SVG and PDF."
         )
     if output.suffix.lower() == ".md":
         require_modules("tests of pairs", "scipy")

@@ -159,7 +159,9 @@ def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
     from robochoc.sniffer.selection import Selection
 
     if selection != replace(Selection(), robots=selection.robots):
-        raise click.UsageError("--format html exports all messages: filter on the page (--robots: those shown first)")
+        raise click.UsageError(
+            "--format html exports all messages: remove --types, --from, --to and --run, and filter on the page"
+        )
     count = len(trace.messages.t)
     if count > MOST_IN_PAGE:
         raise Failure(

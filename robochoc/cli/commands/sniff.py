@@ -128,7 +128,7 @@ def sniff(
             ready=lambda url: click.echo(f"{url} shows {journal} on this machine; Ctrl-C ends it", err=True),
         )
     except OSError as error:
-        raise Failure(USAGE, f"port {port}: {error.strerror} (use another --port, or none)") from error
+        raise Failure(USAGE, f"port {port}: {error.strerror} (use another --port, or omit it)") from error
 
 
 def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
@@ -265,7 +265,7 @@ class _JournalTarget:
             page = self._page
             viewer = Viewer(journal.fileno(), page.chosen, page.port, open_browser=page.open_browser)
         except OSError as error:
-            why = f"port {self._page.port}: {error.strerror} (use another --port, or none)"
+            why = f"port {self._page.port}: {error.strerror} (use another --port, or omit it)"
             raise Failure(USAGE, why) from error
         self._viewer = self._stack.enter_context(viewer)
         click.echo(f"{viewer.url} shows the run at {self._place} on this machine; Ctrl-C ends it", err=True)

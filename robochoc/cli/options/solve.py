@@ -278,7 +278,9 @@ def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, t
     if options.runtime == "arrays" and (outputs.journal or outputs.sniffer):
         raise click.UsageError("--journal and --sniff show messages, but --runtime arrays sends none: remove it")
     if outputs.serve and outputs.sniffer:
-        raise click.UsageError("--serve cannot be used with --sniff, whose page shows the scene, too")
+        raise click.UsageError(
+            "--serve cannot be used with --sniff: remove --serve, since the page of --sniff also shows the scene"
+        )
     if request.ros and teams > 1:
         raise click.UsageError(f"--ros and --situation accept one team; {teams} were found")
     if outputs and teams > 1:

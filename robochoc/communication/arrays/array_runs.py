@@ -26,5 +26,7 @@ def array_run_for(protocol: type[Protocol]) -> type[CycleRun]:
     form = _ARRAY_RUNS.get(protocol)
     if form is None:
         able = ", ".join(kind.__name__.lower() for kind in _ARRAY_RUNS)
-        raise UnsupportedError(f"{protocol.__name__} has no form as arrays, only {able} have: use --runtime simulator")
+        raise UnsupportedError(
+            f"{protocol.__name__} has no array implementation; use --runtime simulator, or one of {able}"
+        )
     return form

@@ -192,7 +192,7 @@ class ArrayMaxSum(CycleRun):
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         if cast("MaxSumSettings", settings).split:
-            raise UnsupportedError("maxsum with --set split has no form as arrays: use --runtime simulator")
+            raise UnsupportedError("maxsum with --set split has no array implementation: use --runtime simulator")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
         self._alone = [self._cost_alone(group) for group in layout.groups]
         self._factors = [] if layout.empty.size else factors_of(layout)

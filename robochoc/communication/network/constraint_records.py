@@ -101,7 +101,7 @@ def known_of(record: SharedRecord) -> KeyedConstraint:
         raise SharedConstraintError(f"the cost {record.cost!r} of {shortened(record.name)!r} must be 0 or more")
     if arity != len(record.parameters):
         raise SharedConstraintError(
-            f"{shortened(record.name)!r} has {len(record.parameters)} arguments where {arity} are needed"
+            f"{shortened(record.name)!r} has {len(record.parameters)} arguments, but requires {arity}"
         )
     return KeyedConstraint(
         record.key,

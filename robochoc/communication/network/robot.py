@@ -139,7 +139,7 @@ class Registration:
         if self._unanswered_since is None:
             return
         if now - self._unanswered_since > max(self._patience_s, 2 * REGISTER_AGAIN_S):
-            why = f"the master does not answer {self._name}: is it enrolled there, and not revoked?"
+            why = f"the master does not answer {self._name}: check that it is enrolled there, and not revoked"
             raise RunOverError(why, failed=True)
         if now - self._registered_at >= REGISTER_AGAIN_S:
             self.send()
@@ -239,7 +239,7 @@ class NetworkRobot:
                 case FrameArrived(sender, content):
                     self._read(sender, content, packet)
                 case FramesLost(sender, frames) if sender == MASTER:
-                    raise UnsupportedError(f"{frames:,} frames of the master to {self._robot.name} were lost for good")
+                    raise UnsupportedError(f"{frames:,} frames from the master to {self._robot.name} were lost")
                 case FramesLost(sender, frames) if self._registration.welcome:
                     self._report_lost_frames(sender, frames)
                 case FramesLost() | PresenceChanged() | WakeUp():

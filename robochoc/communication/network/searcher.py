@@ -149,7 +149,7 @@ class Searcher(RobotLoop):
         self._snapshot_values = SnapshotValues()
         if task.interfaces.get(self._robot.name) != self._robot.interface:  # other robots would misread its values
             raise UnsupportedError(
-                f"{self._robot.name} received invalid data: other interface variables than in its file"
+                f"{self._robot.name} received invalid data: the interface variables differ from those in its file"
             )
 
     @property

@@ -111,7 +111,7 @@ class Simulation(Session):
                 computed_by(deadline, self._set_up, parts)
             except TimeLimitError:
                 late = next((name for name in parts if name not in self._hosts), "the last robot")
-                raise TeamCompileTimeoutError(f"the time was over before {late} knew its problem") from None
+                raise TeamCompileTimeoutError(f"the time limit was reached before {late} was set up") from None
         if losses is not None:
             losses.follow(self.compiled.team, self._values_of)
 
@@ -167,7 +167,7 @@ class Simulation(Session):
     def _check_time(self, name: str) -> None:
         """Raise `TeamCompileTimeoutError` if the deadline passed before the robot `name` was set up."""
         if is_past(self._deadline):
-            raise TeamCompileTimeoutError(f"the time was over before {name} knew its problem")
+            raise TeamCompileTimeoutError(f"the time limit was reached before {name} was set up")
 
     def _set_up(self, parts: Mapping[str, AgentProblem]) -> None:
         """Set up all robots."""

@@ -89,7 +89,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     standing = np.empty((0, 3)) if standing is None else _points(standing, "standing")
     delays = np.zeros(len(starts)) if delays is None else np.asarray(delays, dtype=float)
     if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(delays).all()):
-        raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, the distance positive")
+        raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, distance also positive")
     if not 1 <= downwash < math.inf:
         raise ValueError(f"downwash is {downwash}; it must be a finite number of at least 1")
     starts, goals, standing = (squashed(points, downwash) for points in (starts, goals, standing))
@@ -115,7 +115,7 @@ def _check_counts(starts: Array, goals: Array, delays: Array) -> None:
     """Raise `ValueError` unless there are as many goals and delays as starts."""
     if len(goals) != len(starts) or delays.shape != (len(starts),):
         raise ValueError(
-            f"the numbers of {len(starts)} starts, {len(goals)} goals and delays of shape {delays.shape} differ"
+            f"starts, goals and delays must have equal lengths, not {len(starts)}, {len(goals)} and {delays.shape}"
         )
 
 

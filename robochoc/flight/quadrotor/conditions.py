@@ -55,10 +55,10 @@ class FlightConditions:
     def __post_init__(self) -> None:
         self._check_distances()
         if not 0 <= self.gusts <= WIND_MAX_M_S:
-            raise ValueError(f"gusts is {self.gusts}; it must be a number from 0 to {WIND_MAX_M_S:g} m/s")
+            raise ValueError(f"gusts are {self.gusts} m/s; they must be from 0 to {WIND_MAX_M_S:g} m/s")
         if max(map(abs, self.wind), default=0) > WIND_MAX_M_S:
             speed = ", ".join(f"{part:g}" for part in self.wind)
-            raise ValueError(f"a wind of ({speed}) is faster than {WIND_MAX_M_S:g} m/s")
+            raise ValueError(f"the wind ({speed}) m/s is faster than the maximum of {WIND_MAX_M_S:g} m/s")
         if self.seed < 0:
             raise ValueError(f"the seed is {self.seed}; it must be at least 0")
         for what, point in (("wind", self.wind), *(("obstacle", place) for place in self.obstacles)):
@@ -68,7 +68,7 @@ class FlightConditions:
             if failure.motor not in range(ROTORS):
                 raise ValueError(f"drone {failure.drone} has no motor {failure.motor}; motors are 0 to {ROTORS - 1}")
             if not 0 <= failure.at_s < math.inf:
-                raise ValueError(f"a motor stops at second {failure.at_s}; it must be at least 0, and finite")
+                raise ValueError(f"the time of a motor failure is {failure.at_s} s; it must be finite, and at least 0")
 
     def _check_distances(self) -> None:
         if self.distance is not None and not DISTANCE_MIN_M <= self.distance < math.inf:

@@ -53,7 +53,7 @@ def free_point(
     if free.any():
         return np.asarray(spots[free.argmax()])
     if floor_plan is not None:
-        raise ValueError(f"there is no free place between the walls around ({wish[0]:.2f}, {wish[1]:.2f})")
+        raise ValueError(f"no free place was found near ({wish[0]:.2f}, {wish[1]:.2f}): walls are too close")
     # No free point on the grid: use a point beyond all others, beside or above.
     beyond = np.array([wish[0], wish[1], ground if low else wish[2]])
     side = 0 if low else 2

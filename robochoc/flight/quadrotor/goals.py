@@ -143,7 +143,7 @@ def check_separation(
         gap = math.dist(one, other)
         if gap < least:
             apart = f"{gap:.2f}" if gap >= DISTANCE_MIN_M else f"{gap:.1g}"
-            asked = f"{distance:g} m are to be kept" + (
+            asked = f"the minimum is {distance:g} m" + (
                 f", which requires {needed_distance(distance):g} m" if gap >= distance - SLACK_M else ""
             )
             step = "use a smaller distance, or a larger scale" if distance > DISTANCE_MIN_M else "use a larger scale"

@@ -104,7 +104,7 @@ def _overlaps(values: Sequence[Mapping[int, int]], seen: Seen, a_cell: int) -> I
         left -= len(twice)
         if left < 0:
             raise ValueError(
-                f"the robots could see the same from more than {MAX_TUPLES:,} pairs of cells;"
+                f"more than {MAX_TUPLES:,} pairs of cells have overlapping fields of view;"
                 " use larger cells, fewer robots, or smaller values of sensing or within"
             )
         if twice and a_cell:

@@ -91,7 +91,7 @@ def formation(
     check_bounds({"spacing": (spacing, 0.001, MAX_SPACING), "heading": (heading, -360, 360)})
     middle = places_in(anchor, "anchor")
     if len(middle) > 1:
-        raise ValueError("anchor is one place")
+        raise ValueError(f"anchor has {len(middle)} places; give one place")
     reachability = reachability_of(choice, seeded(seed))
     check_dimensions(middle, reachability.cells, "anchor")
     if middle and reachability.cells.pixel(middle[0]) is None:

@@ -208,7 +208,7 @@ class _Description:
             if node.scalar == mode:
                 return mode
         mode = "a list or mapping as its mode" if node.scalar is None else f"the mode {shortened(str(node.scalar))}"
-        raise MistakeError(f"has {mode}", f"supported are {', '.join(_MODES)}", node.line)
+        raise MistakeError(f"has {mode}", f"supported modes: {', '.join(_MODES)}", node.line)
 
 
 def _number(node: Node, key: str, least: Fraction, most: Fraction) -> Fraction:

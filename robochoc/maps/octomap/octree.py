@@ -134,7 +134,7 @@ class _Header:
     @staticmethod
     def _type(line: int, name: str) -> str:
         if name not in _BYTES_OF_NODE:
-            hint = "supported are OcTree, ColorOcTree and OcTreeStamped"
+            hint = "supported types: OcTree, ColorOcTree, OcTreeStamped"
             raise MistakeError(f"has a tree of the type {shortened(name)}", hint, line)
         return name
 

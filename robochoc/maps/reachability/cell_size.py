@@ -46,7 +46,9 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
             more = len(cells.free)
         step += 1
     if more and not cells.free:
-        raise ValueError(f"no cell of {float(cells.side):g} m is free, but {more:,} smaller ones are; allow more cells")
+        raise ValueError(
+            f"no cell of {float(cells.side):g} m is free, but {more:,} smaller cells are: allow more cells"
+        )
     return _check_cells(cells, most)
 
 
@@ -70,7 +72,9 @@ def _check_cells(cells: AnyCells, most: int) -> AnyCells:
         counts = ", ".join(
             f"{count} {what}" for count, what in zip(cells.counts, ("columns", "rows", "levels"), strict=False)
         )
-        raise ValueError(f"cells of {side} make {' and '.join(counts.rsplit(', ', 1))}; at most {MAX_SIDE} are allowed")
+        raise ValueError(
+            f"with cells of {side} the map has {' and '.join(counts.rsplit(', ', 1))}; at most {MAX_SIDE} are allowed"
+        )
     if len(cells.free) > most:
         raise ValueError(
             f"{len(cells.free):,} cells of {side} are free, more than {most}: use larger cells, or allow more of them"
@@ -83,7 +87,9 @@ def _check_cells(cells: AnyCells, most: int) -> AnyCells:
 def in_pixels(radius: Fraction, resolution: Fraction) -> Fraction:
     """Return a radius in pixels. Raises `ValueError` if it exceeds `MAX_RADIUS`."""
     if radius > MAX_RADIUS * resolution:
-        raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
+        raise ValueError(
+            f"the radius {float(radius):g} m is more than {MAX_RADIUS} pixels of this map; use a smaller radius"
+        )
     return radius / resolution
 
 

@@ -158,7 +158,7 @@ def start_pixel(cells: AnyCells, number: int, place: Place) -> tuple[int, ...]:
     if pixel is None:
         raise ValueError(off_map(robot, cells))
     if not (cells.fits(place) if isinstance(cells, Cells) else cells.passable[pixel]):
-        raise ValueError(f"{robot} does not fit there: something that is not free is nearer than its radius")
+        raise ValueError(f"{robot} does not fit there: an obstacle, or unknown space, is nearer than its radius")
     return pixel
 
 

@@ -59,7 +59,7 @@ def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames 
     """
     if len(text) > MAX_TEXT:
         raise ExpressionError(
-            f"the expression has {len(text)} characters", MAX_TEXT, f"{MAX_TEXT} are allowed: split the predicate"
+            f"the expression has {len(text)} characters", MAX_TEXT, f"use at most {MAX_TEXT}: split the predicate"
         )
     return _Parser(text, names, symbols).expression(wanted)
 
@@ -99,10 +99,10 @@ class _Parser:
     def expression(self, wanted: Type) -> Expression:
         parsed = self._sum(1)
         if self._peek().text == ",":
-            raise ExpressionError("a list instead of one expression", self._peek().position, "use and(..., ...)")
+            raise ExpressionError("expected one expression, found a list", self._peek().position, "use and(..., ...)")
         if self._peek().text:
             raise ExpressionError(
-                f"'{_shortened(self._peek().text)}' after the end of the expression",
+                f"unexpected '{_shortened(self._peek().text)}' after the end of the expression",
                 self._peek().position,
                 "put an operator between the terms, or delete the rest",
             )
@@ -142,13 +142,13 @@ class _Parser:
             return self._integer(token, 1)
         if token.text in {"", ")", ",", "+", "*"}:
             what = f"'{token.text}'" if token.text else "the end"
-            raise ExpressionError(f"{what} instead of a term", token.position, "add an integer, a name or a call")
+            raise ExpressionError(f"expected a term, found {what}", token.position, "add an integer, a name or a call")
         if self._peek().text == "(":
             return self._set(token, level) if token.text == "set" else self._call(token, level)
         if self._symbols and token.text not in self._names:
             return self._symbol(token, self._symbols)
         if token.text not in self._names:
-            known = f"known are {_listed(self._names)}" if self._names else "none is known here"
+            known = f"known names: {_listed(self._names)}" if self._names else "no names are known here"
             raise ExpressionError(
                 f"unknown name '{_shortened(token.text)}'", token.position, _nearest(token.text, self._names) or known
             )
@@ -167,7 +167,7 @@ class _Parser:
     def _set(self, name: _Token, level: int) -> _Parsed:
         members = self._arguments(level)
         if not members:
-            raise ExpressionError("a set without members", name.position, "write set(1, 2)")
+            raise ExpressionError("the set has no members", name.position, "write set(1, 2)")
         for member in members[1:]:
             _check_type(member, members[0].type, "a member of the set")
         parsed = self._applied("in", members, name.position)
@@ -178,23 +178,23 @@ class _Parser:
         closing = self._advance()
         if closing.text == ",":
             raise ExpressionError(
-                "a list in parentheses instead of one term",
+                "expected one term in parentheses, found a list",
                 closing.position,
                 "extra parentheses are allowed only around all arguments of a function: and((a, b))",
             )
         if closing.text != ")":
-            raise ExpressionError(f"'{_shortened(closing.text)}' instead of ')'", closing.position, "add ')'")
+            raise ExpressionError(f"expected ')', found '{_shortened(closing.text)}'", closing.position, "add ')'")
         return parsed
 
     def _negative(self, sign: _Token) -> _Parsed:
         if not self._peek().text.isdecimal():
-            raise ExpressionError("'-' before a term that is not an integer", sign.position, "write neg(...)")
+            raise ExpressionError("'-' must be followed by an integer", sign.position, "write neg(...)")
         return self._integer(self._advance(), -1)._replace(position=sign.position)
 
     def _integer(self, token: _Token, sign: int) -> _Parsed:
         if len(token.text) > MAX_DIGITS:
             raise ExpressionError(
-                f"an integer of {len(token.text)} digits", token.position, f"{MAX_DIGITS} digits are allowed"
+                f"an integer has {len(token.text)} digits", token.position, f"use at most {MAX_DIGITS} digits"
             )
         self._count(token.position)
         return _Parsed(Constant(sign * int(token.text)), Type.INTEGER, token.position)
@@ -203,7 +203,7 @@ class _Parser:
         resolved = ALIASES.get(name.text, name.text)
         if resolved not in OPERATORS:
             known = [*OPERATORS, *ALIASES]
-            hint = _nearest(name.text, known) or f"known are {' '.join(known)}"
+            hint = _nearest(name.text, known) or f"known operators: {' '.join(known)}"
             raise ExpressionError(f"unknown operator '{_shortened(name.text)}'", name.position, hint)
         operator = OPERATORS[resolved]
         arguments = self._arguments(level)
@@ -248,7 +248,7 @@ class _Parser:
             token = self._advance()
             if token.text != ")":
                 raise ExpressionError(
-                    f"'{_shortened(token.text)}' instead of ',' or ')'",
+                    f"expected ',' or ')', found '{_shortened(token.text)}'",
                     token.position,
                     "separate arguments by ','",
                 )
@@ -268,7 +268,7 @@ class _Parser:
             raise ExpressionError(
                 "the expression is too long",
                 position,
-                f"{MAX_NODES} operators and terms are allowed: split the predicate",
+                f"use at most {MAX_NODES} operators and terms: split the predicate",
             )
 
     def _peek(self) -> _Token:
@@ -304,10 +304,10 @@ def _parentheses(tokens: Sequence[_Token]) -> dict[int, int]:
             opened.append(index)
         elif token.text == ")":
             if not opened:
-                raise ExpressionError("')' without '('", token.position, "delete it, or add '('")
+                raise ExpressionError("')' has no matching '('", token.position, "delete it, or add '('")
             closing[opened.pop()] = index
     if opened:
-        raise ExpressionError("'(' without ')'", tokens[opened[-1]].position, "add the missing ')'")
+        raise ExpressionError("'(' has no matching ')'", tokens[opened[-1]].position, "add the missing ')'")
     return closing
 
 
@@ -340,7 +340,7 @@ def _check_type(parsed: _Parsed, wanted: Type, what: str) -> None:
         return
     hint = _TYPE_HINTS.get((wanted, parsed.type), "compare it: eq ne lt le gt ge")
     shown = _shortened(text(parsed.expression))
-    raise ExpressionError(f"{what} should be {wanted}, but '{shown}' is {parsed.type}", parsed.position, hint)
+    raise ExpressionError(f"{what} must be {wanted}, but '{shown}' is {parsed.type}", parsed.position, hint)
 
 
 _TYPE_HINTS = {
@@ -355,7 +355,7 @@ _TYPE_HINTS = {
 
 
 def _too_deep(position: int) -> ExpressionError:
-    hint = f"{MAX_DEPTH} levels are allowed; write a long sum as add(a, b, ...)"
+    hint = f"use at most {MAX_DEPTH} levels; write a long sum as add(a, b, ...)"
     return ExpressionError("the expression is nested too deeply", position, hint)
 
 

@@ -156,7 +156,7 @@ class MCSMGM(Gainers):
             name: (message.broken, message.cost) for name, message in messages.items() if isinstance(message, Gain)
         }
         if len(self.last_gains) < len(messages):
-            raise ValueError(f"a neighbour of {self.problem.agent} sends another message than its gain in this phase")
+            raise ValueError(f"a neighbour of {self.problem.agent} sent a message other than its gain in this phase")
         moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
         self.choose(self.target if moves else self.present)
         if not self.finished:

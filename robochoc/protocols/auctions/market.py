@@ -121,7 +121,9 @@ class Market:
         self._lots = [self._lot(problem, number) for number in range(len(self._own))]
         self.idle = self._places.get(frozenset())
         if self.idle is None and self._places:
-            raise UnsupportedError(f"{problem.agent} has no value without a task, but may win none: add such a value")
+            raise UnsupportedError(
+                f"{problem.agent} has no value that stands for no task, but may win no task: add such a value"
+            )
 
     def _cheapest(self, problem: LocalProblem) -> dict[frozenset[int], int]:
         """Return the index of the cheapest value for each set of tasks that the robot can do together."""

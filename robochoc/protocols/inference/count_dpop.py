@@ -184,7 +184,7 @@ class IncomingNumbers:
         start, left = len(self._numbers), self._costs.size - len(self._numbers)
         if odd or not 0 < cells <= left or width > max(1, -(-self._bits // 8)):
             raise ValueError(
-                f"{len(piece):,} bytes with {width} a number do not fit, as the table lacks {left:,} numbers"
+                f"a piece has {len(piece):,} bytes, with {width} for each number, but the table lacks {left:,} numbers"
             )
         numbers = [int.from_bytes(piece[at : at + width], "little") for at in range(0, len(piece), width)]
         if max(numbers).bit_length() > self._bits:

@@ -425,7 +425,7 @@ class DPOP(TreeProtocol):
             own = ", ".join(self._sizes)
             raise ValueError(f"{self.problem.agent} received unexpected axes {list(separator)}; its separator is {own}")
         if self._need.bytes > self.settings.memory:
-            raise ValueError(f"{self.problem.agent} must proceed, but has no room for its tables")
+            raise ValueError(f"{self.problem.agent} must proceed, but its tables exceed the limit of memory")
 
     def _let_proceed(self, child: str) -> None:
         """Send a child the axes of its table, the nearest robot first."""

@@ -81,7 +81,7 @@ class DdsSink(LiveSink):
 
     def _stuck(self) -> NoReturn:
         raise SinkError(
-            f"a subscriber in domain {self._place.domain} of DDS has acknowledged nothing for {STUCK_S:g} s; "
+            f"a subscriber in domain {self._place.domain} of DDS has not acknowledged any message for {STUCK_S:g} s; "
             "end it, or publish with reliability=best_effort"
         )
 

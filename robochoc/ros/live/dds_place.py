@@ -59,7 +59,7 @@ class DdsPlace:
             quality = default
             for name, value in _pairs(rest):
                 if name not in options:
-                    raise _wrong(f"{name!r} is not an option of this place", f"known are {', '.join(options)}")
+                    raise _wrong(f"{name!r} is not an option of DDS", f"known options: {', '.join(options)}")
                 quality = _with(quality, name, value)
         except ValueError as error:
             raise failed(str(error)) from error
@@ -87,22 +87,22 @@ def _with(quality: Quality, name: str, value: str) -> Quality:
         return replace(quality, partitions=_partitions(quality, value))
     if name == "depth":
         if not _NUMBER.fullmatch(value) or int(value) not in DEPTHS:
-            raise _wrong(f"depth={value} is not a depth", f"expected a number from 1 to {DEPTHS[-1]:,}")
+            raise _wrong(f"depth={value} is not valid", f"expected a number from 1 to {DEPTHS[-1]:,}")
         return replace(quality, depth=int(value))
     if name == "wait":
         return replace(quality, wait_s=_seconds(value))
     words = _WORDS[name]
     if value not in words:
-        raise _wrong(f"{name}={value} is unknown", f"expected {' or '.join(words)}")
+        raise _wrong(f"{name}={value} is not valid", f"expected {' or '.join(words)}")
     chosen = words[value]
     return replace(quality, reliable=chosen) if name == "reliability" else replace(quality, latched=chosen)
 
 
 def _partitions(quality: Quality, value: str) -> tuple[str, ...]:
     if not value.isascii() or not value.isprintable() or not 0 < len(value) <= _NAME_MAX:
-        raise _wrong(f"partition={value} is not a name", f"expected 1 to {_NAME_MAX} characters of ASCII")
+        raise _wrong(f"partition={value} is not a valid name", f"expected 1 to {_NAME_MAX} characters of ASCII")
     if len(quality.partitions) >= PARTITIONS_MAX:
-        raise ValueError(f"a place has at most {PARTITIONS_MAX} partitions")
+        raise ValueError(f"at most {PARTITIONS_MAX} partitions are allowed")
     return (*quality.partitions, value)
 
 
@@ -112,7 +112,7 @@ def _seconds(value: str) -> float:
     except ValueError:
         found = -1.0
     if not 0 <= found <= WAIT_S_MAX:
-        raise _wrong(f"wait={value} is not a time", f"expected seconds from 0 to {WAIT_S_MAX:g}")
+        raise _wrong(f"wait={value} is not a valid time", f"expected seconds from 0 to {WAIT_S_MAX:g}")
     return found
 
 

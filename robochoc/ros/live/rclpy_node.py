@@ -61,7 +61,9 @@ class RclpyNode:
 
     def __init__(self, place: str, failed: ErrorClass) -> None:
         if place:
-            raise failed(f"rclpy has no place, but {shortened(place)!r} was given; set the domain in ROS_DOMAIN_ID")
+            raise failed(
+                f"rclpy accepts no address, but {shortened(place)!r} was given: remove it, and set ROS_DOMAIN_ID"
+            )
         self._failed = failed
         domain_id(failed)  # middlewares give no reason for an invalid domain
         try:
@@ -82,7 +84,7 @@ class RclpyNode:
         except Exception as error:
             made.try_shutdown()
             raise failed(
-                f"rclpy cannot make a node ({_error_text(error)}); see ROS_DOMAIN_ID, RMW_IMPLEMENTATION"
+                f"rclpy cannot create a node ({_error_text(error)}); check ROS_DOMAIN_ID and RMW_IMPLEMENTATION"
             ) from error
 
     def quality(self, *, waypoints: bool) -> Any:  # noqa: ANN401 - rclpy is untyped
@@ -198,7 +200,7 @@ class RclpySink(LiveSink):
         until = time.monotonic() + STUCK_S
         while not self._is_acknowledged(topic):
             if time.monotonic() > until:
-                problem = f"a subscriber of {topic} has acknowledged nothing for {STUCK_S:g} s"
+                problem = f"a subscriber of {topic} has not acknowledged any message for {STUCK_S:g} s"
                 raise SinkError(f"{problem}; see `ros2 topic info -v {topic}` to find it, and end it")
 
     def _is_acknowledged(self, topic: str) -> bool:

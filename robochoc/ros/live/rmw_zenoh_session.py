@@ -66,7 +66,7 @@ class RouterAddress(NamedTuple):
             raise ValueError(f"{shortened(place)!r}: {on_one_line(str(error))}; {wanted}") from error
         unknown = parts.path or parts.query or parts.fragment or parts.username
         if unknown or port == 0 or (text and not parts.hostname):
-            raise ValueError(f"{shortened(place)!r} is not the place of a zenoh router; {wanted}")
+            raise ValueError(f"{shortened(place)!r} is not the address of a zenoh router; {wanted}")
         return cls(parts.hostname or "localhost", port)
 
     def __str__(self) -> str:

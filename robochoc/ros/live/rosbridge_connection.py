@@ -66,7 +66,7 @@ class RosbridgeAddress(NamedTuple):
         except ValueError as error:
             raise ValueError(f"{shortened(place)!r}: {error}; {wanted}") from error
         if not parts.hostname or parts.scheme not in {"", "ws", "wss"} or parts.query or parts.username or port == 0:
-            raise ValueError(f"{shortened(place)!r} is not the place of a rosbridge; {wanted}")
+            raise ValueError(f"{shortened(place)!r} is not the address of a rosbridge; {wanted}")
         return cls(parts.hostname, port, parts.scheme == "wss", parts.path)
 
     @property
@@ -154,7 +154,7 @@ class Connection:
             self.check()
             if time.monotonic() - since > DRAIN_S:
                 raise self._failed(
-                    f"the rosbridge at {self.url} has read nothing for {DRAIN_S:g} s; see its log, and start again"
+                    f"the rosbridge at {self.url} has not read any data for {DRAIN_S:g} s; see its log, and start again"
                 )
             time.sleep(0.005)
             now = self._buffered()

@@ -51,7 +51,7 @@ _lock = threading.Lock()
 def _node(place: str, failed: ErrorClass) -> Any:  # noqa: ANN401 - rospy is untyped
     """Return rospy, after registering this process's node. Raises `failed`."""
     if place:
-        raise failed(f"rospy has no place, but {shortened(place)!r} was given; set the master in ROS_MASTER_URI")
+        raise failed(f"rospy accepts no address, but {shortened(place)!r} was given: remove it, and set ROS_MASTER_URI")
     try:
         rospy = importlib.import_module("rospy")
     except ImportError as missing:
@@ -175,7 +175,7 @@ class RospySink(LiveSink):
             raise SinkError(f"rospy has stopped publishing ({self._problem}); start again")
 
     def _stuck(self) -> str:
-        return f"a subscriber has read nothing for {STUCK_S:g} s; find it by `rostopic info`, and end it"
+        return f"a subscriber has not read any message for {STUCK_S:g} s; find it by `rostopic info`, and end it"
 
     def _await_subscribers(self, topics: Collection[str]) -> None:
         """Wait until the subscribers listed by the master are connected; only once for those that never connect."""

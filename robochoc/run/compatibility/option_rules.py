@@ -169,7 +169,7 @@ OPTION_RULES = (
     ),
     OptionRule(
         lambda o: o.withdraw is not None and o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS,
-        "--withdraw is decided by protocols that have no form as arrays",
+        "--withdraw cannot be used with --runtime arrays",
         "add --runtime simulator",
     ),
 )

@@ -122,7 +122,7 @@ TEAM_RULES = (
     TeamRule(lambda c: c.traits.lacks, "{protocol} needs {case.traits.lacks}"),
     TeamRule(
         lambda c: c.is_distributed and c.options.runtime == Runtime.ARRAYS and not c.traits.arrays,
-        "{protocol} has no form as arrays",
+        "{protocol} has no array implementation",
         "add --runtime simulator, or choose a protocol that has one ('robochoc protocols --long')",
     ),
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),

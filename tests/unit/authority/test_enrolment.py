@@ -79,7 +79,7 @@ def test_a_token_that_has_expired(desk: AuthorityService, tmp_path: Path) -> Non
 
 def test_a_token_of_another_name(desk: AuthorityService, tmp_path: Path) -> None:
     token = desk.authority.enrol("A")
-    with pytest.raises(EnrolmentError, match="not for this name"):
+    with pytest.raises(EnrolmentError, match="for another name"):
         enrol(*desk.place, token, tmp_path / "b", "B")
     assert not (tmp_path / "b" / "key.pem").exists()
 
@@ -173,14 +173,14 @@ def test_renewal_in_another_name(desk: AuthorityService, tmp_path: Path) -> None
     desk.authority.enrol("B")
     request = signing_request(robot.key, "B")
     answer = answered(desk, framed(msgspec.msgpack.encode(Renew(request))), context)
-    assert answer == EnrolmentDenied("the request is in another name than the certificate")
+    assert answer == EnrolmentDenied("the name in the request differs from the name in the certificate")
     assert desk.refusal()
 
 
 def test_renewal_without_a_certificate(desk: AuthorityService) -> None:
     request = signing_request(new_key(), "A")
     assert isinstance(answered(desk, framed(msgspec.msgpack.encode(Renew(request)))), EnrolmentDenied)
-    assert "must use this certificate" in desk.refusal()
+    assert "uses the same certificate" in desk.refusal()
 
 
 def test_renewal_with_a_certificate_of_another_authority(desk: AuthorityService, tmp_path: Path) -> None:
@@ -273,6 +273,6 @@ def test_a_certificate_that_is_not_ours_is_not_taken(tmp_path: Path, kind: str) 
     with desk.server:
         robot = enrol(*desk.place, desk.authority.enrol("A"), tmp_path / "a", "A")
         desk.server._answer = lie  # type: ignore[assignment, method-assign]  # noqa: SLF001 - a service that lies
-        with pytest.raises(EnrolmentError, match=r"another|wrong kind|invalid certificate"):
+        with pytest.raises(EnrolmentError, match=r"another|wrong type|invalid certificate"):
             renew(robot, *desk.place)
     assert Identity.load(tmp_path / "a").certificate == robot.certificate

@@ -35,8 +35,8 @@ def test_oversized_requests_are_not_even_read(desk: AuthorityService) -> None:
     for size in (LARGEST_BYTES + 1, 2**31, 2**32 - 1):
         answer = answered(desk, size.to_bytes(4, "big"))
         assert isinstance(answer, EnrolmentDenied)
-        assert "allowed" in answer.why
-    assert "allowed" in desk.refusal(3)
+        assert "maximum" in answer.why
+    assert "maximum" in desk.refusal(3)
 
 
 MALFORMED = [
@@ -59,7 +59,7 @@ def test_malformed_requests(desk: AuthorityService) -> None:
         for number, content in enumerate(MALFORMED, 1):
             with each(content[:80]):
                 assert isinstance(answered(desk, framed(content)), EnrolmentDenied)
-                assert "not a valid question" in desk.refusal(number)
+                assert "invalid request" in desk.refusal(number)
 
 
 @given(st.binary(max_size=200))
@@ -103,7 +103,7 @@ def test_slow_ones_are_hung_up_on_and_others_are_served_after(tmp_path: Path) ->
     with desk.server, ExitStack() as stack:
         mute, slow = slow_ones(stack, desk)
         drip(slow, framed(bytes(100_000)))
-        assert "more than 1 s" in desk.refusal(3)
+        assert "within 1 s" in desk.refusal(3)
         assert mute.recv(1) == b""
         desk.server._patience_s = HANG_S  # noqa: SLF001 - on a busy machine this one takes long, too
         assert enrol(*desk.place, desk.authority.enrol("B"), tmp_path / "b", "B").name == "B"

@@ -288,7 +288,7 @@ def test_the_distance_is_less_where_places_are_nearer() -> None:
 
 def test_goals_that_are_too_near_are_refused() -> None:
     flight = Flight(["a", "b"], PAIR, FlightConditions(distance=1.0))
-    with pytest.raises(ValueError, match=r"the goals of a and b are 0\.50 m apart, and 1 m are to be kept"):
+    with pytest.raises(ValueError, match=r"the goals of a and b are 0\.50 m apart, and the minimum is 1 m"):
         flight.fly("up", {0: Goal((0.0, 0.0, 1.0)), 1: Goal((0.5, 0.0, 1.0))})
     with pytest.raises(ValueError, match=r"the homes of a and b are 2\.00 m apart"):
         Flight(["a", "b"], PAIR, FlightConditions(distance=2.5))
@@ -370,7 +370,7 @@ def test_far_from_the_origin_drones_fly_as_near_it() -> None:
         ({"wind": (1e9, 0.0, 0.0)}, "faster"),
         ({"obstacles": ((0.0, 0.0, math.inf),)}, "finite"),
         ({"seed": -1}, "seed"),
-        ({"failures": (MotorFailure("a", -1.0),)}, "a motor stops at second -1"),
+        ({"failures": (MotorFailure("a", -1.0),)}, "the time of a motor failure is -1"),
         ({"failures": (MotorFailure("a", 1.0, 4),)}, "no motor 4"),
     ],
 )

@@ -53,8 +53,12 @@ def test_a_file_whose_parts_are_all_read_has_no_mistake(tmp_path: Path) -> None:
         ("price='4'", "price='4' colour='red'", (3, "the attribute 'colour' is not supported in <item>", "known")),
         ("open=", "opened=", (1, "the attribute 'opened' is not supported in <shop>", "did you mean 'open'?")),
         ("<note>", "<itme/><note>", (4, "<itme> is not supported in <shop>", "did you mean 'item'?")),
-        ("<note>", "once <note>", (3, "text inside <shop>: 'once'", "no text is expected there: delete it")),
-        (" milk ", "<b>milk</b>", (3, "<b> inside <item>", "only text is expected there")),
+        (
+            "<note>",
+            "once <note>",
+            (3, "<shop> contains the text 'once'", "delete it: only elements are expected there"),
+        ),
+        (" milk ", "<b>milk</b>", (3, "<b> is not allowed inside <item>", "write only text there")),
         ("'4'", "'four'", (3, "the price four of milk", "write a number")),
     ],
 )
@@ -74,12 +78,12 @@ def test_all_mistakes_are_reported_but_no_consequences_of_one(tmp_path: Path) ->
 
 def test_a_misspelt_child_is_named_where_the_right_one_is_missing(tmp_path: Path) -> None:
     found = mistakes(tmp_path, "<a><conditon/></a>", lambda root: root.required("condition"))
-    assert found == [(1, "<a> without <condition>", "write 'condition' instead of 'conditon'")]
+    assert found == [(1, "<a> has no <condition>", "write 'condition' instead of 'conditon'")]
 
 
 def test_a_second_child_is_refused(tmp_path: Path) -> None:
     found = mistakes(tmp_path, "<a>\n<b/>\n<b/></a>", lambda root: root.child("b"))
-    assert found == [(3, "a second <b> in <a>", "write one of them")]
+    assert found == [(3, "<a> has a second <b>", "keep one of them")]
 
 
 def test_a_child_that_was_asked_for_but_not_read_is_refused(tmp_path: Path) -> None:
@@ -114,7 +118,7 @@ def test_the_depth_of_elements_is_bounded(levels: int, tmp_path: Path) -> None:
                 read(child)
 
     found = mistakes(tmp_path, "\n".join(["<a>"] * levels + ["</a>"] * levels), read)
-    deep = [(MAX_DEPTH, f"elements nested deeper than {MAX_DEPTH} levels", "write fewer levels")]
+    deep = [(MAX_DEPTH, f"elements are nested deeper than {MAX_DEPTH} levels", "use fewer levels")]
     assert found == ([] if levels == MAX_DEPTH else deep)
 
 

@@ -106,24 +106,24 @@ def test_symbols_may_all_differ(tmp_path: Path) -> None:
     ("constraint", "told"),
     [
         (stated("allEqual", "[ A B C ]"), "unknown global constraint 'global:allEqual' (supported: global:all"),
-        (stated("allDifferent", "[ A ]", "A"), "the end instead of a list of two terms or more"),
-        (stated("allDifferent", "[ A B C"), "the end instead of a variable or an integer"),
-        (stated("allDifferent", "A B C"), "'X0' instead of '['"),
-        (stated("allDifferent", "[ A B ] C"), "'X2' instead of the end"),
+        (stated("allDifferent", "[ A ]", "A"), "expected a list of two terms or more, found the end"),
+        (stated("allDifferent", "[ A B C"), "expected a variable or an integer, found the end"),
+        (stated("allDifferent", "A B C"), "expected '[', found 'X0'"),
+        (stated("allDifferent", "[ A B ] C"), "expected the end, found 'X2'"),
         (stated("allDifferent", "[ A B ]"), "'C' is in the scope but not among the parameters"),
         (stated("allDifferent", "[ A B C V ]"), "the parameter 'V' is not in the scope"),
         (stated("allDifferent", "[ A B R ]", "A B R"), "global:allDifferent expects a symbol, but 'A' is"),
-        (stated("allDifferent", f"[ A B C {' '.join(map(str, range(90)))} ]"), "with 93 terms (80 are allowed"),
-        (stated("weightedSum", "[ {1 A} {1 B} {1 C} ] 3"), "'3' instead of <eq/> or <ne/> or"),
+        (stated("allDifferent", f"[ A B C {' '.join(map(str, range(90)))} ]"), "has 93 terms (use at most 80"),
+        (stated("weightedSum", "[ {1 A} {1 B} {1 C} ] 3"), "expected <eq/> or <ne/> or"),
         (stated("weightedSum", "[ {A 1} {1 B} {1 C} ] <le/> 3"), "an integer before each variable"),
         (stated("weightedSum", "[ {1 A} {1 B} {1 R} ] <le/> 3", "A B R"), "expects an integer, but 'R' is"),
         (stated("element", "A [ ] B", "A B"), "a list of one term or more"),
-        (stated("element", "A [ 1.5 C ] B"), "'1.5' instead of a variable or an integer"),
+        (stated("element", "A [ 1.5 C ] B"), "expected a variable or an integer, found '1.5'"),
         (stated("cumulative", "[ {A B} {C 1 1} ] 2"), "in which one may be <nil/>"),
         (stated("cumulative", "[ {A <nil/> <nil/> 1} {B C 1} ] 2"), "in which one may be <nil/>"),
         (stated("cumulative", "[ {A -1 1} {B C 1} ] 2"), "durations and heights of 0 or more"),
-        (stated("cumulative", "[ {A 1 1} {B C 1} ] <eq/> 2"), "'<eq/>' instead of a variable or an integer"),
-        ('reference="eq" scope="A B"><parameters>A <eq/> B</parameters>', "<eq/> in the parameters"),
+        (stated("cumulative", "[ {A 1 1} {B C 1} ] <eq/> 2"), "expected a variable or an integer, found '<eq/>'"),
+        ('reference="eq" scope="A B"><parameters>A <eq/> B</parameters>', "<eq/> is not allowed in these parameters"),
         (stated("element", "A [ B ] <or/> C"), "<or> does not belong in <parameters>"),
     ],
 )
@@ -174,17 +174,17 @@ def test_a_body_that_says_something_else() -> None:
     wrong = replace(right, body=Apply("eq", (Name("X0"), Name("X1"))))
     for definition, told in (
         (wrong, "the body of global:allDifferent does not follow from its form"),
-        (replace(right, form="[ X0"), "the end instead of a variable or an integer"),
+        (replace(right, form="[ X0"), "expected a variable or an integer, found the end"),
         (
             replace(right, form=7),  # type: ignore[arg-type]
-            "the end instead of '['",
+            "expected '[', found the end",
         ),
         (replace(right, name="global:none"), "unknown global constraint 'global:none'"),
     ):
         with pytest.raises(InvalidInputError) as caught:
             check_team(one_robot(definition, "A", "B"))
         assert told in str(caught.value)
-    with pytest.raises(InvalidInputError, match="an integer as parameter of global:allDifferent"):
+    with pytest.raises(InvalidInputError, match="global:allDifferent has an integer as a parameter"):
         check_team(one_robot(right, "A", 1))
 
 

@@ -155,7 +155,7 @@ def test_costs_in_a_discsp_are_not_called_a_solution() -> None:
     assert solve(costly(), replace(HERE, protocol="sfb")).cost == 11
     wrong = replace(costly(), robots=tuple(replace(one, kind=ProblemKind.DISCSP) for one in costly().robots))
     for attempt in (lambda: solve(wrong, HERE), lambda: robochoc.Problem(wrong)):
-        with pytest.raises(InvalidInputError, match="a soft relation in a DisCSP"):
+        with pytest.raises(InvalidInputError, match="a DisCSP cannot have a soft relation"):
             attempt()
 
 
@@ -191,9 +191,9 @@ def test_what_changes_leave_can_be_solved(team: Team) -> None:
     ("change", "message"),
     [
         (AddConstraint("RB", "RA", Constraint("C", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)),
-         "a cost in a Dis"),
+         "a DisCSP cannot have costs"),
         (AddConstraint("RC", "RA", Constraint("C", PREDEFINED["ne"], ("A", "C"), ("A",))),
-         "takes 2 terms, but 'A' has 1"),
+         "requires 2 terms, but there are 1: 'A'"),
         (AddAgent(Robot("RC", (Variable("C", Domain("D", ())),))), "domain D has no value"),
         (AddValue("A", 10**18), "19 digits"),
         ("nonsense", "'nonsense' instead of RemoveAgent or AddAgent"),
@@ -233,7 +233,7 @@ def test_what_is_made_of_a_valid_team_is_not_valid_by_that(team: Team) -> None:
     check_team(team)
     with pytest.raises(InvalidInputError):
         check_team(replace(team, robots=team.robots[1:]))
-    invalid = AS_IN_FILES["a cost in a DisCSP"](team)
+    invalid = AS_IN_FILES["a DisCSP cannot have costs"](team)
     for _ in range(2):
         refused(invalid)
 

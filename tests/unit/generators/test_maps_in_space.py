@@ -145,7 +145,7 @@ def test_cells_are_as_small_as_their_number_allows() -> None:
         assert cells.side == Fraction(side)
         assert 0 < len(cells.free) <= most
     thin = grid_of(dict.fromkeys(itertools.product(range(-9, 9), range(-9, 9), range(2)), FREE), "0.1")
-    with pytest.raises(ValueError, match=r"no cell of 0.2 m is free, but 289 smaller ones are; allow more cells"):
+    with pytest.raises(ValueError, match=r"no cell of 0.2 m is free, but 289 smaller cells are: allow more cells"):
         cells_of(thin, Fraction(0), 288)
     with pytest.raises(ValueError, match=r"1,331 cells of 0.2 m are free, more than 9"):
         cells_of(grid, Fraction(0), 9, Fraction("0.2"))

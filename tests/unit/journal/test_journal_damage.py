@@ -258,7 +258,7 @@ def test_entries_in_a_wrong_place_are_damage() -> None:
     with pytest.raises(JournalError, match="expected the header"):
         read_journal(made(columns(lost)))
     assert "a second header" in str(read_journal(made(columns(HEADER), columns(HEADER))).damage)
-    assert "more follows the end" in str(read_journal(made(columns(HEADER, ended), columns(lost))).damage)
+    assert "there are entries after the end" in str(read_journal(made(columns(HEADER, ended), columns(lost))).damage)
     for first in ((HEADER, HEADER), (HEADER, ended, lost), (lost, HEADER), ()):
         with pytest.raises(JournalError):
             read_journal(made(columns(*first)))

@@ -104,7 +104,7 @@ def test_a_robot_can_come_again() -> None:
 @looped(
     ("robot", "message", "line"),
     [
-        (newcomer(name="RA"), "the robot 'RA' is in the team already", 0),
+        (newcomer(name="RA"), "the robot 'RA' is already in the team", 0),
         (newcomer(variable="A"), "the variable 'A' belongs to 'RA'", 0),
         (replace(newcomer(), kind=ProblemKind.DISWCSP), "'RE' is a DisWCSP in a team of DisCSP", 0),
         (replace(newcomer(), children=(Child("RA", line=7),)), "'RE' has the child 'RA'", 7),

@@ -223,7 +223,7 @@ def test_names_may_be_an_array() -> None:
 def test_protocols_and_settings_are_looked_up() -> None:
     problem = ArrayProblem(2, 2, PAIR, SAME)
     assert repr(problem) == "<array problem: 2 robots, 1 edges, 2 values>"
-    with pytest.raises(UnsupportedError, match="ABT has no form as arrays"):
+    with pytest.raises(UnsupportedError, match="ABT has no array implementation"):
         problem.solve("abt")
     with pytest.raises(UnsupportedError, match=r"settings: .*cycle"):
         problem.solve("dsa", cycle=3)

@@ -147,5 +147,5 @@ def test_who_is_to_fail_has_to_be_there() -> None:
 
 
 def test_places_nearer_than_the_distance_to_keep_are_refused() -> None:
-    with pytest.raises(CannotFlyError, match="5 m are to be kept"):
+    with pytest.raises(CannotFlyError, match="the minimum is 5 m"):
         looped(FlightSettings(distance=5.0))

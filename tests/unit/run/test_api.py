@@ -155,7 +155,7 @@ def test_containers_that_were_not_told_all(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="add_agent"):
         container.run()
     container.add_agent("Robot3.1", tmp_path / "Robot3.2.xml")
-    with pytest.raises(ValueError, match=r"Robot3\.1 needs its file, Robot3\.1\.xml"):
+    with pytest.raises(ValueError, match=r"the file of Robot3\.1 must be called Robot3\.1\.xml"):
         container.run()
 
 

@@ -116,7 +116,7 @@ def test_a_constraint_of_many_robots_is_compiled_once(monkeypatch: pytest.Monkey
 
 
 def test_time_ends_the_setting_up_too() -> None:
-    with pytest.raises(TeamCompileTimeoutError, match="the time was over before R0 knew its problem"):
+    with pytest.raises(TeamCompileTimeoutError, match="the time limit was reached before R0 was set up"):
         Simulation(wide(3), protocol_named("dsa"), Concurrent(0), deadline=0)
     # The limit may be a timeout or a deadline: no option is named that was not given.
     for limited in (Options(timeout=1e-9), Options(deadline=1e-9)):

@@ -143,8 +143,14 @@ def test_options_of_problems_as_arrays_are_converted() -> None:
 
 WLAN = CHANNELS["wlan"]
 REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
-    ({"runtime": Runtime.ARRAYS}, "sfb has no form as arrays; add --runtime simulator, or choose a protocol"),
-    ({"runtime": Runtime.ARRAYS, "protocol": "dsa", "withdraw": Withdrawal.MAXIMAL}, "--withdraw is decided by"),
+    (
+        {"runtime": Runtime.ARRAYS},
+        "sfb has no array implementation; add --runtime simulator, or choose a protocol",
+    ),
+    (
+        {"runtime": Runtime.ARRAYS, "protocol": "dsa", "withdraw": Withdrawal.MAXIMAL},
+        "--withdraw cannot be used with --runtime arrays",
+    ),
     ({"runtime": Runtime.ARRAYS, "delay": 3}, "--delay and --schedule are only for the simulator"),
     ({"runtime": Runtime.ARRAYS, "ncccs": 3}, "--ncccs is only for the simulator"),
     ({"runtime": Runtime.ARRAYS, "patience": 3.0}, "--patience is for robots with processes"),

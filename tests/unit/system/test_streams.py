@@ -65,7 +65,7 @@ def test_a_file_that_grows_into_a_pipe_names_a_reader_that_is_too_slow(
     with pytest.raises(OSError, match="behind") as behind:
         list(map(file.append, LINES))
     assert behind.value.errno == errno.ENOBUFS
-    with pytest.raises(OSError, match="has not read anything"):
+    with pytest.raises(OSError, match="has not read any data"):
         file.close()
     os.close(reader)  # the writer's thread ends, and closes the pipe
 

@@ -98,9 +98,7 @@ def test_a_crazyflie_that_is_not_there_ends_with_one_message(tmp_path: Path) -> 
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
-        assert (
-            f"RC cannot be flown: no message received on udp://127.0.0.1:{vehicles[2].port} within 5 s" in done.stderr
-        )
+        assert f"RC cannot fly: no message received on udp://127.0.0.1:{vehicles[2].port} within 5 s" in done.stderr
         assert done.stderr.count("\n") == 1
         assert done.returncode == 1
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
@@ -119,7 +117,7 @@ def test_firmware_that_is_too_old(tmp_path: Path, trouble: dict[str, object], wh
         for name, value in trouble.items():
             setattr(vehicles[1], name, value)
         done = solve(tmp_path, fleet, "--arm")
-        assert f"RB cannot be flown: {why}" in done.stderr
+        assert f"RB cannot fly: {why}" in done.stderr
         assert done.stderr.count("\n") == 1
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
@@ -136,7 +134,7 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path, link: str, why: str) -> No
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         fleet.write_text(fleet.read_text().replace(f"udp://127.0.0.1:{vehicles[0].port}", link))
         done = solve(tmp_path, fleet)
-        assert f"RA cannot be flown: {link} {why}" in done.stderr
+        assert f"RA cannot fly: {link} {why}" in done.stderr
         assert done.returncode == 1
 
 
@@ -145,7 +143,7 @@ def test_a_port_at_which_nobody_is(tmp_path: Path) -> None:
     with crazyflie_field(tmp_path) as (vehicles, fleet):
         fleet.write_text(fleet.read_text().replace(str(vehicles[0].port), "9"))
         done = solve(tmp_path, fleet)
-        assert "RA cannot be flown: no message received on udp://127.0.0.1:9 within 5 s" in done.stderr
+        assert "RA cannot fly: no message received on udp://127.0.0.1:9 within 5 s" in done.stderr
 
 
 # What goes wrong on the way

@@ -106,14 +106,14 @@ def test_an_order_without_a_permit_is_refused(here: Field) -> None:
     ("told", "settings"),
     [
         (
-            "is outside of the fence; the fence is from -1, -1, 0 to 5, 5, 6; the decision is not flown",
+            "is outside the fence; the fence is from -1, -1, 0 to 5, 5, 6; the decision is not flown",
             {"fence": "[[-1, -1, 0], [5, 5, 6]]"},
         ),
         (
             "the waypoints of RA and RB are 2.24 m apart; 'distance' is 2.5 m; the decision is not flown",
             {"distance": 2.5},
         ),
-        ("RB stands at 0, 700, 0, outside of the fence", {}),
+        ("RB is at 0, 700, 0, outside the fence", {}),
     ],
 )
 def test_what_is_refused_before_anything_is_armed(here: Field, told: str, settings: dict[str, object]) -> None:
@@ -133,8 +133,8 @@ def test_all_vehicles_that_are_not_heard_are_named_at_once(here: Field) -> None:
     for name in ("RB", "RC", "RD"):
         here.flyers[name].connects, here.flyers[name].seen = False, Telemetry()
     done = here.solve(here.fleet(patience=1), "--arm")
-    assert "RB cannot be flown: no message received on udpin://" in done.stderr
-    assert "within 1 s; nor can RC, RD; nothing was armed" in done.stderr
+    assert "RB cannot fly: no message received on udpin://" in done.stderr
+    assert "within 1 s; RC, RD cannot fly either; nothing was armed" in done.stderr
     assert done.stderr.count("\n") == 1
     assert here.done == [[]] * 4
 

@@ -81,7 +81,7 @@ def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
     with mavlink_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
-        assert "RC cannot be flown: no message received on udpin://127.0.0.1:" in done.stderr
+        assert "RC cannot fly: no message received on udpin://127.0.0.1:" in done.stderr
         assert "within 5 s; nothing was armed" in done.stderr
         assert done.stderr.count("\n") == 1
         assert done.returncode == 1
@@ -93,7 +93,7 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
     with mavlink_field(tmp_path) as (_, fleet):
         fleet.write_text(fleet.read_text().replace("udpin://127.0.0.1", "udpin://no.such.host.invalid"))
         done = solve(tmp_path, fleet)
-        assert "RA cannot be flown: udpin://no.such.host.invalid" in done.stderr
+        assert "RA cannot fly: udpin://no.such.host.invalid" in done.stderr
 
 
 @looped(

@@ -135,7 +135,7 @@ def test_what_another_guard_has_left_in_the_air_is_brought_down(pilot: Pilot, pl
     ("seen", "why"),
     [
         (replace(GROUND, healthy=False), "its autopilot is not ready to arm"),
-        (replace(GROUND, place=(50, 0, 0)), "it stands at 50, 0, 0, outside of the fence (-1, -1, 0 to 9, 9, 9)"),
+        (replace(GROUND, place=(50, 0, 0)), "it is at 50, 0, 0, outside the fence (-1, -1, 0 to 9, 9, 9)"),
     ],
 )
 def test_nothing_is_armed_that_is_not_ready(pilot: Pilot, played: Played, seen: Telemetry, why: str) -> None:

@@ -111,7 +111,7 @@ def test_a_flight_that_is_refused_tells_why_and_is_made_again(tmp_path: Path) ->
     assert making.flight, making.troubles
     flown = flight_result_of(making.run)
     assert flown is not None
-    assert "m are to be kept: use a larger scale" in flown.refused
+    assert "m: use a larger scale" in flown.refused
     assert "cannot be flown" not in flown.refused
     low = kept_run(tmp_path / "low", cube(2))
     (making.run.folder / RESULT).write_bytes((low.folder / RESULT).read_bytes())

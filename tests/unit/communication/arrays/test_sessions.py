@@ -96,7 +96,7 @@ def test_protocols_with_a_form_say_so_and_no_other_has_one() -> None:
         if offer.protocol.traits.arrays:
             assert array_run_for(offer.protocol)
         else:
-            with pytest.raises(UnsupportedError, match="has no form as arrays"):
+            with pytest.raises(UnsupportedError, match="has no array implementation"):
                 array_run_for(offer.protocol)
 
 
@@ -104,7 +104,7 @@ def test_a_users_kind_of_dsa_has_none() -> None:
     class MyDSA(DSA):
         pass
 
-    with pytest.raises(UnsupportedError, match="MyDSA has no form as arrays"):
+    with pytest.raises(UnsupportedError, match="MyDSA has no array implementation"):
         ArraysRun(dear(3), MyDSA)
 
 
@@ -122,7 +122,7 @@ def run(*words: str) -> tuple[int, str]:
 @looped(
     ("words", "said"),
     [
-        ((PATROL, "--protocol", "sfb"), "sfb has no form as arrays"),
+        ((PATROL, "--protocol", "sfb"), "sfb has no array implementation"),
         ((PATROL, "--protocol", "dsa", "--journal", "out.journal"), "--runtime arrays sends none"),
         ((PATROL, "--protocol", "dsa", "--sniff"), "--runtime arrays sends none"),
         ((PATROL, "--protocol", "dsa", "--schedule", str(ScheduleName.CYCLES)), "are only for the simulator"),

@@ -325,7 +325,7 @@ def test_parts_without_a_meaning_here_are_refused(tmp_path: Path) -> None:
         ('name="c"', 'name="c" model="PKC"', "the attribute 'model' is not supported in <constraint>"),
         ('defaultCost="0"', 'defaultcost="0"', "the attribute 'defaultcost' is not supported in <relation>"),
         ('maximize="false"', 'maximise="true"', "the attribute 'maximise' is not supported in <presentation>"),
-        ("2: 1 1<", "2: 1 1 <b/><", "<b> inside <relation>"),
+        ("2: 1 1<", "2: 1 1 <b/><", "<b> is not allowed inside <relation>"),
     ):
         whole = frodo(body)
         assert now in whole

@@ -98,13 +98,13 @@ def test_what_frodo_has_too_is_exported_as_it_was(kind: str, parameters: str, tm
 @looped(
     ("kind", "parameters", "message"),
     [
-        ("weightedSum", "[ {1 V0} ] <foo/> 3", "'<foo/>' instead of <eq/> or <ne/>"),
-        ("weightedSum", "[ {1 V0 ] <eq/> 3", "']' instead of '}'"),
+        ("weightedSum", "[ {1 V0} ] <foo/> 3", "expected <eq/> or <ne/>"),
+        ("weightedSum", "[ {1 V0 ] <eq/> 3", "expected '}', found ']'"),
         ("weightedSum", "[ {1 V9} ] <eq/> 3", "'V9' is not a variable"),
-        ("element", "V0 [ 1 2", "the end instead of a variable or an integer"),
+        ("element", "V0 [ 1 2", "expected a variable or an integer, found the end"),
         ("allDifferent", "[ V0 V1 ] V2", "have 'V2', expected the end"),
         ("cumulative", "[ {V0 1} ] 1", "{origin duration end height}, in which one may be <nil/>"),
-        ("cumulative", "[" + "{V0 1 1}" * 101 + "] 1", "global:cumulative with 26 tasks"),
+        ("cumulative", "[" + "{V0 1 1}" * 101 + "] 1", "global:cumulative has 26 tasks"),
         ("allDifferent", "[" + " V0" * 501 + "]", "global:allDifferent has 501 terms"),
         ("allDifferent", "[" + " V0" * 9000 + "]", "global:allDifferent has too many parameters"),
     ],

@@ -211,7 +211,7 @@ REFUSED = {
     "<sum><list> x[] </list><coefs> 2 1 1 </coefs><condition> (le,3) </condition></sum>": "did you mean 'coeffs'?",
     "<sum><list> x[] </list><conditon> (le,3) </conditon></sum>": "write 'condition' instead of 'conditon'",
     "<sum><list> x[] </list><condition> (le,3) </condition><condition> (le,2) </condition></sum>": "a second",
-    "<sum><list> x[] </list><list> x[] </list><condition> (le,3) </condition></sum>": "a second <list> in <sum>",
+    "<sum><list> x[] </list><list> x[] </list><condition> (le,3) </condition></sum>": "<sum> has a second <list>",
     "<extension><list> x[0] </list><supports> 1 </supports><conflicts> 2 </conflicts></extension>": "<conflicts> is",
     "<extension><list> x[0] x[1] </list><supports> (1 2,0) </supports></extension>": "'1 2' is not a valid integer",
     "<intension> eq(x[0],1 2) </intension>": "is not a valid expression",
