@@ -1,13 +1,16 @@
-"""Digests of problems: problems with the same content are the same problem, whatever their names and paths."""
+"""Digests of problems and protocols: the same content is the same problem or protocol, whatever its name and path."""
 
 from __future__ import annotations
 
 import hashlib
+import sys
 from collections.abc import Iterable
 from pathlib import Path
+from types import ModuleType
 
 from robochoc.formats.scenario_writer import team_files
 from robochoc.model.problem import Team
+from robochoc.protocols.protocol import Protocol
 
 _BYTES = 16
 
@@ -21,6 +24,26 @@ def digest_of_files(path: Path) -> str:
     """Return the digest of the names and contents of a team's files, or of a single file. Raises `OSError`."""
     files = sorted(path.iterdir()) if path.is_dir() else [path]
     return _digest((file.name, file.read_bytes()) for file in files if file.is_file())
+
+
+def digest_of_protocol(protocol: type[Protocol]) -> str:
+    """Return the digest of the Python files of another package's protocol; empty for a protocol of robochoc.
+
+    All files of the packages that define the class and its base classes count, but not what these import.
+    """
+    packages = {base.__module__.partition(".")[0] for base in protocol.__mro__} - {"robochoc"}
+    own = sorted(packages - sys.stdlib_module_names)
+    files = [file for package in own for file in _python_files(sys.modules.get(package))]
+    return _digest((file.name, file.read_bytes()) for file in files) if files else ""
+
+
+def _python_files(module: ModuleType | None) -> list[Path]:
+    """Return the files of a package, or the file of a module; none if it has no source files."""
+    folders = [Path(folder) for folder in getattr(module, "__path__", ())]
+    if folders:
+        return sorted(file for folder in folders for file in folder.rglob("*.py") if file.is_file())
+    file = Path(getattr(module, "__file__", None) or "")
+    return [file] if file.is_file() else []
 
 
 def _digest(files: Iterable[tuple[str, bytes]]) -> str:

@@ -1,4 +1,4 @@
-"""Exports results for other programs: CSV, JSON lines, Parquet, and a LaTeX table of medians."""
+"""Exports results for other programs: CSV, JSON lines, Parquet, and tables of medians in LaTeX and CSV."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ import msgspec
 
 from robochoc.experiments import summary
 from robochoc.experiments.results import Results
+from robochoc.experiments.statistics import mean_interval, median_interval
 from robochoc.experiments.study import report_settings
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.plain_text import on_one_line
@@ -24,7 +25,7 @@ _LATEX = str.maketrans(
 
 
 def export_results(results: Results, form: str) -> bytes:
-    """Return the results of a study in the format `csv`, `json`, `latex` or `parquet`.
+    """Return the results of a study in the format `csv`, `json`, `latex`, `parquet` or `summary`.
 
     Raises:
         UnsupportedError: if the package that writes the format is not installed.
@@ -39,8 +40,40 @@ def export_results(results: Results, form: str) -> bytes:
             wishes = report_settings(results.text)
             over, shown = summary.prepare(rows, wishes.over, wishes.names)[:2] if rows else ("", rows)
             return latex_table(shown, results.title, over, wishes.metrics).encode()
+        case "summary":
+            return _csv(summary_rows(results)).encode()
         case _:
             return _parquet(rows)
+
+
+def summary_rows(results: Results) -> list[dict[str, Any]]:
+    """Return a row for each part, value of the parameter, metric and way to run.
+
+    A row has the number of runs with a value, of values that a limit ended, the median and the mean, each with its 95 %
+    confidence interval. Without a value these are None.
+    """
+    if not results.rows:
+        return []
+    wishes = report_settings(results.text)
+    over, rows, _ = summary.prepare(results.rows, wishes.over, wishes.names)
+    found = []
+    for part, of_part in summary.parts(rows, wishes.each):
+        for metric in summary.metrics_to_show(of_part, wishes.metrics, over):
+            for (value, way), sample in summary.samples(of_part, metric, over).items():
+                place = {over: value, **({"part": part} if part else {}), "metric": metric, "label": way}
+                found.append(place | _statistics_of(sample))
+    return found
+
+
+def _statistics_of(sample: summary.Sample) -> dict[str, Any]:
+    counts: dict[str, Any] = {"runs": len(sample.values), "at_limit": sample.censored}
+    names = ("median", "median_low", "median_high", "mean", "mean_low", "mean_high")
+    if not sample.values:
+        return counts | dict.fromkeys(names)
+    median = median_interval(sample.values, sample.problems)
+    mean = mean_interval(sample.values, sample.problems)
+    values = (median.median, median.low, median.high, mean.mean, mean.low, mean.high)
+    return counts | dict(zip(names, values, strict=True))
 
 
 def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:

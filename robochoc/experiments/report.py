@@ -59,7 +59,7 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
     report = _Report(results, over)
     tables = unique_names([file_name("medians", part) for part, _ in report.parts])
     files = {
-        f"{name}.tex": latex_table(rows, headed(report.title, part), report.over).encode()
+        f"{name}.tex": latex_table(rows, headed(report.title, part), report.over, report.metrics).encode()
         for name, (part, rows) in zip(tables, report.parts, strict=True)
     }
     captions = [*report.remarks, *(f"{one.name}: {one.title}. {one.caption}" for one in report.drawings)]

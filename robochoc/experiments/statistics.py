@@ -33,6 +33,15 @@ class MedianInterval:
     high: float
 
 
+@dataclass(frozen=True)
+class MeanInterval:
+    """A mean, and its confidence interval at the level `CONFIDENCE`."""
+
+    mean: float
+    low: float
+    high: float
+
+
 def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> MedianInterval:
     """Return the median of `values` and its confidence interval by the percentile bootstrap.
 
@@ -46,17 +55,38 @@ def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> Me
     Raises:
         ValueError: if there are no values.
     """
+    given, drawn = _resampled(values, problems)
+    low, high = _middle(weighted_medians(given, drawn))
+    return MedianInterval(float(np.median(given)), low, high)
+
+
+def mean_interval(values: Sequence[float], problems: Sequence[str] = ()) -> MeanInterval:
+    """Return the mean of `values` and its confidence interval, in the same way as `median_interval`.
+
+    Raises:
+        ValueError: if there are no values.
+    """
+    given, drawn = _resampled(values, problems)
+    low, high = _middle(drawn @ given / drawn.sum(axis=1))
+    return MeanInterval(float(np.mean(given)), low, high)
+
+
+def _resampled(values: Sequence[float], problems: Sequence[str]) -> tuple[Any, Any]:
+    """Return the values in ascending order, and how often each resample contains each of them."""
     if not values:
         raise ValueError("there are no values")
     order = np.argsort(values, kind="stable")
-    given = np.asarray(values, dtype=float)[order]
-    of_problem = np.unique(problems or np.arange(len(given)), return_inverse=True)[1][order]
+    of_problem = np.unique(problems or np.arange(len(values)), return_inverse=True)[1][order]
     count = int(of_problem.max()) + 1
     drawn = np.random.default_rng(_SEED).multinomial(count, np.full(count, 1 / count), RESAMPLES)
-    medians = weighted_medians(given, drawn[:, of_problem])
+    return np.asarray(values, dtype=float)[order], drawn[:, of_problem]
+
+
+def _middle(resampled: Any) -> tuple[float, float]:  # noqa: ANN401 - an array of floats
+    """Return the bounds of the middle part of `resampled`, whose share is `CONFIDENCE`."""
     rest = (1 - CONFIDENCE) / 2
-    low, high = np.quantile(medians, [rest, 1 - rest])
-    return MedianInterval(float(np.median(given)), float(low), float(high))
+    low, high = np.quantile(resampled, [rest, 1 - rest])
+    return float(low), float(high)
 
 
 def weighted_medians(values: Any, counts: Any) -> Any:  # noqa: ANN401 - arrays of numbers

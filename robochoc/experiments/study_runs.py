@@ -8,6 +8,7 @@ from typing import Any
 import msgspec
 
 from robochoc.communication.simulator.channel import CHANNELS, ChannelModel, read_channel
+from robochoc.experiments.digests import digest_of_protocol
 from robochoc.experiments.study_file import MAX_INTEGER, Place
 from robochoc.experiments.task import GIVEN, Limits, Setup, options_of
 from robochoc.formats.diagnostics import shortened, suggestion
@@ -77,7 +78,9 @@ def _setups(table: Mapping[str, Any], limits: Mapping[str, Any], place: Place) -
         for one in combined:
             setup = _setup(plain, {name: _text(value) for name, value in one.items()}, place)
             _refuse(setup, Limits(**limits), place)
-            yield setup
+            by_robots = setup.protocol not in {CENTRAL, AUTO}
+            source = digest_of_protocol(protocol_named(setup.protocol)) if by_robots else ""
+            yield msgspec.structs.replace(setup, source=source)
 
 
 def _text(value: object) -> str:

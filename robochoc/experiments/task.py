@@ -53,11 +53,13 @@ class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
 class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """A protocol with its options. The attributes have the meaning of those in `robochoc.run.options.Options`.
 
-    `label` is the setup's name in tables and figures.
+    `label` is the setup's name in tables and figures. `source` is the digest of the protocol's files, so that the runs
+    of a changed protocol are repeated; it is empty for protocols of robochoc.
     """
 
     label: str = ""
     protocol: str
+    source: str = ""
     settings: dict[str, str] = {}
     order: str | None = None
     runtime: str = "simulator"

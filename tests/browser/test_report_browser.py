@@ -52,6 +52,7 @@ def test_figures_for_a_paper(results: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     names = {path.name for path in folder.iterdir()}
     assert {"messages-over-agents.svg", "messages-over-agents.pdf", "medians.tex", "cost-over-ncccs.pdf"} <= names
+    assert "NCCCs, agents" not in (folder / "medians.tex").read_text(), "only the metrics of the study's [report]"
     assert "cost-over-agents: cost over agents. Median of cost" in (folder / "captions.txt").read_text()
     for path in folder.glob("*.svg"):
         assert etree.parse(path).getroot().tag.endswith("svg")

@@ -20,6 +20,8 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.experiments.digests import digest_of_protocol
+from robochoc.experiments.plan import plan_of
 from robochoc.journal.journal import read_journal
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -32,6 +34,7 @@ from tests.support import golden
 from tests.support.limits import HANG_S
 from tests.support.problems import team_of
 from tests.support.program import ROOT, robochoc_within
+from tests.support.studies import study
 
 EXAMPLE = ROOT / "docs" / "examples" / "breakout"
 GUIDE = (ROOT / "docs" / "tutorials" / "write-a-protocol.md").read_text()
@@ -281,6 +284,29 @@ def test_what_is_installed_beside_ours_is_tested_but_has_no_golden_journals(here
     golden.files.cache_clear()
     assert "own" in protocol_names()
     assert golden.files() == ours
+
+
+def test_a_study_repeats_the_runs_of_a_protocol_whose_files_have_changed(here: Path) -> None:
+    text = '[problems]\nfamily = "random"\nagents = 4\ndomain = 3\n[runs]\nprotocol = ["abt", "own"]\n'
+    package(here, "mine", {"own": "mine:Silent"})
+    before = {task.setup.protocol: key for key, task in plan_of(study(text)).items()}
+    assert {task.setup.protocol: key for key, task in plan_of(study(text)).items()} == before
+    (here / "mine.py").write_text(f"{SILENT}# changed\n")
+    after = {task.setup.protocol: key for key, task in plan_of(study(text)).items()}
+    assert after["abt"] == before["abt"]
+    assert after["own"] != before["own"]
+
+
+def test_all_files_of_a_protocols_package_count(here: Path) -> None:
+    package(here, "mine", {"own": "mine.own:Silent"})
+    (here / "mine.py").unlink()
+    (here / "mine").mkdir()
+    for name, code in (("__init__", ""), ("own", SILENT), ("help", "P = 0.98\n")):
+        (here / "mine" / f"{name}.py").write_text(code)
+    before = digest_of_protocol(protocol_named("own"))
+    (here / "mine" / "help.py").write_text("P = 0.90\n")
+    assert digest_of_protocol(protocol_named("own")) != before
+    assert digest_of_protocol(protocol_named("abt")) == ""
 
 
 @pytest.mark.parametrize("runtime", ["processes", "simulator"])

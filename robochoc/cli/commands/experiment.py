@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from robochoc.experiments.study import Study
 
 FORMATS = ("csv", "json", "latex", "parquet")
+SUMMARY = "summary"
 JOURNALS = "journals"
 AGAIN = ("refused", "limit", "memory", "refuted", "done")
 PAGES = (".html", ".htm", ".md")
@@ -114,16 +115,18 @@ def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
     "-o", "--output", type=InputPath(), metavar="FILE", help="File, or folder, to write.  [default: standard output]"
 )
 @click.option(
-    "--format", "form", type=click.Choice([*FORMATS, JOURNALS]), help="csv, json (one line per run), latex (medians),"
-    " parquet; journals: a folder with the recorded journals.  [default: by the file's ending, else csv]",
+    "--format", "form", type=click.Choice([*FORMATS, SUMMARY, JOURNALS]),
+    help="csv, json (one line per run), latex (medians), parquet; summary: CSV of medians and means with 95 %"
+    " confidence intervals; journals: a folder with the recorded journals.  [default: by the file's ending, else csv]",
 )  # fmt: skip
 @invalid_input_fails
 def export(results: Path, output: Path | None, form: str | None) -> None:
-    """Write the results as CSV, JSON lines or Parquet with one row per run, or as a LaTeX table of medians.
+    """Write the results as CSV, JSON lines or Parquet with one row per run, or as a table of medians.
 
     \b
     robochoc experiment export study.sqlite -o study.csv
     robochoc experiment export study.sqlite --format latex > table.tex
+    robochoc experiment export study.sqlite --format summary -o table.csv
     robochoc experiment export study.sqlite --format journals -o journals/
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.failures import errors_as_failures

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import tomllib
 from functools import cache
+from statistics import mean, median
 from typing import Any
 
 import pytest
@@ -92,6 +95,25 @@ def test_ways_to_run_have_the_names_that_a_paper_gives_them() -> None:
     assert f" & {' & '.join(ways)} \\\\" in export_results(wished, "latex").decode()
     with pytest.raises(InvalidInputError, match="two ways to run would have the same name"):
         told(COSTS, '[report]\nnames = { sfb = "x", syncbb = "x" }\n')
+
+
+def test_a_summary_has_medians_and_means_with_their_intervals() -> None:
+    results = made(COSTS)._replace(text='[report]\neach = "agents"\nmetrics = ["cost", "cycles"]\n')
+    table = list(csv.DictReader(io.StringIO(export_results(results, "summary").decode())))
+    ways = ["sfb", "syncbb", "dsa variant=A", "dsa variant=B"]
+    assert [(row["part"], row["metric"], row["label"]) for row in table] == [
+        (f"agents {agents}", metric, way) for agents in (5, 7) for metric in ("cost", "cycles") for way in ways
+    ]
+    costs = [row["cost"] for row in results.rows if row["label"] == "dsa variant=A" and row["agents"] == 7]
+    (one,) = [row for row in table if (row["part"], row["metric"], row["label"]) == ("agents 7", "cost", ways[2])]
+    assert (one["agents"], one["runs"], one["at_limit"]) == ("7", "4", "0")
+    assert (float(one["median"]), float(one["mean"])) == (median(costs), mean(costs))
+    assert min(costs) <= float(one["mean_low"]) <= mean(costs) <= float(one["mean_high"]) <= max(costs)
+    refused = tuple({**row, "status": "refused", "cost": None} for row in results.rows)
+    without = list(csv.DictReader(io.StringIO(export_results(results._replace(rows=refused), "summary").decode())))
+    assert {(row["runs"], row["median"], row["mean_low"]) for row in without if row["metric"] == "cost"} == {
+        ("0", "", "")
+    }
 
 
 def test_problems_are_in_the_natural_order_of_their_names() -> None:

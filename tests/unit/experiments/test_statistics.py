@@ -118,6 +118,20 @@ def test_the_interval_of_a_median() -> None:
         statistics.median_interval([])
 
 
+def test_the_interval_of_a_mean() -> None:
+    values = [float(value) for value in range(101)]
+    found = statistics.mean_interval(values)
+    # The standard error is 29.15 / sqrt(101) = 2.90; the interval is about 1.96 of these on both sides.
+    assert found.mean == 50
+    assert 43.5 < found.low < 45
+    assert 55 < found.high < 56.5
+    # Two runs of each problem are as good as one: problems are resampled with all of their runs.
+    twice = statistics.mean_interval(values * 2, [str(value) for value in values * 2])
+    assert twice.high - twice.low == pytest.approx(found.high - found.low, rel=0.1)
+    with pytest.raises(ValueError, match="no values"):
+        statistics.mean_interval([])
+
+
 def test_runs_of_one_problem_are_drawn_together() -> None:
     """Ten runs of each of eleven problems say no more of the problems than one run of each."""
     values = [float(value) for value in range(11)]
