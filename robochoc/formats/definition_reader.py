@@ -155,17 +155,20 @@ def read_function(element: etree._Element, code: Callable[[str], int]) -> Functi
     return Function(attribute(element, "name"), *_read_intension(element, Type.INTEGER, code))
 
 
-def read_topic(element: etree._Element, variables: Collection[str], symbolic: Collection[str] = ()) -> Topic:
-    """Return a topic. Its `x`, `y`, `z` are expressions over the robot's own `variables` except the `symbolic` ones.
+def read_topic(
+    element: etree._Element, variables: Collection[str], symbolic: Sequence[str], code: Callable[[str], int]
+) -> Topic:
+    """Return a topic. Its `x`, `y`, `z` are integer expressions over the robot's own `variables`.
 
-    Raises `MistakeError`.
+    The `symbolic` variables can only be compared with symbols; `code` returns the code of a symbol. Raises
+    `MistakeError`.
     """
     given: dict[str, Expression] = {}
     for axis in ("x", "y", "z"):
         body = element.get(axis)
         if body is not None:
             try:
-                symbols = SymbolNames(symbolic, _no_symbol) if symbolic else None
+                symbols = SymbolNames(symbolic, _unparsed_if_unknown(code)) if symbolic else None
                 given[axis] = parse(body, variables, Type.INTEGER, symbols)
             except ExpressionError as error:
                 raise expression_mistake(f"{axis} of the topic", error) from None
@@ -173,15 +176,8 @@ def read_topic(element: etree._Element, variables: Collection[str], symbolic: Co
     return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"))
 
 
-def _no_symbol(word: str) -> int:
-    raise ValueError(f"unknown name '{shortened(word)}'")
-
-
-def _read_intension(
-    element: etree._Element, wanted: Type, code: Callable[[str], int]
-) -> tuple[tuple[str, ...], Expression, tuple[str, ...]]:
-    """Return the formal parameters of a predicate or function, its body, and the symbolic parameters."""
-    parameters, symbolic = _read_parameters(element.findtext("parameters") or "")
+def _unparsed_if_unknown(code: Callable[[str], int]) -> Callable[[str], int]:
+    """Return `code` with the parser's exception for a word that cannot be a symbol."""
 
     def known_code(word: str) -> int:
         try:
@@ -189,11 +185,20 @@ def _read_intension(
         except MistakeError as mistake:
             raise ValueError(mistake.message) from None
 
+    return known_code
+
+
+def _read_intension(
+    element: etree._Element, wanted: Type, code: Callable[[str], int]
+) -> tuple[tuple[str, ...], Expression, tuple[str, ...]]:
+    """Return the formal parameters of a predicate or function, its body, and the symbolic parameters."""
+    parameters, symbolic = _read_parameters(element.findtext("parameters") or "")
     functional = element.find("expression/functional")
     body = (functional.text if functional is not None else None) or ""
     try:
         if symbolic:
-            return parameters, parse(body, parameters, wanted, SymbolNames(symbolic, known_code)), symbolic
+            symbols = SymbolNames(symbolic, _unparsed_if_unknown(code))
+            return parameters, parse(body, parameters, wanted, symbols), symbolic
         return parameters, parse_once(body, parameters, wanted), ()
     except ExpressionError as error:
         below = body[: error.position].count("\n")

@@ -145,16 +145,16 @@ def check_parameter_names(names: Sequence[str]) -> None:
         seen.add(name)
 
 
-def check_topic(topic: Topic, own: Collection[str], symbolic: Sequence[str] = ()) -> None:
+def check_topic(topic: Topic, own: Collection[str], symbolic: Sequence[str], table: Sequence[str]) -> None:
     """Raise `MistakeError` unless the coordinates of `topic` are integer expressions over the `own` variables.
 
-    Variables in `symbolic` are not integers.
+    Variables in `symbolic` can only be compared with symbols, whose names are in `table`.
     """
     check_word(topic.name)
     check_word(topic.type)
     for axis, expression in (("x", topic.x), ("y", topic.y), ("z", topic.z)):
         if expression is not None:
-            check_expression(f"{axis} of the topic", expression, tuple(own), Type.INTEGER, (symbolic, ()))
+            check_expression(f"{axis} of the topic", expression, tuple(own), Type.INTEGER, (symbolic, table))
 
 
 def check_expression(

@@ -6,7 +6,7 @@ docs/reference/format.md, "One robot"; the paper, Figure 2.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -248,11 +248,12 @@ class _RobotReader:
             self._report.finish()  # further errors may be consequences of this one
         return tuple(variables)
 
-    def _topics(self, symbolic: Collection[str]) -> tuple[Topic, ...]:
+    def _topics(self, symbolic: Sequence[str]) -> tuple[Topic, ...]:
         topics: dict[str, Topic] = {}
         for element in self._elements("topics", "topic", "nbTopics"):
             with self._report.at(line(element)):
-                topic = read_topic(element, self._own, symbolic)
+                place = self._report.file, line(element)
+                topic = read_topic(element, self._own, symbolic, lambda word: self._table.mention(word, *place))
                 check_unique("topic", topic.name, topics)
                 topics[topic.name] = topic
         return tuple(topics.values())

@@ -145,7 +145,7 @@ class RobotValidator:
         seen: set[str] = set()
         for topic in robot.topics:
             with self._at(places.part, "topic", topic.name):
-                check_topic(topic, own, symbolic)
+                check_topic(topic, own, symbolic, robot.symbol_table)
                 check_unique("topic", topic.name, seen)
             seen.add(topic.name)
             yield

@@ -53,7 +53,7 @@ def robot_xml(robot: Robot) -> bytes:
     variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
     for variable in robot.variables:
         etree.SubElement(variables, "variable", name=variable.name, domain=variable.domain.name)
-    _write_topics(instance, robot.topics)
+    _write_topics(instance, robot)
     _write_definitions(instance, robot)
     _write_constraints(instance, robot.private, robot.costs)
     _write_neighbours(instance, robot)
@@ -92,17 +92,18 @@ def _range(part: range) -> str:
     return f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0])
 
 
-def _write_topics(instance: etree._Element, topics: Sequence[Topic]) -> None:
-    if not topics:
+def _write_topics(instance: etree._Element, robot: Robot) -> None:
+    if not robot.topics:
         return
-    section = etree.SubElement(instance, "topics", nbTopics=str(len(topics)))
-    for topic in topics:
+    symbolic = [variable.name for variable in robot.variables if variable.domain.symbols]
+    section = etree.SubElement(instance, "topics", nbTopics=str(len(robot.topics)))
+    for topic in robot.topics:
         element = etree.SubElement(section, "topic", name=topic.name)
         if topic.type != Topic.type:
             element.set("type", topic.type)
         for axis, expression in (("x", topic.x), ("y", topic.y), ("z", topic.z)):
             if expression is not None:
-                element.set(axis, text(expression))
+                element.set(axis, text(expression, symbolic, robot.symbol_table))
 
 
 def _write_definitions(instance: etree._Element, robot: Robot) -> None:

@@ -186,7 +186,8 @@ class ModelRobot:
         except UntranslatableError:
             scaled = None
         if scaled is None or scaled.divisor != 1:
-            raise ModelError(f"files cannot express the position {term!r}", "write it with integers and operators")
+            hint = "write it with integers and operators; for parts of a metre, use smaller units and --scale"
+            raise ModelError(f"files cannot express the position {term!r}", hint)
         return scaled.expression
 
 

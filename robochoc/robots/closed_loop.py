@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 from robochoc.flight.crafts import crafts_of
 from robochoc.flight.mission import (
+    UNIT_M,
     VAST_M,
     Drone,
     Goal,
@@ -276,7 +277,7 @@ def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
     return MissionBuilder([robot], {}).drones
 
 
-def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
+def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float = UNIT_M) -> Leg:
     """Return the goals of one robot's drones on its own machine, where the places of other robots are unknown.
 
     Goals are given by the drones' numbers in `drones_of_robot`. The drones of a withdrawn robot land at their first
@@ -287,7 +288,7 @@ def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | 
         robot: The robot.
         why: The master's text about the end of the run, such as `optimal, 6 withdraw`.
         assignment: The robot's decision; empty if it has withdrawn.
-        scale: The length of a unit, in metres.
+        scale: The length of a unit, in metres. It must be the same for all robots.
     """
     verdict, _, others = why.partition(",")
     if verdict not in _ANSWERED or not (assignment or _WITHDRAWN in others):

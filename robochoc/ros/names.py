@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 
@@ -114,13 +113,21 @@ def _plain(char: str) -> str:
 
 
 def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
-    """Yield the drones' namespaces: the first token of the waypoint topic if it is unique, else the whole topic."""
+    """Yield the drones' namespaces: the first token of the waypoint topic, or the whole topic.
+
+    The whole topic is used if another robot has the same first token, if a topic of the same robot comes before, and if
+    a waypoint topic with the token is called like a report.
+    """
     names = [ros_name(drone.name.replace("/", "_")) for drone in drones]
     first = ["/" + topic.split("/")[1] if topic else name for topic, name in zip(waypoints, names, strict=True)]
-    shared = Counter(first)
+    owners: dict[str, set[str]] = {}
+    for number, (drone, own) in enumerate(zip(drones, first, strict=True)):
+        owners.setdefault(own, set()).add(drone.robot or f"/{number}")
+    reserved = {own for topic, own in zip(waypoints, first, strict=True) if topic in {f"{own}/{one}" for one in REPORTS}}
+    given: set[str] = set()
     for topic, own in zip(waypoints, first, strict=True):
-        reports = topic is not None and topic in {f"{own}/{token}" for token in REPORTS}
-        yield topic if topic and (shared[own] > 1 or reports) else own
+        yield topic if topic and (len(owners[own]) > 1 or own in given or own in reserved) else own
+        given.add(own)
 
 
 def _clash(topic: str, first: Drone, second: Drone) -> str:

@@ -15,6 +15,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.model.expression import Constant
 from robochoc.robots.mission_publisher import MissionPublisher, nanoseconds
 from robochoc.robots.sink import Fields, Sink, Waypoint
 from robochoc.robots.source import REPORTS
@@ -88,7 +89,8 @@ class Publisher:
         decided = waypoints(leg, self._drones, self.names, self._frame, at_ns, self._goals)
         for sink in self._sinks:
             sink.decide(decided)
-        for waypoint in decided:
+        leg = without_ground_landings(leg, self._drones)
+        for waypoint in (one for one in decided if one.drone in leg.goals):
             self._publish(waypoint.topic, waypoint.kind, self._fields(waypoint), at_ns)
         self._goals |= {number: goal.at for number, goal in leg.goals.items()}
         header = self._header(at_ns)
@@ -172,7 +174,8 @@ class SinkPublisher(MissionPublisher):
 
     def decide(self, leg: Leg, at_ns: int) -> None:
         """Publish the waypoints of `leg`. Raises `SinkError`, `NoMappingError`."""
-        for waypoint in waypoints(leg, self._drones, self._publisher.names, self._frame, at_ns):
+        published = without_ground_landings(leg, self._drones)
+        for waypoint in waypoints(published, self._drones, self._publisher.names, self._frame, at_ns):
             self._counts["landing" if waypoint.lands else "waypoint"] += 1
         self._publisher.decide(leg, at_ns)
 
@@ -214,6 +217,16 @@ def waypoints(
         if topic is not None and name is not None:
             found.append(Waypoint(number, name, topic.type, goal.at, goal.lands, frame, stamp, before.get(number)))
     return tuple(found)
+
+
+def without_ground_landings(leg: Leg, drones: Sequence[Drone]) -> Leg:
+    """Return `leg` without the landing points of robots on the ground, which cannot land: the z of their topics is 0.
+
+    A landing point is outside all places of the team, where a ground robot must not be sent.
+    """
+    on_ground = {number for number, drone in enumerate(drones) if drone.topic and drone.topic.z == Constant(0)}
+    goals = {number: goal for number, goal in leg.goals.items() if not (goal.lands and number in on_ground)}
+    return replace(leg, goals=goals)
 
 
 def _with_kind(drone: Drone, kind: str) -> Drone:

@@ -23,6 +23,8 @@ _BILLION = 1_000_000_000
 _SECONDS = range(1 << 31)
 PATIENCE_S = 10.0
 """The default time to wait for reports of a live source after a decision, in seconds."""
+_TOPICS_MAX = 3
+"""The maximum number of expected topics in a note."""
 _NOTES_MAX = 12
 _SLICE_S = 0.2
 """The interval between calls of `idle`, and the longest time of `poll`, in seconds."""
@@ -72,8 +74,11 @@ class SourceFeedback(Feedback):
         expected = self._decoder.topics.get(topic)
         if expected:
             return on_one_line(f"{topic} has the type {kind}, not {expected}, and was ignored")
-        if REPORTS.get(topic.rpartition("/")[2]) == short_kind(kind):
-            return on_one_line(f"{topic} does not belong to a drone of this team, and was ignored")
+        token = topic.rpartition("/")[2]
+        if REPORTS.get(token) == short_kind(kind):
+            known = [one for one in self._decoder.topics if one.endswith(f"/{token}")]
+            listed = ", ".join([*known[:_TOPICS_MAX], *["..."] * (len(known) > _TOPICS_MAX)])
+            return on_one_line(f"{topic} does not belong to a drone of this team, and was ignored (expected: {listed})")
         return ""
 
     def now_ns(self) -> int:

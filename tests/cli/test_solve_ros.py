@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import Result
 
+import robochoc
 from robochoc.flight.mission import Goal
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
@@ -172,7 +173,8 @@ def test_reports_that_nobody_can_use_are_told(tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert result.stderr.splitlines() == [
         "/nose/battery has the type std_msgs/String, not sensor_msgs/BatteryState, and was ignored",
-        "/nobody/out_of_order does not belong to a drone of this team, and was ignored",
+        "/nobody/out_of_order does not belong to a drone of this team, and was ignored"
+        " (expected: /fin/out_of_order, /nose/out_of_order, /port/out_of_order, ...)",
     ]
 
 
@@ -190,6 +192,32 @@ def test_a_run_that_fails_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     assert "the minimum is 5 m" in refused.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["run.mcap"]
     assert place.read_text() == "of another run"
+
+
+def warehouse(folder: Path) -> Path:
+    """A team of two robots on the ground, whose places are more than 40 m apart; `b` leaves after the first epoch."""
+    model = robochoc.Model("warehouse")
+    picks = {"near": 2, "far": 60}
+    for name in "ab":
+        robot = model.robot(name)
+        pick = robot.variable("pick", [*picks])
+        robot.topic(f"/{name}/goal", x=sum((pick == each) * x for each, x in picks.items()), y=5, z=0)
+    model.add(model["a.pick"] == "far", model["b.pick"] != model["a.pick"])
+    model.after_solution().remove_robot("b")
+    model.save(folder)
+    return folder
+
+
+def test_places_are_in_metres_and_robots_on_the_ground_do_not_land(tmp_path: Path) -> None:
+    team = warehouse(tmp_path / "warehouse")
+    words = ("--protocol", "abt", "--runtime", "simulator", "--ros", f"mcap:{tmp_path / 'run.mcap'}")
+    result = ran("solve", team, *words)
+    assert (result.exit_code, result.stderr) == (0, f"{tmp_path / 'run.mcap'}: 3 waypoints, 0 landings\n")
+    places = [[at for _, at in published(tmp_path / "run.mcap", f"/{name}/goal")] for name in "ab"]
+    assert places == [[(60, 5, 0), (60, 5, 0)], [(2, 5, 0)]]
+    robot = read_team(team)["a"]
+    far = robot.symbol_table.index("far")
+    assert leg_of_robot(robot, "solution", {"a.pick": far}).goals == {0: Goal((60, 5, 0))}
 
 
 def test_what_cannot_be_published_at_last_is_told_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -86,6 +86,14 @@ def test_the_space_is_the_first_token_if_it_is_the_drones_own() -> None:
     assert names.reports()["/drone3_1/battery"] == "sensor_msgs/BatteryState"
 
 
+def test_the_first_topic_of_a_robot_has_the_space_of_its_token() -> None:
+    own = [drone("A", "/amr1/goal", "amr1"), drone("B", "/amr1/wait", "amr1"), drone("C", "/amr2/goal", "amr2")]
+    names = TopicNames(own)
+    assert [names.namespace(number) for number in range(3)] == ["/amr1", "/amr1/wait", "/amr2"]
+    shared = TopicNames([*own, drone("D", "/amr1/spare", "other")])
+    assert [shared.namespace(number) for number in (0, 1, 3)] == ["/amr1/goal", "/amr1/wait", "/amr1/spare"]
+
+
 def test_a_waypoint_that_is_called_like_a_report_is_no_report() -> None:
     names = TopicNames([drone("A", "/a/pose")])
     assert names.waypoint(0) == "/a/pose"

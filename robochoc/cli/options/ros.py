@@ -121,7 +121,7 @@ ros_options = _all_of(
         "--scale",
         type=Finite(1e-6, 1e6),
         metavar="METRES",
-        help="Metres per unit.  [default: 1 or less]",
+        help="Metres per unit.  [default: 1; flights: 1 or less]",
     ),
     click.option("--ros-type", "ros_type", metavar="TYPE", help="ROS type of all waypoints, such as nav_msgs/Path."),
     click.option("--tf", is_flag=True, help="Publish goals on /tf_static and flights on /tf."),

@@ -137,7 +137,7 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
     if not ros:
         yield None
         return
-    from robochoc.flight.mission import check_scale
+    from robochoc.flight.mission import UNIT_M, check_scale
     from robochoc.robots.closed_loop import ClosedLoop, drones_of
     from robochoc.robots.situation import BATTERY
     from robochoc.ros.publisher import SinkPublisher
@@ -158,7 +158,10 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
             check_scale(ros.scale, ground)
         options = publish_options(ros.published)
         publishers = [SinkPublisher(team.name, drones, sink, ros.frame, options) for sink in sinks]
-        loop = ClosedLoop(team, publishers, feedback, scale=ros.scale, battery=battery, ground=ground)
+        scale = ros.scale
+        if scale is None and ros.situation != FLIGHT and (ground is None or ground.scale is None):
+            scale = UNIT_M
+        loop = ClosedLoop(team, publishers, feedback, scale=scale, battery=battery, ground=ground)
         yield loop
 
 
@@ -200,6 +203,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
         return
     import time
 
+    from robochoc.flight.mission import UNIT_M
     from robochoc.robots.closed_loop import drones_of_robot, leg_of_robot
     from robochoc.ros.publisher import SinkPublisher
 
@@ -211,7 +215,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
 
         def publish(why: str, assignment: Assignment) -> list[str]:
             nonlocal last
-            leg = leg_of_robot(robot, why, assignment, scale)
+            leg = leg_of_robot(robot, why, assignment, UNIT_M if scale is None else scale)
             for publisher in publishers if leg != last else ():
                 publisher.decide(leg, time.time_ns())
             last = leg

@@ -171,6 +171,12 @@ def test_a_scenario_names_symbols(tmp_path: Path) -> None:
         ("RA.xml", 'reference="warm" scope="A N"', 'reference="lt" scope="A N"', "lt expects an integer, but 'A'"),
         ("RA.xml", "set(red, ", "set(rad, ", "RA.xml:9: no domain of the team has the symbol 'rad' (did you mean"),
         ("RA.xml", "</variables>", '</variables><topics><topic name="t" x="A"/></topics>', "x of the topic: the expr"),
+        (
+            "RA.xml",
+            "</variables>",
+            '</variables><topics><topic name="t" x="if(eq(A,rad),1,2)"/></topics>',
+            "RA.xml:7: no domain of the team has the symbol 'rad' (did you mean",
+        ),
         ("RB.xml", "|red 2", "|2 2", "RB.xml:5: '2' is a number in a column of symbols"),
         ("RB.xml", "|red 2", "|red pink", "RB.xml:5: 'pink' is not an integer"),
         ("RB.xml", 'scope="A B"', 'scope="N B"', "RB.xml:8: r expects a symbol, but 'N' is"),
@@ -291,3 +297,17 @@ def test_two_symbols_are_not_reported_as_tasks(tmp_path: Path) -> None:
     assert task_table(Team("one", (alone,)), {"RA.A": "red"}) == []
     plain = replace(alone, variables=(Variable("RA.A", Domain("D", (range(2),))),))
     assert task_table(Team("one", (plain,)), {"RA.A": 1}) != []
+
+
+def test_a_topic_compares_a_symbolic_variable_with_symbols(tmp_path: Path) -> None:
+    folder = files(tmp_path)
+    text = (folder / "RA.xml").read_text()
+    topic = """<topics><topic name="t" x="if(eq(A,'dark-blue'),N,7)" y="0"/></topics>"""
+    (folder / "RA.xml").write_text(text.replace("</variables>", f"</variables>{topic}"))
+    team = read_team(folder)
+    (read,) = team["RA"].topics
+    code = team["RA"].symbol_table.index("dark-blue")
+    assert read.x == Apply("if", (Apply("eq", (Name("A"), Constant(code))), Name("N"), Constant(7)))
+    check_team(team)
+    write_team(team, tmp_path / "again")
+    assert read_team(tmp_path / "again")["RA"].topics == (read,)
