@@ -131,8 +131,11 @@ class MissionLayout:
         rows, columns, levels = (replace(axis, unit_m=unit_m if axis.name in _PLACE else None) for axis in self.axes)
         return replace(self, axes=(rows, columns, levels))
 
-    def places(self, crafts: Sequence[Craft]) -> list[Point | None]:
-        """Return the goals of the crafts, all different, in the order of `homes`; None for a craft without a level."""
+    def places(self, crafts: Sequence[Craft], *, exact: bool = False) -> list[Point | None]:
+        """Return the goals of the crafts in the order of `homes`; None for a craft without a level.
+
+        Places too close to each other are moved apart, unless they are `exact`.
+        """
         taken = _OccupiedPoints()
         around: dict[Point, Iterator[Point]] = {}
         found: list[Point | None] = []
@@ -143,7 +146,7 @@ class MissionLayout:
                 here = (rows.at(craft.cell[0]), columns.at(craft.cell[1])) if craft.cell else (x, y)
                 middle = (*here, levels.at(craft.level))
                 spots = around.setdefault(middle, _spiral(middle))
-                place = next(spot for spot in spots if not taken.is_near(spot))
+                place = middle if exact else next(spot for spot in spots if not taken.is_near(spot))
                 taken.add(place)
             found.append(place)
         return found

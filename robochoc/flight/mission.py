@@ -119,6 +119,8 @@ class MissionBuilder:
             large.
         ground: A map of the ground. Robots without a waypoint in their files then stay in place. If the map has walls,
             withdrawn drones return to their homes.
+        exact: True for places as in the topics, even if drones would collide there; only for drones that are not
+            simulated.
 
     Raises:
         ValueError: The map has walls, and `scale` differs from its scale.
@@ -134,8 +136,10 @@ class MissionBuilder:
         leaving: int | None = None,
         scale: float | None = None,
         ground: GroundMap | None = None,
+        exact: bool = False,
     ) -> None:
         self._ground = ground
+        self._exact = exact
         self.walls = walls_of(ground)
         check_scale(scale, ground)
         self._robots = {robot.name: robot for robot in robots}
@@ -163,7 +167,7 @@ class MissionBuilder:
         for craft in self._crafts(values, here):
             crafts[self._places[craft.robot, craft.name]] = craft
         places = self.layout.places(
-            [craft if _owner(craft) in here else replace(craft, level=None) for craft in crafts]
+            [craft if _owner(craft) in here else replace(craft, level=None) for craft in crafts], exact=self._exact
         )
         goals: dict[int, Goal] = {}
         for number, (craft, place) in enumerate(zip(crafts, places, strict=True)):
@@ -251,7 +255,12 @@ def check_scale(scale: float | None, ground: GroundMap | None) -> None:
 
 
 def mission_of(
-    outcome: Outcome, team: Team | None = None, scale: float | None = None, ground: GroundMap | None = None
+    outcome: Outcome,
+    team: Team | None = None,
+    scale: float | None = None,
+    ground: GroundMap | None = None,
+    *,
+    exact: bool = False,
 ) -> Mission:
     """Return the mission of `outcome`.
 
@@ -260,6 +269,7 @@ def mission_of(
         team: The team as defined in its files, before its scenario. Without a team, only names are known.
         scale: The length of a unit, in metres; see `MissionBuilder`.
         ground: A map of the ground, if there is one.
+        exact: True for places as in the topics; see `MissionBuilder`.
 
     Raises:
         ValueError: See `MissionBuilder`.
@@ -280,7 +290,14 @@ def mission_of(
         robots, names = [], [*first, *outcome.withdrawn]
         others = [craft_of_variable(name, values) for values in decided for name in values]
     builder = MissionBuilder(
-        robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale, ground=ground
+        robots,
+        first,
+        names=names,
+        others=others,
+        leaving=_leaving(epochs, outcome),
+        scale=scale,
+        ground=ground,
+        exact=exact,
     )
     legs = [builder.leg(epoch) for epoch in epochs[:-1]]
     return builder.mission(outcome.team, [*legs, builder.leg(epochs[-1], outcome.withdrawn)])

@@ -123,6 +123,7 @@ class ClosedLoop:
         self._ground = ground
         self._robots = all_robots(team)
         self.feedback = feedback
+        self._exact = feedback is None or not feedback.simulated
         self._scale = scale
         self._battery = battery
         self._builder: MissionBuilder | None = None
@@ -163,7 +164,7 @@ class ClosedLoop:
 
     def publish(self, outcome: Outcome) -> None:
         """Publish the decisions of a run that was made without this loop."""
-        mission = mission_of(outcome, self._team, self._scale, self._ground)
+        mission = mission_of(outcome, self._team, self._scale, self._ground, exact=self._exact)
         self._legs = [*mission.legs]
         for leg in mission.legs:
             self._decide(leg)
@@ -217,7 +218,9 @@ class ClosedLoop:
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
         others = [craft for values in (near, far) for robot in self._robots for craft in crafts_of(robot, values)]
-        return MissionBuilder(self._robots, first, others=others, scale=self._scale, ground=self._ground)
+        return MissionBuilder(
+            self._robots, first, others=others, scale=self._scale, ground=self._ground, exact=self._exact
+        )
 
     def _decide(self, leg: Leg) -> None:
         at_ns = self.feedback.now_ns() if self.feedback else time.time_ns()
@@ -293,7 +296,7 @@ def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float = 
     verdict, _, others = why.partition(",")
     if verdict not in _ANSWERED or not (assignment or _WITHDRAWN in others):
         return Leg(why, Verdict.UNKNOWN, {})
-    builder = MissionBuilder([robot], assignment, scale=scale)
+    builder = MissionBuilder([robot], assignment, scale=scale, exact=True)
     known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}
     if assignment:
         goals = builder.leg(EpochOutcome(Verdict(verdict), robots=(robot.name,), assignment=dict(assignment))).goals

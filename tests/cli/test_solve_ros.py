@@ -220,6 +220,18 @@ def test_places_are_in_metres_and_robots_on_the_ground_do_not_land(tmp_path: Pat
     assert leg_of_robot(robot, "solution", {"a.pick": far}).goals == {0: Goal((60, 5, 0))}
 
 
+def test_places_near_each_other_are_published_as_they_are(tmp_path: Path) -> None:
+    model = robochoc.Model("near")
+    for name, x in {"a": 10, "b": 11, "c": 10, "d": 60}.items():
+        robot = model.robot(name)
+        robot.topic(f"/{name}/goal", x=robot.variable("x", [x]), y=0, z=0)
+    model.save(tmp_path / "near")
+    words = ("--protocol", "abt", "--runtime", "simulator", "--ros", f"mcap:{tmp_path / 'run.mcap'}")
+    assert ran("solve", tmp_path / "near", *words).exit_code == 0
+    places = [published(tmp_path / "run.mcap", f"/{name}/goal")[0][1] for name in "abcd"]
+    assert places == [pytest.approx((x, 0, 0)) for x in (10, 11, 10, 60)]
+
+
 def test_what_cannot_be_published_at_last_is_told_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
