@@ -6,7 +6,7 @@ docs/reference/format.md, "One robot".
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 
 from lxml import etree
 

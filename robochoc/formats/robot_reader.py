@@ -252,8 +252,7 @@ class _RobotReader:
         topics: dict[str, Topic] = {}
         for element in self._elements("topics", "topic", "nbTopics"):
             with self._report.at(line(element)):
-                place = self._report.file, line(element)
-                topic = read_topic(element, self._own, symbolic, lambda word: self._table.mention(word, *place))
+                topic = read_topic(element, self._own, symbolic, self._code_at(line(element)))
                 check_unique("topic", topic.name, topics)
                 topics[topic.name] = topic
         return tuple(topics.values())
@@ -290,8 +289,11 @@ class _RobotReader:
             check_unique("definition", name, definitions)
             definitions[name] = None
             refuse_predefined(name)
-            place = self._report.file, line(element)
-            definitions[name] = read(element, lambda word: self._table.mention(word, *place))
+            definitions[name] = read(element, self._code_at(line(element)))
+
+    def _code_at(self, line_number: int) -> Callable[[str], int]:
+        """Return a function for the codes of symbols that occur in a line."""
+        return lambda word: self._table.mention(word, self._report.file, line_number)
 
     def _constraints(
         self,

@@ -123,7 +123,9 @@ def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Ite
     owners: dict[str, set[str]] = {}
     for number, (drone, own) in enumerate(zip(drones, first, strict=True)):
         owners.setdefault(own, set()).add(drone.robot or f"/{number}")
-    reserved = {own for topic, own in zip(waypoints, first, strict=True) if topic in {f"{own}/{one}" for one in REPORTS}}
+    reserved = {
+        own for topic, own in zip(waypoints, first, strict=True) if topic in {f"{own}/{one}" for one in REPORTS}
+    }
     given: set[str] = set()
     for topic, own in zip(waypoints, first, strict=True):
         yield topic if topic and (len(owners[own]) > 1 or own in given or own in reserved) else own

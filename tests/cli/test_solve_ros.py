@@ -173,8 +173,10 @@ def test_reports_that_nobody_can_use_are_told(tmp_path: Path) -> None:
     assert result.exit_code == 0
     assert result.stderr.splitlines() == [
         "/nose/battery has the type std_msgs/String, not sensor_msgs/BatteryState, and was ignored",
-        "/nobody/out_of_order does not belong to a drone of this team, and was ignored"
-        " (expected: /fin/out_of_order, /nose/out_of_order, /port/out_of_order, ...)",
+        (
+            "/nobody/out_of_order does not belong to a drone of this team, and was ignored"
+            " (expected: /fin/out_of_order, /nose/out_of_order, /port/out_of_order, ...)"
+        ),
     ]
 
 
