@@ -8,8 +8,8 @@ from typing import Any
 
 import msgspec
 
-from robochoc.journal.events import AnyEvent, Began, Bounded, actor
-from robochoc.journal.reader import read_journal
+from robochoc.journal.events import AnyEvent, Began, Bounded, Improved, Sent, actor
+from robochoc.journal.reader import Journal, read_journal
 
 COLUMNS = (
     *("run", "epoch", "event", "t", "robot", "other", "type", "content", "bytes", "clock", "checks", "cost"),
@@ -52,6 +52,26 @@ def by_column(path: Path | str) -> dict[str, list[Any]]:
     """Return the events in a journal as columns, with the keys of `rows`."""
     found = rows(path)
     return {name: [row[name] for row in found] for name in COLUMNS}
+
+
+def cost_rows(journal: Journal) -> list[Row]:
+    """Return a row for each improvement of the team's assignment: its time, the messages sent until then, the cost.
+
+    `run` is the number of the run or epoch, from 1, as in other exports.
+    """
+    found: list[Row] = []
+    run, messages = 0, 0
+    for event in journal.events:
+        match event:
+            case Began():
+                run, messages = run + 1, 0
+            case Sent():
+                messages += 1
+            case Improved():
+                found.append({"run": max(run, 1), "t": event.t, "messages": messages, "cost": event.cost})
+            case _:
+                pass
+    return found
 
 
 def _row(event: AnyEvent, run: int, epoch: int) -> Row:

@@ -17,6 +17,8 @@ from click.testing import CliRunner, Result
 
 from robochoc.cli.group import cli
 from robochoc.cli.reports.failures import INVALID, USAGE
+from robochoc.formats.team_writer import write_team
+from robochoc.generators.coloring import coloring
 from robochoc.journal.events import AnyEvent, Began, Decided, Received, Sent, Settled
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.sniffer.acl import parse
@@ -26,6 +28,7 @@ from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.patterns import matching, patterns_in
 from robochoc.sniffer.trace import Trace
 from tests.support.cases import cases
+from tests.support.program import robochoc_within
 from tests.support.recorded_journals import recorded
 
 NAME = "R;#1\nend"
@@ -110,6 +113,33 @@ def test_a_table_comes_back_as_the_trace(file: Path) -> None:
             "content": row["content"],
         }
         assert json.loads(row["content"]) == trace.content(message)
+
+
+def test_costs_are_the_curve_that_a_study_records(tmp_path: Path) -> None:
+    """DSA in cycles: the cost falls, and the time is the number of the cycle."""
+    team, path = tmp_path / "team", tmp_path / "dsa.journal"
+    write_team(coloring(12, 3, degree=4), team)
+    words = ("--protocol", "dsa", "--set", "cycles=20", "--runtime", "simulator", "--schedule", "cycles")
+    solved = robochoc_within("solve", team, *words, "--journal", path, "--json")
+    assert solved.returncode == 0, solved.stderr
+    rows = list(csv.DictReader(io.StringIO(exported(path, "costs"))))
+    costs, cycles = [int(row["cost"]) for row in rows], [float(row["t"]) for row in rows]
+    assert costs == sorted(set(costs), reverse=True)
+    assert costs[-1] == json.loads(solved.stdout)["cost"]
+    assert cycles == sorted(set(cycles))
+    assert cycles[0] == 0
+    assert cycles[-1] <= 20
+    # In each cycle, each of the 12 robots sends its value to its neighbours: 48 messages.
+    assert [int(row["messages"]) for row in rows] == [48 * (1 + int(cycle)) for cycle in cycles]
+    done = journal("export", path, "--format", "costs", "-o", tmp_path / "costs.csv")
+    assert f"{len(rows)} costs" in done.stdout
+    refused = journal("export", path, "--format", "costs", "--from", "3")
+    assert (refused.exit_code, "exports no messages" in refused.stderr) == (USAGE, True)
+
+
+def test_a_run_without_costs_has_no_curve(file: Path) -> None:
+    refused = journal("export", file, "--format", "costs")
+    assert (refused.exit_code, "there are no costs" in refused.stderr) == (INVALID, True)
 
 
 def test_acl_texts_are_messages_of_fipa(file: Path) -> None:

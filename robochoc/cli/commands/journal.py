@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from robochoc.sniffer.selection import Selection
     from robochoc.sniffer.trace import Trace
 
-FORMATS = ("jsonl", "acl", "csv", "mermaid", "html")
+FORMATS = ("jsonl", "acl", "csv", "mermaid", "html", "costs")
 MOST_IN_PAGE = 100_000
 """The maximum number of messages in a page. With more, the page would be too large for browsers."""
 
@@ -71,6 +71,7 @@ def export(
     csv      a table with one row per message: cause, explanation, content
     mermaid  a sequence diagram for Markdown pages
     html     the sniffer's page in one file, without a server
+    costs    a table (CSV) with one row per improvement: time, messages until then, cost
 
     In PATTERNS, * matches any characters and ? one character. Messages have the same numbers as in the sniffer.
     """  # noqa: D301 - \\b keeps click from wrapping the lines
@@ -80,6 +81,11 @@ def export(
     selection = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
     refuse_same_places({"-o": output}, {"the journal": file})
     read = saved_journal(file)
+    if form == "costs":
+        if selection != Selection():
+            raise click.UsageError("--format costs exports no messages: remove --robots, --types, --from, --to, ...")
+        _export_costs(read, file, output)
+        return
     trace = _trace(read, file)
     try:
         messages = selection.numbers_in(trace)
@@ -100,8 +106,28 @@ def export(
         _write(output, b"".join(pieces), count=len(messages))
 
 
-def _write(output: Path, content: bytes, *, count: int) -> None:
-    """Write an export of `count` messages to a file, and print the file's size."""
+def _export_costs(read: Journal, file: Path, output: Path | None) -> None:
+    """Write the improvements of the team's cost as CSV."""
+    import csv
+    import io
+
+    from robochoc.journal.as_rows import cost_rows
+
+    if not (found := cost_rows(read)):
+        why = "there are no costs: the run minimised nothing, found no assignment, or was killed"
+        raise Failure(INVALID, _one_line(f"{file}: {why} (journals of DCOPs have costs)"))
+    table = io.StringIO()
+    writer = csv.DictWriter(table, found[0], lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(found)
+    if output is None:
+        click.echo(table.getvalue(), nl=False)
+    else:
+        _write(output, table.getvalue().encode(), count=len(found), unit="cost")
+
+
+def _write(output: Path, content: bytes, *, count: int, unit: str = "message") -> None:
+    """Write an export of `count` messages or costs to a file, and print the file's size."""
     from robochoc.system.files import write_atomically
 
     try:
@@ -109,7 +135,7 @@ def _write(output: Path, content: bytes, *, count: int) -> None:
     except OSError as error:
         why = f"{output}: the export cannot be written: {error.strerror} (free some space, or name another file)"
         raise Failure(INVALID, _one_line(why)) from error
-    click.echo(f"{output}: {count:,} message{'s' * (count != 1)}, {len(content):,} bytes")
+    click.echo(f"{output}: {count:,} {unit}{'s' * (count != 1)}, {len(content):,} bytes")
 
 
 def _pieces(
