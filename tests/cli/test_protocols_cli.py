@@ -27,6 +27,7 @@ from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
 WITHOUT_DOCSTRING = """
+    from robochoc.protocols.local_search.dsa import DSA
     from robochoc.protocols.satisfaction.first_fit import FirstFit
     from robochoc.protocols.satisfaction.first_fit_messages import Placed
     from robochoc.protocols.dynamic import DynamicProtocol
@@ -43,6 +44,9 @@ WITHOUT_DOCSTRING = """
         def change(self, problem, order, invalidated): ...
 
         def resume(self, *, lossless): ...
+
+    class Variant(DSA):
+        pass
 
     class Static(FirstFit):
         traits = Traits(dynamic=True)
@@ -73,6 +77,7 @@ def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (about / "METADATA").write_text("Metadata-Version: 2.1\nName: others-protocols\nVersion: 1.2\n")
     places = {
         "zz-other": "others:Other",
+        "zz-variant": "others:Variant",
         "zz-odd": "others:Odd",
         "zz-static": "others:Static",
         "zz-number": "others:NUMBER",
@@ -177,6 +182,13 @@ def test_other_packages_protocols_are_listed_beside_ours() -> None:
     assert told.split()[1:7] == ["optimisation", "no", "yes", "binary,", "PKC", "yes"]
     assert r"[bold]Nobody[/bold] 1999\n" in told
     assert "decisions" in told
+
+
+@pytest.mark.usefixtures("package")
+def test_a_variant_does_not_inherit_the_form_as_arrays() -> None:
+    assert "also as arrays" in run("dsa").stdout
+    assert "also as arrays" not in run("zz-variant").stdout
+    assert objects(run("--json"))["zz-variant"]["arrays"] is False
 
 
 @pytest.mark.usefixtures("package")

@@ -7,7 +7,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 import click
 import msgspec
@@ -132,11 +132,14 @@ def _row(offer: InstalledProtocol) -> ProtocolRow:
     if offer.protocol is None:
         return ProtocolRow(offer.name, offer.place, offer.package, None, offer.broken)
     protocol = offer.protocol
+    traits = protocol.traits
+    if traits.arrays and "traits" not in vars(protocol):  # inherited: the form as arrays is that of the base class
+        traits = replace(traits, arrays=False)
     return ProtocolRow(
         offer.name,
         offer.place,
         offer.package,
-        protocol.traits,
+        traits,
         module=protocol.__module__,
         settings=protocol.settings,
     )
