@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import cast
 
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.robots.echo_sink import ECHO, EchoSink
 from robochoc.robots.sink import Sink, SinkError
 from robochoc.robots.source import Source, SourceError
 from robochoc.system.entry_points import EntryPoint
@@ -35,6 +36,8 @@ class UnknownSourceError(SourceError):
 def open_sink(text: str) -> Sink:
     """Return the sink named by `text`. Raises `UnknownSinkError`, and `SinkError` if it cannot be opened."""
     name, place = _parts(text)
+    if name == ECHO:
+        return EchoSink(place)
     return cast("type[Sink]", _load_class(SINKS, "sink", name, Sink, UnknownSinkError))(place)
 
 
@@ -70,7 +73,7 @@ def _load_class(group: str, kind: str, name: str, base: type, error_type: type[E
         hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
         if "?" in name:
             hint = f"; options follow a colon: {name.replace('?', ':?', 1)}"
-        also = ("flight",) if group == SOURCES else ()  # the simulated source
+        also = ("flight",) if group == SOURCES else (ECHO,)  # not entry points
         raise error_type(on_one_line(not_installed_message(group, kind, name, also=also) + hint))
     entry = entries[0]
     missing = _missing_extra(entry) if len(entries) == 1 else ""

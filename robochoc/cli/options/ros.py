@@ -112,7 +112,7 @@ ros_options = _all_of(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish waypoints: mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
+            "Publish waypoints: echo (print), mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
             ", mavlink:FILE, crazyflie:FILE, others. Repeatable."
         ),
     ),
