@@ -275,7 +275,9 @@ def mission_of(
         ValueError: See `MissionBuilder`.
     """
     epochs = outcome.epochs or (
-        EpochOutcome(outcome.verdict, robots=team.order if team else (), assignment=outcome.assignment),
+        EpochOutcome(
+            outcome.verdict, robots=team.order if team else (), assignment=outcome.assignment, cost=outcome.cost
+        ),
     )
     decided = [epoch.assignment for epoch in epochs if epoch.verdict != Verdict.NO_SOLUTION]
     first: dict[str, int] = {}

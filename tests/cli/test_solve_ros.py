@@ -18,7 +18,7 @@ from robochoc.robots.closed_loop import drones_of_robot, leg_of_robot
 from robochoc.ros.recordings.mcap_file import McapSink
 from tests.support.deployments import Deployment, ended
 from tests.support.program import ROOT
-from tests.support.solve_ros import HANGAR, MET, OPENINGS, SCOUTS, epochs, published, ran, solved
+from tests.support.solve_ros import HANGAR, MET, OPENINGS, PATROL, SCOUTS, epochs, published, ran, solved
 
 RESCUE = ROOT / "docs" / "examples" / "rescue"
 FOUR = ROOT / "instances" / "queens3d-4"
@@ -234,6 +234,15 @@ def test_echo_prints_each_message_with_its_topic_and_type(tmp_path: Path) -> Non
     assert json.loads(result.stdout)["verdict"] == "solution"
     refused = ran("solve", tmp_path / "warehouse", "--ros", "echo:file")
     assert (refused.exit_code, "echo prints messages, and has no place" in refused.stderr) == (1, True)
+
+
+def test_the_status_of_a_team_with_costs_has_the_cost() -> None:
+    result = ran(
+        "solve", PATROL, "--protocol", "dpop", "--runtime", "simulator", "--json", "--ros", "echo", "--diagnostics"
+    )
+    (status,) = (line for line in result.stderr.splitlines() if line.startswith("/diagnostics "))
+    values = json.loads(status.split(" ", 2)[2])["status"][0]["values"]
+    assert {"key": "cost", "value": str(json.loads(result.stdout)["cost"])} in values
 
 
 def test_places_near_each_other_are_published_as_they_are(tmp_path: Path) -> None:
