@@ -182,7 +182,9 @@ def codes_of(domain: object, symbols: Symbols, place: SourceLine) -> DomainCodes
     if domain is bool:
         domain = (False, True)
     if isinstance(domain, str):
-        raise ModelTypeError(f"the domain {domain!r} is one text", f"use a list of values: {domain.split()!r}", place)
+        raise ModelTypeError(
+            f"the domain {domain!r} is a single text", f"use a list of values: {domain.split()!r}", place
+        )
     if not isinstance(domain, Iterable):
         raise ModelTypeError(f"invalid domain {domain!r}", "expected a range, an Enum, or a list of values", place)
     values = list(itertools.islice(domain, MAX_VALUES + 1))

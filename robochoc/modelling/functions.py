@@ -151,14 +151,14 @@ def _several(terms: tuple[object, ...]) -> list[Term]:
 def _extreme(operator: str, terms: tuple[object, ...]) -> Term:
     found = [number(one) for one in _several(terms)]
     if not found:
-        raise ModelError(f"{operator} of an empty list")
+        raise ModelError(f"{operator} requires a list with at least one term")
     return Operation(operator, *found) if len(found) > 1 else found[0]
 
 
 def _scope(terms: object) -> tuple[Term, ...]:
     found = _several((terms,)) if not isinstance(terms, Term) else [terms]
     if not found:
-        raise ModelError("a table without terms")
+        raise ModelError("a table requires at least one term")
     return tuple(found)
 
 

@@ -54,7 +54,7 @@ def exact(value: object) -> Exact:
         return _whole_if_possible(Fraction(value))
     if isinstance(value, Decimal) and value.is_finite():
         if value and not -_FAR <= value.adjusted() <= _FAR:
-            raise ModelError(f"the number {value} is too large, or too small", "a cost has at most 18 digits")
+            raise ModelError(f"the number {value} is too large or too small", "a cost has at most 18 digits")
         return _whole_if_possible(Fraction(value))
     if isinstance(value, Real) and math.isfinite(value):
         return _whole_if_possible(Fraction(str(value)))
@@ -80,7 +80,7 @@ def places_of(value: Exact, place: SourceLine | None = None) -> int:
     places = _places(value)
     if places is not None:
         return places
-    hint = "round it: minimize(..., places=3) and maximize(..., places=3) round every cost, round(cost, 3) rounds one"
+    hint = "round all costs by minimize(..., places=3) or maximize(..., places=3), or one cost by round(cost, 3)"
     text = float(value) or f"close to {'-' * (value < 0)}0"
     raise ModelError(f"the cost {text} has more than {MAX_PLACES} decimal places", hint, place)
 

@@ -112,7 +112,7 @@ class Solution(Outcome, Mapping[str, object]):
             try:
                 return what.value({variable: self[variable] for variable in what.variables})
             except UndefinedTermError:
-                raise UnknownNameError(f"{what!r} has no value: a division by zero") from None
+                raise UnknownNameError(f"{what!r} has no value: its evaluation divides by zero") from None
         if not isinstance(what, str):
             raise ModelTypeError(f"{what!r} is not a key", "expected a variable, a term of variables, or a name")
         return self._value(what)

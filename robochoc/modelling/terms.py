@@ -177,12 +177,12 @@ class Term:
     def __bool__(self) -> NoReturn:
         raise ModelTypeError(
             f"{self!r} has no truth value before the problem is solved",
-            "in place of and, or, not, if, in, write & | ~ .implies() .is_in(); of 1 < x < 3, (1 < x) & (x < 3);"
-            " of all, any, min, max, all_of, any_of, minimum, maximum",
+            "write & | ~ for and, or, not; .implies() for if; .is_in() for in; (1 < x) & (x < 3) for 1 < x < 3;"
+            " all_of, any_of, minimum, maximum for all, any, min, max",
         )
 
     def __iter__(self) -> NoReturn:
-        raise ModelTypeError(f"{self!r} is one term, not a list of terms")
+        raise ModelTypeError(f"{self!r} is one term, not a list of terms", "put it in a list")
 
     def __deepcopy__(self, memo: dict[int, object]) -> Term:
         """Return a copy. The deepest subterms are copied first, since recursion could exceed Python's limit."""

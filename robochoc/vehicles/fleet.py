@@ -152,7 +152,7 @@ def _fleet(root: Node, kind: VehicleKind) -> Fleet:
     if fleet.takeoff_m > high - low:
         line = (root.get("takeoff") or box).line
         raise MistakeError(
-            f"a take-off to {fleet.takeoff_m:g} m leaves a fence that is {high - low:g} m high",
+            f"a take-off to {fleet.takeoff_m:g} m would leave the fence, which is {high - low:g} m high",
             "raise the fence, or lower 'takeoff'",
             line,
         )

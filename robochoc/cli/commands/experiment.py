@@ -82,7 +82,9 @@ def run(
         return
     workers = _workers(scheduler, dask)
     if workers and any(setup.runtime not in {"simulator", "arrays"} for setup, *_ in read.setups):
-        click.echo(f"{read.name}: runs with one process per robot run here, not on the cluster", err=True)
+        click.echo(
+            f"{read.name}: runs with one process per robot are executed on this machine, not on the cluster", err=True
+        )
     with open_store(path) as store, _cluster_loss_as_failure(workers):
         ended = carry_out(read, store, jobs, workers, again)
     click.echo(ended_line(read.name, ended), err=True)

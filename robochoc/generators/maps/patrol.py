@@ -94,7 +94,9 @@ def patrol(
     if agents * rounds > count:
         raise ValueError(f"{agents} robots make {agents * rounds} visits, more than {count} points; use more points")
     if count**rounds > MAX_PLANS:
-        raise ValueError(f"{count} points in {rounds} rounds have more than {MAX_PLANS:,} plans; use fewer of them")
+        raise ValueError(
+            f"{count} points in {rounds} rounds give more than {MAX_PLANS:,} plans; use fewer points or rounds"
+        )
     if count > len(reachability.reached):
         raise ValueError(
             f"robots can reach {len(reachability.reached)} cells, fewer than {count} points; use smaller cells"

@@ -67,11 +67,11 @@ OPTION_RULES = (
     ),
     OptionRule(
         lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
-        "--delay is only for --schedule concurrent: in random they are arbitrary, in cycles one cycle",
+        "--delay is only for --schedule concurrent: with random, delays are arbitrary, and with cycles one cycle",
     ),
-    OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: give one of them"),
+    OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: remove one of them"),
     OptionRule(lambda o: o.improve and not o.deadline, "--improve continues after --deadline SECONDS: add --deadline"),
-    OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
+    OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss must be a probability from 0 to 0.9"),
     OptionRule(
         lambda o: o.loss and (o.runtime == Runtime.ARRAYS or o.preprocess or o.wants_anytime),
         "--message-loss cannot be used with --runtime arrays, --preprocess or --set anytime=yes",
@@ -83,16 +83,16 @@ OPTION_RULES = (
     ),
     OptionRule(
         lambda o: o.cycles is not None and o.schedule != ScheduleName.CYCLES,
-        "--cycles is a limit on the simulator's cycles",
+        "--cycles limits the cycles of the simulator",
         "add --runtime simulator --schedule cycles (a local search has its own number of cycles: --set cycles=N)",
     ),
     OptionRule(
         lambda o: o.protocol == CENTRAL and o.verify,
-        "--verify asks the central solver: --protocol central is already its answer",
+        "--verify calls the central solver: remove it, since --protocol central uses that solver already",
     ),
     OptionRule(
         lambda o: o.patience is not None and (o.protocol == CENTRAL or o.runtime in _WITHOUT_PROCESSES),
-        "--patience is for robots with processes, which can be stopped",
+        "--patience is only for robots that run as processes",
         "remove it",
     ),
     _for_robots("--messages", lambda o: o.messages),
@@ -111,12 +111,12 @@ OPTION_RULES = (
     _for_robots("--preprocess", lambda o: o.preprocess),
     OptionRule(
         lambda o: o.preprocess and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
-        "--preprocess is only for robots in processes or in the simulator",
+        "--preprocess is only for robots that run as processes or in the simulator",
         "remove it",
     ),
     OptionRule(
         lambda o: o.protocol == CENTRAL and o.withdraw == Withdrawal.MAXIMAL,
-        "--withdraw maximal is decided by the robots, in priority order, and not by the central solver",
+        "--withdraw maximal is not supported by the central solver: robots decide it, in priority order",
         "use --withdraw minimum",
     ),
     OptionRule(
@@ -135,32 +135,32 @@ OPTION_RULES = (
     ),
     OptionRule(
         _starts_programs_without,
-        "--runtime network starts programs that do not know a protocol registered by this program",
+        "--runtime network starts other programs, which do not know a protocol registered by this program",
         "add --runtime processes, or install the protocol as a package",
     ),
     OptionRule(
         lambda o: o.filters and o.runtime != Runtime.NETWORK,
-        "--filter is for messages that cross a network",
+        "--filter is only for messages over a network",
         "add --runtime network",
     ),
     OptionRule(
         lambda o: o.bounds and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
-        "--bounds is only for robots in processes or in the simulator",
+        "--bounds is only for robots that run as processes or in the simulator",
         "remove it",
     ),
     OptionRule(
         lambda o: o.spares and o.runtime == Runtime.NETWORK,
-        "--spare starts processes of this machine again",
+        "--spare restarts only processes on this machine",
         "remove --runtime network",
     ),
     OptionRule(
         lambda o: (o.on_loss or o.spares) and o.runtime in _WITHOUT_PROCESSES,
-        "--on-loss and --spare are for processes, which can die",
+        "--on-loss and --spare are only for robots that run as processes",
         "remove --runtime, or write a scenario.xml",
     ),
     OptionRule(
         lambda o: o.kill and o.runtime in _WITHOUT_PROCESSES,
-        "--kill ends a robot's process, and the simulator and arrays have none",
+        "--kill ends a robot's process: the simulator and arrays do not use processes",
         "remove --runtime",
     ),
     OptionRule(

@@ -73,7 +73,7 @@ def test_a_refused_run_has_one_reason(caplog: pytest.LogCaptureFixture) -> None:
 @looped(
     ("options", "why"),
     [
-        (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator and arrays have none"),
+        (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator and arrays do not use processes"),
         (Options(kill=(Kill("RA", 1),), protocol="central"), "--kill is for robots .*not for --protocol central"),
         (Options(kill=(Kill("RZ", 1),)), "names a robot that .* does not have"),
     ],

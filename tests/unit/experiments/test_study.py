@@ -171,7 +171,7 @@ WRONG = {
     "a title of two lines": (f'title = "a\\nb"\n{SMALL}', 1, "expected one line"),
     "a range with a dash": (SMALL.replace('"1..3"', '"1-3"'), 8, "a range is written 1..30"),
     "NCCCs of processes": (f'{SMALL}runtime = "processes"\nncccs = 3\n', 10, "--ncccs is only for the simulator"),
-    "cycles of none": (f"{SMALL}cycles = 3\n", 10, "--cycles is a limit on the simulator's cycles"),
+    "cycles of none": (f"{SMALL}cycles = 3\n", 10, "--cycles limits the cycles of the simulator"),
     "too narrow": (f"{SMALL}[report]\nwidth = 0.5\n", 13, "report: width: expected a number >= 2.0"),
     "unknown wish": (f'{SMALL}[report]\nabove = "x"\n', 13, "report: there is no field 'above'; did you mean 'over'?"),
 }

@@ -186,7 +186,7 @@ def test_distances_are_costs_once_they_are_rounded() -> None:
 
     assert model_of(3).solve("dpop", runtime="simulator").cost == Decimal("6.378")  # 1 + 2.236 + 3.142
     assert model_of(0).solve("dpop", runtime="simulator").cost == 6
-    with pytest.raises(robochoc.ModelError, match=r"decimal places \(round it: minimize\(..., places=3\)"):
+    with pytest.raises(robochoc.ModelError, match=r"decimal places \(round all costs by minimize\(..., places=3\)"):
         _ = model_of(None).team
     with pytest.raises(robochoc.ModelError, match="expected an integer from 0 to 9"):
         model_of(10)

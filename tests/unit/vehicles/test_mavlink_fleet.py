@@ -100,7 +100,7 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
         (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, true]]", "a corner of the fence is not a place"),
         (
             f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [9, 9, 2]]",
-            "a take-off to 2.5 m leaves a fence that is 2 m high",
+            "a take-off to 2.5 m would leave the fence, which is 2 m high",
         ),
         (f"{GOOD}origin: [47, 8]", "'origin' is not a place"),
         (f"{GOOD}origin: [80, 8, 0]", "'origin' is outside the limits; expected latitudes within 75"),

@@ -134,7 +134,7 @@ def _parsed(source: str) -> list[ast.stmt]:
             warnings.simplefilter("ignore")  # warnings on the user's text, such as "\d" in a string
             body = ast.parse(source.lstrip()).body
     except SyntaxError as error:
-        what = f"the function is not valid Python: {error.msg}, in its line {error.lineno}"
+        what = f"the function is not valid Python: {error.msg}, in line {error.lineno} of the function"
         raise MistakeError(what, "write an expression, or lines with a return") from None
     except (ValueError, RecursionError, MemoryError):
         what = "the function is not valid Python, or is nested too deeply"
@@ -437,4 +437,4 @@ def _refuse(node: ast.AST) -> NoReturn:
             pass
     line = getattr(node, "lineno", 1)
     hint = "use arithmetic, comparisons, conditions, lists, loops over lists, and the documented functions"
-    raise MistakeError(f"the function contains {what}, in its line {line}, which is not allowed", hint)
+    raise MistakeError(f"line {line} of the function contains {what}, which is not allowed", hint)

@@ -154,7 +154,7 @@ def _check_model(read: _TaskList, mistakes: DiagnosticCollector) -> None:
 def _check_symbols(tasks: Mapping[str, TaskEntry]) -> None:
     for name, task in tasks.items():
         if name == NONE:
-            raise MistakeError(f"the name '{NONE}' of a task means no task", "rename the task", task.line)
+            raise MistakeError(f"the name '{NONE}' is reserved, and means no task", "rename the task", task.line)
         try:
             check_symbol(name)
         except MistakeError as mistake:
@@ -241,7 +241,7 @@ class _TaskTeamBuilder:
         self._sets += len(lengths)
         if self._sets > MAX_CONSTRAINTS:
             what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} tours"
-            raise MistakeError(what, "write fewer robots, or a smaller most:")
+            raise MistakeError(what, "use fewer robots, or a smaller number in most:")
         hurries = any(entry.deadline is not None for entry in placed.values())
         return {tasks: round_length(length, self._scale.places) for tasks, length in lengths.items()}, hurries
 
@@ -249,7 +249,7 @@ class _TaskTeamBuilder:
         able = sum(self._number[name] in one.profit for one in workers)
         if task.robots > 1 and able > MAX_CREW:
             what = f"the task '{shortened(name)}' requires {task.robots} robots, and {able} robots can do it"
-            raise MistakeError(what, f"use needs: so that at most {MAX_CREW} robots can do it", task.line)
+            raise MistakeError(what, f"restrict it by needs: to at most {MAX_CREW} robots", task.line)
         return TaskSpec(self._task_names.allowed(name), task.load, task.robots)
 
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:

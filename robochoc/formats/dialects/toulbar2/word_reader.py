@@ -38,7 +38,9 @@ class WordReader:
         """Return the next word. Raises `MistakeError`, which names `what`, at the end of the file."""
         found = next(self._words, None)
         if found is None:
-            raise MistakeError(f"expected {what}, found the end of the file", "check that it is complete", self.line)
+            raise MistakeError(
+                f"expected {what}, found the end of the file", "check that the file is complete", self.line
+            )
         self.line, word = found
         return word
 

@@ -139,7 +139,7 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
 @looped(
     ("text", "told"),
     [
-        ("robots: {a: }\ntasks: {none: {worth: 1}}\nmodel: assignment", "2: the name 'none' of a task means no task"),
+        ("robots: {a: }\ntasks: {none: {worth: 1}}\nmodel: assignment", "2: the name 'none' is reserved"),
         ("robots: {a: }\ntasks: {t t: {worth: 1}}\nmodel: assignment", "2: 't t'"),
         ("robots: {a: }", "has no tasks"),
         ("robots: 3\ntasks: 4", "1: robots is not a mapping"),
