@@ -19,7 +19,7 @@ from robochoc.cli.reports.failures import invalid_input_fails
 @serve_option
 @team_option
 @map_option
-@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of --serve; 0: any free one.")
+@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of --serve; 0 is a free port.")
 @invalid_input_fails
 def animate(
     saved: Path, html: Path | None, folder: Path | None, ground: Path | None, port: int, *, serve: bool

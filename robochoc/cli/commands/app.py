@@ -12,7 +12,7 @@ from robochoc.cli.reports.failures import USAGE, Failure
 
 
 @click.command()
-@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port; 0: any free one.")
+@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of the page; 0 is a free port.")
 @click.option("--no-open", is_flag=True, help="Print the address without opening a browser.")
 @click.option(
     "--folder",

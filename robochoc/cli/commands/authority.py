@@ -51,7 +51,9 @@ def init(folder: Path | None) -> None:
 
         created = Authority.create(folder or default_authority_folder())
         until = created.certificate.not_valid_after_utc
-        click.echo(f"{created.folder}: a new Authority, until {until:%Y-%m-%d}; next: robochoc authority enrol NAME")
+        click.echo(
+            f"{created.folder}: a new Authority, valid until {until:%Y-%m-%d}; next: robochoc authority enrol NAME"
+        )
 
 
 @authority.command(short_help="Enrol robots or observers: one token per name.")
@@ -142,7 +144,7 @@ def list_members(folder: Path | None, *, as_json: bool) -> None:
         click.echo("no names are enrolled; next: robochoc authority enrol NAME")
 
 
-@authority.command(short_help="Revoke a name, at once.")
+@authority.command(short_help="Revoke a name immediately.")
 @click.argument("name")
 @authority_option
 def revoke(name: str, folder: Path | None) -> None:

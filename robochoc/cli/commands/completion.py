@@ -25,5 +25,5 @@ def completion(shell: str) -> None:
 
     kind = get_completion_class(shell)
     if kind is None:
-        raise click.UsageError(f"completion is not available for {shell}")
+        raise click.UsageError(f"no completion script exists for {shell}: use bash, zsh or fish")
     click.echo(kind(cli, {}, "robochoc", VARIABLE).source())

@@ -33,7 +33,7 @@ PAGE = Path("robochoc-demo.html")
 @click.option(
     "--no-open",
     is_flag=True,
-    help="Do not open the page in a browser. Without a terminal and windows, it is never opened.",
+    help="Do not open the page in a browser. It is opened only from a terminal on a desktop.",
 )
 @click.pass_context
 def demo(context: click.Context, page: Path, *, no_open: bool) -> None:

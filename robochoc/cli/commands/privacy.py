@@ -24,7 +24,7 @@ MEASURES = ("linear", "entropy", "known")
 @click.argument("journal", type=InputPath(), metavar="JOURNAL")
 @click.option("--run", "number", type=WholeNumber(1), metavar="N", help="Run or epoch N.  [default: the last]")
 @click.option(
-    "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure of the table."
+    "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure shown in the table."
 )
 @click.option(
     "--html", type=OutputFile(), metavar="FILE", help="Write a page with the loss of each robot to each other robot."

@@ -59,7 +59,7 @@ def robot(
     as_json: bool,
     **given: Any,  # noqa: ANN401 - options of the run and of compilation
 ) -> None:
-    """Run the robot of FILE on this machine, in the next run of a master.
+    """Run the robot in FILE on this machine, in the next run of a master.
 
     The robot reads only its own file. Its first run requires a token (robochoc authority enrol), which it exchanges for
     a certificate. Later runs use the certificate, and renew it.

@@ -75,9 +75,9 @@ def serve(
 ) -> None:
     """Solve teams on request: a ROS 2 service, for behaviour trees and other nodes. Only rclpy requires ROS here.
 
-    A request of /robochoc/decide (robochoc_msgs/srv/Decide) has a team's name and changes of its problem. Each team
-    also has /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other; /robochoc/cancel
-    (std_srvs/srv/Trigger) ends the current decision.
+    A request to /robochoc/decide (robochoc_msgs/srv/Decide) contains a team's name and changes to its problem. Each
+    team also has /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other;
+    /robochoc/cancel (std_srvs/srv/Trigger) ends the current decision.
 
     \b
     robochoc serve hangar

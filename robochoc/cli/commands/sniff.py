@@ -76,7 +76,7 @@ def master_options(command: Command) -> Command:
 @click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("journal", type=InputPath(), metavar="[JOURNAL]", required=False)
 @master_options
-@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of the page; 0: any free one.")
+@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of the page; 0 is a free port.")
 @click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser.")
 @click.option(
     "--robots",

@@ -172,7 +172,7 @@ _SECTIONS: Sections = {
     metavar="NAME",
     help="--protocol central: ace (default) or ortools.",
 )
-@click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum centrally.")
+@click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum by a central solver.")
 @local_options
 @format_option
 @reading_options

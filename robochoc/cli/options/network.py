@@ -87,7 +87,7 @@ def token_options() -> Callable[[Command], Command]:
             expose_value=False,
             callback=_note_file,
             metavar="FILE",
-            help="Enrol with the token in FILE, which others must not be able to read; -: standard input.",
+            help="Enrol with the token in FILE, which only you may read; - is standard input.",
         ),
         click.option(
             "--token",

@@ -142,7 +142,7 @@ flight_options = _all_of(
         "--distance",
         type=Finite(0, min_open=True),
         metavar="METRES",
-        help="Minimum between drones.  [default: 0.5 or less]",
+        help="Minimum distance.  [default: 0.5 or less]",
     ),
     click.option(
         "--downwash",

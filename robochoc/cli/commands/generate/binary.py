@@ -106,7 +106,7 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
     show_default=True,
     help="Neighbours of the same colour cost 1, or the random weight of their edge, or are forbidden.",
 )
-@number_option("--max-cost", "weighted: weights are uniform up to this.", most=MAX_COST, default=10)
+@number_option("--max-cost", "weighted: maximum weight of an edge.", most=MAX_COST, default=10)
 @places_option
 @seed_option
 @writes_team("coloring-AGENTS-COLORS-GRAPH-SEED[-connected]")

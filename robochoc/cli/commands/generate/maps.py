@@ -145,7 +145,7 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
 )
 @map_options
 @measure_option("--sensing", "Range of sight, along free lines.", 3.0)
-@measure_option("--worth", "Travel time that seeing one square (or cubic) metre is worth.", 10.0, "SECONDS")
+@measure_option("--worth", "Worth of seeing a square (or cubic) metre, as travel time.", 10.0, "SECONDS")
 @seed_option
 @writes_team("coverage-MAP-AGENTS-SEED")
 def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
@@ -177,7 +177,7 @@ def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
 @click.option("--visit", default="", metavar="'X,Y X,Y'", help="The points, in metres, instead of random ones.")
 @number_option("--idle", "Points were last visited 0 to N seconds ago.", least=0, most=1_000_000, default=120)
 @number_option("--rounds", "Number of visits that each robot plans.", most=4, default=1)
-@measure_option("--apart", "Robots nearer to each other than this have a cost.", 2.0)
+@measure_option("--apart", "Robots that are closer than this incur a cost.", 2.0)
 @seed_option
 @writes_team("patrol-MAP-AGENTS-POINTS-ROUNDS-SEED")
 def patrol(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `patrol`'s own

@@ -141,7 +141,7 @@ def grid_sensors(**problem: Any) -> Team:  # noqa: ANN401 - `grid_sensors`'s own
 @number_option("--mobility", "Number of cells that a robot can move.", least=0, most=100, default=1)
 @number_option("--sensing", "Range of sight, in cells.", least=0, most=100, default=2)
 @number_option("--requirement", "Required coverage of a target.", default=100)
-@number_option("--credibility", "Each robot covers 1 to N of that.", default=30)
+@number_option("--credibility", "Coverage by one robot: 1 to N.", default=30)
 @seed_option
 @writes_team("tracking-AGENTS-TARGETS-SIDExSIDE-MOBILITY-SENSING-REQUIREMENT-CREDIBILITY-SEED")
 def tracking(**problem: Any) -> Team:  # noqa: ANN401 - `tracking`'s own
