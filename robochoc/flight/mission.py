@@ -251,7 +251,9 @@ def check_scale(scale: float | None, ground: GroundMap | None) -> None:
     """Raise `ValueError` if a map has walls, and `scale` differs from its scale."""
     walled = ground and (ground.walls or (ground.volume and ground.volume.walls))
     if ground and walled and scale not in {None, ground.scale}:
-        raise ValueError(f"the scale is {scale:g} m, but a map with walls has the scale {ground.scale:g} m: omit it")
+        raise ValueError(
+            f"the scale is {scale:g} m, but the map with walls has the scale {ground.scale:g} m: omit the scale"
+        )
 
 
 def mission_of(

@@ -66,7 +66,7 @@ class WallWatch:
             where = "in a wall" if not leave else f"{leave:.2g} m from a wall"
             name = self._names[worst % len(self._names)]
             place = self._point_text(places[worst])
-            raise ValueError(f"the place of {name}, {place}, is {where} or an unknown part of the map")
+            raise ValueError(f"{name} is at {place}, {where} or an unknown part of the map: choose another position")
         return self._keeping(wish) if leave >= wish else self._leaving(leave)
 
     def floor(self, place: Array) -> float | None:

@@ -101,7 +101,7 @@ def _difference(
         return ""  # variables of a robot whose file is invalid
     if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
         return (
-            "has another definition than the child's constraint, and its tuples are too many to compare"
+            "has another definition than the child's constraint, and has too many tuples to compare"
             f" (more than {MAX_COMPARED})"
         )
     copy_costs = [_cost_function(constraint, variables, units) for constraint in copies]
@@ -110,7 +110,8 @@ def _difference(
         here, there = sum(cost(values) for cost in copy_costs), sum(cost(values) for cost in child_costs)
         if here != there:
             shown = shortened(" ".join(map(str, values)))
-            return f"differs: '{shown}' is {_in_words(here, units)}, and with the child {_in_words(there, units)}"
+            own, other = _in_words(here, units), _in_words(there, units)
+            return f"differs: '{shown}' is {own} here, and {other} in the child's file"
     return ""
 
 

@@ -71,7 +71,9 @@ def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, .
     """
     _refuse_events(model, "conflict()")
     if model.given is not None:
-        raise UnsupportedError("conflict() names constraints added to a model; this model was loaded, and has others")
+        raise UnsupportedError(
+            "conflict() requires constraints that were added by add(); this model was loaded from files"
+        )
     until = None if timeout is None else time.monotonic() + timeout
     every = _constraints(model)
     hard = [place for place, one in enumerate(every) if one.cost is None]

@@ -107,7 +107,7 @@ class Rebuilder:
 
     def __init__(self, header: Header | None, options: ReplayOptions, only: Collection[str] | None = None) -> None:
         if header is not None and header.message_loss:
-            raise CannotReplayError("messages were lost in it (--message-loss), which no journal records")
+            raise CannotReplayError("messages were lost (--message-loss), and journals do not record which")
         self._header = header
         self._options = options
         self._only = only

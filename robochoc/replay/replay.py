@@ -136,7 +136,7 @@ class _JournalReplay:
             self._show(f"run {run.number + 1}: creating the robots")
             robots = self._rebuilder.robots_of(run)
             if robots.protocol.traits.secret_keys and self._journal.header.runtime == "network":
-                raise CannotReplayError("its robots have drawn keys on their machines, which no journal contains")
+                raise CannotReplayError("its robots used random keys, which journals do not contain")
             self._runs += 1
             self._counts.update({name: 0 for name in robots.hosts if name not in self._counts})
             difference = self._play(RunReplay(run, robots, self._journal.header))

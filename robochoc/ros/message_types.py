@@ -223,7 +223,7 @@ class Types:
         def make(value: object) -> object:
             time_ns = _integer(value)
             if not low <= time_ns // _SECOND_NS < 1 << 31:
-                raise _FieldError(f"must be a time of ROS {self.version} in nanoseconds, is {value!r}")
+                raise _FieldError(f"must be a time of ROS {self.version} in nanoseconds, not {value!r}")
             return made(time_ns // _SECOND_NS, time_ns % _SECOND_NS)
 
         def nanoseconds(time: Any) -> int:  # noqa: ANN401 - the type of rosbags, which reads signed seconds
@@ -260,7 +260,7 @@ class Types:
 
         def make(values: object) -> object:
             if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
-                raise _FieldError(f"must be a list, is {values!r}")
+                raise _FieldError(f"must be a list, not {values!r}")
             found = [*values]
             if len(found) != fixed if fixed is not None else number and len(found) > number:
                 raise _FieldError(
@@ -296,7 +296,7 @@ def _field_type(desc: Any) -> FieldType:  # noqa: ANN401 - the library's tuples
 def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Conversion]]) -> list[Any]:
     """Return the values of all fields of `kind`. Raises `_FieldError`."""
     if not isinstance(value, Mapping):
-        raise _FieldError(f"must be fields by their names, is {value!r}")
+        raise _FieldError(f"must be fields by their names, not {value!r}")
     names = {field for field, _ in parts}
     if not value.keys() <= names:
         unknown = next(iter(value.keys() - names))
@@ -330,7 +330,7 @@ def _scalar(kind: str, limit: int) -> _Conversion:
     def make(value: object) -> int:
         integer = _integer(value)
         if not low <= integer <= high:
-            raise _FieldError(f"must be a whole number from {low} to {high}, is {value!r}")
+            raise _FieldError(f"must be a whole number from {low} to {high}, not {value!r}")
         return integer
 
     return _Conversion(make, unchanged, 0)
@@ -339,17 +339,17 @@ def _scalar(kind: str, limit: int) -> _Conversion:
 def _text(value: object, limit: int) -> str:
     if not isinstance(value, str) or "\0" in value or (limit and len(value) > limit):
         most = f" of at most {limit} characters" if limit else ""
-        raise _FieldError(f"must be text{most} without a NUL, is {value!r}")
+        raise _FieldError(f"must be text{most} without a NUL, not {value!r}")
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise _FieldError(f"must be text that UTF-8 can encode, is {value!r}") from None
+        raise _FieldError(f"must be text that UTF-8 can encode, not {value!r}") from None
     return value
 
 
 def _boolean(value: object) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise _FieldError(f"must be true or false, is {value!r}")
+        raise _FieldError(f"must be true or false, not {value!r}")
     return bool(value)
 
 
@@ -359,13 +359,13 @@ def _float(value: object) -> float:
     if not isinstance(value, bool) and isinstance(value, Real):
         with suppress(OverflowError):
             return float(value)
-    raise _FieldError(f"must be a number, is {value!r}")
+    raise _FieldError(f"must be a number, not {value!r}")
 
 
 def _float32(value: object) -> float:
     number = _float(value)
     if _LARGEST_SINGLE <= abs(number) < math.inf:
-        raise _FieldError(f"must be a number of single precision, is {value!r}")
+        raise _FieldError(f"must be a number of single precision, not {value!r}")
     return number
 
 
@@ -373,7 +373,7 @@ def _integer(value: object) -> int:
     if not isinstance(value, bool):
         with suppress(TypeError):
             return operator.index(value)  # type: ignore[arg-type]  # raises TypeError for other types
-    raise _FieldError(f"must be a whole number, is {value!r}")
+    raise _FieldError(f"must be a whole number, not {value!r}")
 
 
 def same_fields(kind: str, text: str, ours: str) -> bool:

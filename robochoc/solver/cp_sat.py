@@ -215,7 +215,7 @@ class CpSatSolver:
                 continue
             chunk = connection.recv(_CHUNK)
             if not chunk:
-                raise OSError("it hung up")
+                raise OSError("it closed the connection")
             buffer += chunk
 
     def _left_s(self) -> float | None:

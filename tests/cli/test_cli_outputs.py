@@ -59,7 +59,7 @@ def test_animate_refuses_another_team(four: Path) -> None:
     other = ROOT / "docs" / "examples" / "scouts"
     done = robochoc_within("animate", saved, "--team", other, "-o", four.parent / "page.html")
     assert done.returncode == 1
-    assert "the team here is not" in done.stderr
+    assert "the team in this folder is not" in done.stderr
 
 
 def test_animate_says_what_is_missing(tmp_path: Path) -> None:

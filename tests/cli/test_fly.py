@@ -266,7 +266,7 @@ def test_what_cannot_be_flown_is_one_clear_line(two: Path) -> None:
             (("--fail", "nobody"), 2, "there is no drone 'nobody' to fail: choose V1.1, V1.2"),
             (("--fail", "V1.1@-1"), 2, "is not of the form ROBOT or ROBOT@SECONDS"),
             (("--ros", "mcap:run.mcap"), 2, "give their folder with --team"),
-            (("--team", HANGAR), 1, "the team here is not"),
+            (("--team", HANGAR), 1, "the team in this folder is not"),
         ]:
             with each(words):
                 result = ran("fly", two, *words)

@@ -104,7 +104,7 @@ def test_solve_flies_and_publishes_in_the_scale_of_the_map(team: Path, tmp_path:
     for more in (("--situation", "flight"), ("--ros", f"mcap:{bag}")):
         refused = ran("solve", team, *simulator, *more, "--scale", "2")
         assert refused.exit_code == 2
-        assert "--scale: the scale is 2 m, but a map with walls has the scale 0.5 m: omit it" in refused.stderr
+        assert "--scale: the scale is 2 m, but the map with walls has the scale 0.5 m: omit the scale" in refused.stderr
 
 
 def test_a_scenario_of_a_team_keeps_its_map(team: Path, tmp_path: Path) -> None:

@@ -84,4 +84,4 @@ def test_a_run_that_has_lost_messages_is_refused_in_one_line(saved: Path, tmp_pa
     run("solve", saved.parent / "team", *lossy, "--journal", journal, "--no-cache")
     refused = run("privacy", journal, "--no-cache")
     assert (refused.exit_code, refused.stdout) == (USAGE, "")
-    assert refused.stderr == f"{journal}: messages were lost in it (--message-loss), which no journal records\n"
+    assert refused.stderr == f"{journal}: messages were lost (--message-loss), and journals do not record which\n"

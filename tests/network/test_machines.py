@@ -119,7 +119,7 @@ def test_who_has_dropped_out_is_named_when_the_time_is_over(site: Deployment) ->
     robot.kill()
     master.wait_to_say("RA has disconnected: it has not been there for 1 s; waiting for its return")
     assert master.hurried_status() == 3
-    assert "awaited: RA (it was there, and has dropped out), RB" in master.errors
+    assert "missing: RA (it was there, and has dropped out), RB" in master.errors
 
 
 @pytest.mark.more

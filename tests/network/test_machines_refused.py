@@ -113,7 +113,7 @@ def test_a_master_that_nobody_joins(site: Deployment) -> None:
     assert (master.hurried_status(), master.output) == (3, "")
     told = master.errors.splitlines()[-1]
     assert "not complete after 3600 s" in told
-    assert "awaited: RA, RB" in told
+    assert "missing: RA, RB" in told
 
 
 @pytest.mark.slow
@@ -123,9 +123,9 @@ def test_a_robot_hears_that_the_others_did_not_come(site: Deployment) -> None:
     master = site.master("--gather", 3600)
     master.wait_to_say("RA has registered")
     assert master.hurried_status() == 3
-    assert "awaited: RB" in master.errors
+    assert "missing: RB" in master.errors
     assert robot.status() == 4
-    assert "awaited: RB" in one_line(robot)
+    assert "missing: RB" in one_line(robot)
 
 
 # What the command line says no to

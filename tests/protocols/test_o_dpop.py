@@ -110,7 +110,7 @@ def test_goods_with_values_that_are_none_are_refused(assignment: list[int]) -> N
 def test_goods_out_of_order_are_refused() -> None:
     robot = root("BC")
     replies(robot, ("RB", Good([1], 5)), ("RC", Good([2], 5)))
-    with pytest.raises(ValueError, match="costs less than its last one"):
+    with pytest.raises(ValueError, match="costs less than its previous good"):
         replies(robot, ("RB", Good([0], 4)))
 
 

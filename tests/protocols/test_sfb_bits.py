@@ -121,7 +121,7 @@ def test_places_that_there_are_not_are_refused_in_two_bytes_as_well() -> None:
     (first, _), (second, _) = both(team_of({"A": range(300), "B": range(300)}, [less]))
     row = first.packed(first.extended(first.nothing([[0.0] * 300]), 1)[:1])
     assert second.read((299).to_bytes(2, "little") + row[2:], 1)
-    with pytest.raises(ValueError, match="values that there are not"):
+    with pytest.raises(ValueError, match="values that do not exist"):
         second.read((300).to_bytes(2, "little") + row[2:], 1)
 
 

@@ -93,7 +93,7 @@ NEIGHBOURS = [
     case("a copy that the child does not have", [told(C4, C5.replace("sum", "lt").replace("W1 V2 V3", "W1 V3"))],
          (R1, 'name="C5"', ("the copy of 'C5'", "'Robot3' has no such constraint"))),
     case("a copy that says something else", [told(C4.replace("ne", "lt"))],
-         (R1, 'name="C4"', ("'2 1' is forbidden, and with the child allowed", "Robot3.xml:25"))),
+         (R1, 'name="C4"', ("'2 1' is forbidden here, and allowed in the", "Robot3.xml:25"))),
     case(
         "a copy too large to compare",
         [

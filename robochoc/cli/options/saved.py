@@ -122,7 +122,7 @@ def saved_team(
         )
     team = read_team(folder) if folder else None
     if team and not _is_team_of(outcome, team):
-        why = f"the team here is not {outcome.team}, the team of {saved} (give its folder with --team)"
+        why = f"the team in this folder is not {outcome.team}, the team of {saved} (give the folder with --team)"
         raise Failure(INVALID, f"{folder}: {why}")
     return team, folder
 

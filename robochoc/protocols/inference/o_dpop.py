@@ -180,7 +180,7 @@ class ODPOP(DPOP):
             raise ValueError(f"{assignment} are not values of {child}'s separator")
         if child in self._waiting:
             if cost < self.last[child] or not np.isnan(self.goods[child][tuple(assignment)]):
-                raise ValueError(f"{child}'s good costs less than its last one, or is a repeated one")
+                raise ValueError(f"{child} sent a good that costs less than its previous good, or repeats one")
             self.goods[child][tuple(assignment)] = cost
         self._receive_bound(child, cost)
 

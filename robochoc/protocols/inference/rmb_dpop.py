@@ -261,10 +261,12 @@ class IncomingPlaces:
         """Append the next piece, of `cells` cells. Raises `ValueError` if the bytes do not fit."""
         rows = self.table.reshape(len(self.table), -1)
         if len(piece) != cells * len(rows) * rows.itemsize or cells > rows.shape[1] - self._start:
-            raise ValueError(f"{len(piece)} bytes are not the places of {len(rows)} robots for {cells} cells")
+            raise ValueError(f"{len(piece)} bytes cannot contain the values of {len(rows)} robots for {cells} cells")
         places = np.frombuffer(piece, rows.dtype).reshape(len(rows), cells)
         if (places >= self._limits).any():
-            raise ValueError(f"a place of a value is too large: the robots have {self._limits.ravel().tolist()} values")
+            raise ValueError(
+                f"the index of a value is too large: the robots have {self._limits.ravel().tolist()} values"
+            )
         rows[:, self._start : self._start + cells] = places
         self._start += cells
 

@@ -296,7 +296,7 @@ class Neighbourhood:
                 larger |= {tuple(sorted((*group, name), key=self._rank.__getitem__)): None for name in others}
                 if len(larger) > MOST_GROUPS:
                     raise TooLargeError(
-                        f"{self._centre} is in more than {MOST_GROUPS:,} groups of {k} robots (--set k=NUMBER)"
+                        f"{self._centre} is in more than {MOST_GROUPS:,} groups of {k} robots: lower k (--set k=NUMBER)"
                     )
             groups = larger or groups
         return [self._fitting(group) for group in groups]
@@ -305,8 +305,8 @@ class Neighbourhood:
         """Return a group; raise `TooLargeError` if its values have too many combinations."""
         if math.prod(self.sizes[name] for name in group) > MOST_COMBINATIONS:
             raise TooLargeError(
-                f"{len(group)} robots around {self._centre} have more than {MOST_COMBINATIONS:,} combinations of values"
-                " (--set k=NUMBER)"
+                f"{len(group)} robots around {self._centre} have more than {MOST_COMBINATIONS:,} combinations of"
+                " values: lower k (--set k=NUMBER)"
             )
         return group
 

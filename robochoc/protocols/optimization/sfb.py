@@ -269,7 +269,7 @@ def costs_prove(content: bytes, count: int, ceiling: int, reception: Reception) 
     size = next(size for size in _SIZES if largest < 1 << 8 * size - (size == _SIZES[-1]))
     columns = _VALUES + rank + sum(map(len, domains[rank:]))
     if len(content) != count * columns * size:
-        raise ValueError(f"{len(content)} bytes are not {count} rows")
+        raise ValueError(f"{len(content)} bytes cannot contain {count} rows")
     for start in range(0, len(content), columns * size):
         cells = [
             int.from_bytes(content[start + at * size : start + (at + 1) * size], "little") for at in range(columns)
@@ -291,7 +291,7 @@ def bits_prove(content: bytes, count: int, reception: Reception) -> Iterator[Pro
     size = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
     length = rank * size + (sum(len(values) + 1 for values in domains[rank:]) + 7) // 8
     if len(content) != count * length:
-        raise ValueError(f"{len(content)} bytes are not {count} rows")
+        raise ValueError(f"{len(content)} bytes cannot contain {count} rows")
     for start in range(0, len(content), length):
         row = content[start : start + length]
         places = [int.from_bytes(row[at * size : (at + 1) * size], "little") for at in range(rank)]
@@ -311,7 +311,7 @@ def _known(reception: Reception) -> tuple[int, list[Sequence[Value]]]:
     domains = [reception.values(robot) for robot in reception.order]
     known = [values for values in domains if values is not None]
     if len(known) < len(domains):
-        raise ValueError("rows arrive before all robots' values")
+        raise ValueError("received rows before the values of all robots")
     return reception.order.index(reception.receiver), known
 
 

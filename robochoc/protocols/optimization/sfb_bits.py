@@ -60,7 +60,7 @@ class ForwardBits:
     def count_up_to(self, ceiling: int) -> None:
         """Check the `ceiling`. Raises `ValueError` if there are costs."""
         if ceiling != CEILING:
-            raise ValueError(f"costs of up to {ceiling - 1} for a problem without costs")
+            raise ValueError(f"received costs of up to {ceiling - 1}, but the problem has no costs")
 
     def nothing(self, charges: Sequence[Sequence[float]]) -> list[Row]:
         """Return the empty partial assignment, with all values of all robots: `charges` are all 0."""
@@ -72,17 +72,17 @@ class ForwardBits:
         chosen = self.rank * self._place_bytes
         length = chosen + _bytes(self._bits + self._own + 1)
         if count < 1 or len(content) != count * length:
-            raise ValueError(f"{len(content)} bytes are not {count} partial assignments")
+            raise ValueError(f"{len(content)} bytes cannot contain {count} partial assignments")
         for robot, size in enumerate(self._above):
             first = robot * self._place_bytes
             if _largest(content, first, self._place_bytes, length) >= size:
-                raise ValueError("a partial assignment has values that there are not")
+                raise ValueError("a partial assignment contains values that do not exist")
         full = self._full << self._own + 1 | (1 << self._own) - 1
         rows = []
         for start in range(0, len(content), length):
             left = int.from_bytes(content[start + chosen : start + length], "little")
             if left & ~full:
-                raise ValueError("a partial assignment has values that there are not")
+                raise ValueError("a partial assignment contains values that do not exist")
             rows.append((content[start : start + chosen], left))
         return rows
 

@@ -93,10 +93,10 @@ class ForwardBounds:
         """
         columns = self._first + self._own + int(self._starts[-1])
         if count < 1 or len(content) != count * columns * self._type.itemsize:
-            raise ValueError(f"{len(content)} bytes are not {count} partial assignments")
+            raise ValueError(f"{len(content)} bytes cannot contain {count} partial assignments")
         rows: Rows = np.frombuffer(content, self._type).reshape(count, columns)
         if (rows[:, VALUES : self._first] >= self._above).any() or (rows < 0).any():
-            raise ValueError("a partial assignment has values that there are not")
+            raise ValueError("a partial assignment contains values that do not exist")
         return rows
 
     @property

@@ -407,7 +407,7 @@ class LinearOrderProtocol(RerootingProtocol):
             raise ValueError(f"received an invalid plan of {len(plan.axes):,} axes")
         if self.is_root:
             if plan.axes != {own.codename: len(own.order)}:
-                raise ValueError("received a plan at the root with other axes than the root's own one")
+                raise ValueError("the root received a plan with other axes than its own axis")
             self.end_turn()
             return
         if self.turn in self.places:

@@ -119,5 +119,5 @@ class AFCTree(AFCng):
     @property
     def _tree(self) -> PseudoTree:
         if self.order.tree is None:
-            raise ValueError("AFC-tree needs an order with its pseudo-tree")
+            raise ValueError("AFC-tree requires an order with a pseudo-tree")
         return self.order.tree

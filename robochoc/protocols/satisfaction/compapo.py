@@ -377,7 +377,7 @@ class CompAPO(Protocol):
     def _accept(self, mediator: str, place: int, changes: Changes) -> None:
         """Adopt the value from the mediator, which has also sent it to all neighbours."""
         if mediator != self.holder or not 0 <= place < len(self.problem.values):
-            raise ValueError(f"{mediator} assigns value number {place + 1}, which it must not")
+            raise ValueError(f"{mediator} is not allowed to assign value number {place + 1}")
         if place != self.value:
             self._change(place)
         self._release(mediator, changes)

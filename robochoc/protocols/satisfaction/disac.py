@@ -148,7 +148,7 @@ class DisAC(Protocol):
         size = len(self.domains.get(sender, ()))
         for place in places:
             if not 0 <= place < size:
-                raise ValueError(f"{sender} removes its value number {place + 1} of {size}")
+                raise ValueError(f"{sender} removes its value number {place + 1}, but has only {size} values")
             self.left[sender] &= ~(1 << place)
 
     def _evaluated(self) -> list[_Table]:

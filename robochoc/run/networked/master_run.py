@@ -211,7 +211,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
     """Wait for the team, and run its search."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = first_names(master.members.waited_for) or "more robots"
-        raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
+        raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; missing: {names}")
     team = registered_team(master, plan.name)
     options = choose_for_private_team(team, plan.options(plan.protocol or AUTO)).options
     name, protocol = options.protocol, protocol_or_stage(options.protocol)

@@ -144,9 +144,9 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
     ):
         fly(sent(team, ground, (1, 1, 2), (2, 1, 0.5)))
     team, ground = floors(tmp_path)
-    with pytest.raises(ValueError, match=r"the place of Robot2, \(1.50, 0.50, 1.00\), is in a wall"):
+    with pytest.raises(ValueError, match=r"Robot2 is at \(1.50, 0.50, 1.00\), in a wall"):
         fly(sent(team, ground, (3.5, 0.5, 0.5), (1.5, 0.5, 1)))
-    with pytest.raises(ValueError, match=r"a map with walls has the scale 0.5 m"):
+    with pytest.raises(ValueError, match=r"the map with walls has the scale 0.5 m"):
         mission_of(
             Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
             team,

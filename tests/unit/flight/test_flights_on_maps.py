@@ -155,9 +155,9 @@ def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"Robot1 has no route around the walls from \(1.00, 1.00\) to \(3.50, 1.00\)"):
         fly(sent(team, ground, (7, 2), (7, 5)))
     team, ground = hall(tmp_path)
-    with pytest.raises(ValueError, match=r"the place of Robot2, \(2.00, 0.50\), is in a wall"):
+    with pytest.raises(ValueError, match=r"Robot2 is at \(2.00, 0.50\), in a wall"):
         fly(sent(team, ground, (7, 2), (4, 1)))
-    with pytest.raises(ValueError, match=r"a map with walls has the scale 0.5 m"):
+    with pytest.raises(ValueError, match=r"the map with walls has the scale 0.5 m"):
         mission_of(
             Outcome(Verdict.SOLUTION, team="x", protocol="abt", runtime="simulator", seed=0, assignment={"V1": 40}),
             team,

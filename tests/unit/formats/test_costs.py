@@ -140,7 +140,7 @@ def test_copies_are_compared_in_one_unit(tmp_path: Path) -> None:
     assert read_team(folder)["RA"].costs.places == 3
     (folder / "RB.xml").write_text(file("B", relations=half("0.25"), parents=CHILD_OF_A.format(shared.format("B A"))))
     with pytest.raises(
-        InvalidInputError, match=r"differs: '1 2' is at a cost of -0\.5, and with the child at a cost of -0\.75"
+        InvalidInputError, match=r"differs: '1 2' is at a cost of -0\.5 here, and at a cost of -0\.75 in"
     ):
         read_team(folder)
 

@@ -106,7 +106,7 @@ def test_constraints_that_files_cannot_tell_apart_are_refused() -> None:
     first = model.add(x != y, name="a")
     model.add(x <= y, name="a")
     model.after_solution().remove_constraint(first)
-    with pytest.raises(ModelError, match=r"<a: \(r0.x != r1.x\)> has the name and robots of <a: "):
+    with pytest.raises(ModelError, match=r"<a: \(r0.x != r1.x\)> has the same name and robots as <a: "):
         _ = model.team
 
 

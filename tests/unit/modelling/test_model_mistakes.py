@@ -119,7 +119,7 @@ MISTAKES: list[tuple[Callable[[Made], object], str]] = [
     (lambda m: m.model.add(m.model.after_solution().robot("late").variable("v", [1]) == 1), "event.add"),
     (lambda m: m.model.add(abs(m.large[0] * 10**17 - m.large[1] * m.large[2]) > 3), "beyond the limit of 2^63"),
     (lambda m: m.model.minimize(m.x * m.y * 5 * 10**17), "may reach 2000000000000000000; costs have at most 18 digits"),
-    (lambda m: m.model.minimize(m.large[0] ** 6 * m.large[1] ** 6), "(b.l1 ** 6))) reaches"),
+    (lambda m: m.model.minimize(m.large[0] ** 6 * m.large[1] ** 6), "(b.l1 ** 6))) can be"),
     (lambda m: m.model.add(m.large[0] ** 10**6 * m.large[1] > 3), "1000000 has more than 4096 bits"),
     (lambda _: robochoc.Model().team, "no robot"),
 ]

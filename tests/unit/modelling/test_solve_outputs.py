@@ -57,15 +57,15 @@ def test_a_protocol_may_be_a_class(runtime: str) -> None:
 
 
 def test_programs_on_a_network_do_not_know_a_registered_protocol() -> None:
-    with pytest.raises(robochoc.UnsupportedError, match="runtime='network' starts programs that do not know"):
+    with pytest.raises(robochoc.UnsupportedError, match="runtime='network' starts other programs, which do not know"):
         slots().solve(SlowMGM, "network")
 
 
 @pytest.mark.parametrize(
     ("name", "protocol", "text"),
     [
-        ("abt", SlowMGM, "'abt' is taken by an installed protocol"),
-        ("central", SlowMGM, "'central' is taken"),
+        ("abt", SlowMGM, "installed protocol is called 'abt'"),
+        ("central", SlowMGM, "is called 'central'"),
         ("a b", SlowMGM, "'a b' is not a valid name"),
         ("x", int, "int is not a subclass of Protocol"),
         ("x", 3, "3 is not a subclass of Protocol"),
