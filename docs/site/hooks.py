@@ -42,7 +42,12 @@ MOVED = {"benchmarks/RESULTS.md": "reference/results.md", "CHANGELOG.md": "refer
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Put the pages of protocols, examples and studies into the navigation, beside their lists."""
+    """Put the pages of protocols, examples and studies into the navigation, beside their lists.
+
+    A page of one version, which mike builds, has a selector of versions. It requires a server.
+    """
+    if "MIKE_DOCS_VERSION" in os.environ:
+        config.extra["version"] = {"provider": "mike", "default": "latest", "alias": True}
     names = sorted(Path(name).stem for name in protocol_pages() if name != PROTOCOLS)
     protocols = [{name: f"reference/protocols/{name}.md"} for name in names]
     for section in config.nav or []:
@@ -69,20 +74,37 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Return the page's text, its links to files outside of the site's source changed to their pages."""
-    del config, files
+    del files
+    if page.is_homepage and config.site_url:  # the selector of versions looks for this address in the sitemap
+        page.canonical_url = f"{config.site_url.rstrip('/')}/"
     markdown = markdown.replace("<!-- commands -->", "\n".join(command_reference(cli, "robochoc", 2)))
     return with_links(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
 
 
 def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Return the page's HTML, in which no line breaks within an option."""
+    """Return the page's HTML, in which no line breaks within an option, and no empty cell is a heading."""
     del page, config, files
-    return re.sub(r"<code>(--?[a-z][^<\n]{0,28})</code>", r'<code class="option">\1</code>', html)
+    html = re.sub(r"<th[^>]*></th>", "<td></td>", html)
+    html = re.sub(r"<code>(--?[a-z][^<\n]{0,28})</code>", r'<code class="option">\1</code>', html)
+    return re.sub(r"<code>[^<\n]+ --?[a-z][^<\n]*</code>", with_whole_options, html)
+
+
+def with_whole_options(command: re.Match[str]) -> str:
+    """Return a command within a sentence, in which no line breaks within an option."""
+    return re.sub(r" (--?[a-z][a-z-]*)", r' <span class="option">\1</span>', command[0])
 
 
 def on_post_page(html: str, *, page: Page, config: MkDocsConfig) -> str:
-    """Return the page with a name for the search dialog, which the theme leaves out."""
+    """Return the page with names that the theme leaves out: of the search, and of each part of the navigation."""
     del page, config
+    names = dict(
+        re.findall(r'<label class="md-nav__title" for="(__nav_\w+)">\s*<span[^>]*></span>([^<]*)</label>', html)
+    )
+    html = re.sub(
+        r'(id="(__nav_\w+)_label" tabindex="\d?">)(?=\s*<span class="md-nav__icon)',
+        lambda found: f'{found[1]}<span class="spoken">{names[found[2]].strip()}</span>',
+        html,
+    )
     return html.replace('class="md-search"', 'class="md-search" aria-label="Search"', 1)
 
 
