@@ -38,6 +38,7 @@ _KNOWN = {
         "problem",
         "order",
         "outbox",
+        "secret",
         "checks_at_send",
         "value",
         "verdict",

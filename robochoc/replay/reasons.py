@@ -1,4 +1,4 @@
-"""The reasons for a robot's new value, or for its conclusion of the search, as text, one line each."""
+"""The reasons for a robot's new value, backtracking, or conclusion of the search, as text, one line each."""
 
 from __future__ import annotations
 
@@ -68,9 +68,9 @@ class Reasons:
             self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
 
     def lines(self, received: Sequence[tuple[Sent, Message]], step: RecordedStep) -> list[str]:
-        """Return the reasons for a changed value, or for a conclusion of the search; otherwise empty."""
+        """Return the reasons for a changed value, a backtrack, or a conclusion of the search; otherwise empty."""
         concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
-        if self._protocol.value == self._value and not concluded:
+        if self._protocol.value == self._value and not concluded and not self._dead_ends:
             return []
         lines = [line for dead_end in self._dead_ends[:MOST_BACKTRACKS] for line in dead_end.lines()]
         if len(self._dead_ends) > MOST_BACKTRACKS:
@@ -79,8 +79,8 @@ class Reasons:
         if hopeless:
             lines += self._ruled_out()
         lines = lines or self._reason_against_previous(received) or self._received_lines(received)
-        if self._protocol.value != self._value:
-            lines.append(self._new_value_line())
+        if self._protocol.value != self._value or (self._dead_ends and self._value is not None):
+            lines.append(self._value_line())
         return [*lines, *(self._conclusion_line(verdict, hopeless=hopeless) for verdict in concluded)]
 
     # Excluded values
@@ -128,8 +128,8 @@ class Reasons:
 
     # The result
 
-    def _new_value_line(self) -> str:
-        """Return a sentence on the new value."""
+    def _value_line(self) -> str:
+        """Return a sentence on the value after the step."""
         index = self._protocol.value
         if index is None:
             return "it has no value now"
@@ -137,7 +137,8 @@ class Reasons:
         text = self._value_text(index) or ""
         if text.startswith("withdraws"):
             return f"it {text}"
-        return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
+        verb = "keeps" if index == self._value else "takes"
+        return f"it {verb} {text}{', the first value that nothing rules out' if first else ''}"
 
     def _is_first(self, index: int) -> bool:
         """Return whether all earlier values are ruled out; False if values have costs."""

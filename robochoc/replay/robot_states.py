@@ -1,4 +1,4 @@
-"""A robot's state after each of its own steps, and the reasons for a new value.
+"""A robot's state after each of its own steps, and the reasons for a new value or a backtrack.
 
 Only this robot is replayed, from the messages in its journal; other robots are replayed only if the text form of a
 journal has lost the content of a message.
@@ -36,7 +36,7 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
         domain: Each value of the robot, with the reason that excludes it.
         nogoods: The stored nogoods.
         more: Everything else that the protocol stores, by name.
-        why: The reasons for a changed value, or for the conclusion of the search; otherwise empty.
+        why: The reasons for a changed value, a backtrack, or the conclusion of the search; otherwise empty.
     """
 
     step: int

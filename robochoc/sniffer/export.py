@@ -1,4 +1,4 @@
-"""Exports conversations: as FIPA ACL text, table (CSV), diagram (Mermaid), or data embedded in a page.
+"""Exports conversations: in words, as FIPA ACL text, table (CSV), diagram (Mermaid), or data embedded in a page.
 
 The table follows RFC 4180, in UTF-8. Cells that a spreadsheet could interpret as formulas are not changed.
 """
@@ -8,8 +8,10 @@ from __future__ import annotations
 import csv
 import io
 import zlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import islice
+from contextlib import suppress
+from itertools import accumulate, islice
 
 import msgspec
 
@@ -48,21 +50,61 @@ def _answers(data: PageData, journal: Journal | None, most_states: int) -> Itera
 
 
 def _states(data: PageData, journal: Journal, most: int) -> Iterator[tuple[str, bytes]]:
-    counts = [0] * len(data.trace.robots)
-    for robot in data.trace.steps.robot:
-        counts[robot] += 1
-    for number, name in enumerate(data.trace.robots):
-        most -= counts[number]
-        if most < 0:
-            return
+    for number in _replayable(data.trace, most):
         try:
-            coming = iter(states_of(journal, name))
+            coming = iter(states_of(journal, data.trace.robots[number]))
             chunk = 0
             while states := list(islice(coming, STATES)):
                 yield f"states:{number}:{chunk}", _encode(states)
                 chunk += 1
         except CannotReplayError:
             continue  # the page shows that its states are not available
+
+
+def _replayable(trace: Trace, most: int) -> range:
+    """Return the numbers of the first robots, which have at most `most` steps in total."""
+    counts = Counter(trace.steps.robot)
+    totals = accumulate(counts[robot] for robot in range(len(trace.robots)))
+    return range(sum(total <= most for total in totals))
+
+
+def in_words(
+    data: PageData, journal: Journal, messages: Sequence[int], *, most_states: int = 20_000
+) -> Iterator[bytes]:
+    """Yield the robots' steps as text: the messages received, the reasons, and the messages sent, all in words.
+
+    Without a selection, steps that send nothing are included. Reasons are computed by replay, as in
+    `embedded_answers`.
+    """
+    trace = data.trace
+    reasons = {} if data.cannot_replay() else dict(_reasons(trace, journal, most_states))
+    chosen = {*messages}
+    for step, robot in enumerate(trace.steps.robot):
+        sent = [message for message in trace.sent_in(step) if message in chosen]
+        why = reasons.get(step, [])
+        if not sent and (len(chosen) < len(trace.messages.t) or not why):
+            continue
+        received = ", ".join(map(str, trace.packet(step)))
+        name = trace.robots[robot]
+        yield f"{printable(name)} {f'receives {received}' if received else 'starts'}\n".encode()
+        for reason in why:
+            yield f"    {printable(reason)}\n".encode()
+        for message in sent:
+            receiver = trace.robots[trace.messages.receiver[message]]
+            words = data.words(message).removeprefix(f"{name} says: ")
+            yield f"  {message} to {printable(receiver)}: {printable(words)}\n".encode()
+
+
+def _reasons(trace: Trace, journal: Journal, most: int) -> Iterator[tuple[int, list[str]]]:
+    """Yield the numbers of steps with the reasons of their robots."""
+    steps: dict[int, list[int]] = {}
+    for step, robot in enumerate(trace.steps.robot):
+        steps.setdefault(robot, []).append(step)
+    for number in _replayable(trace, most):
+        with suppress(CannotReplayError):
+            for state in states_of(journal, trace.robots[number]):
+                if state.step < len(steps.get(number, ())):
+                    yield steps[number][state.step], state.why
 
 
 HEADINGS = (

@@ -143,6 +143,20 @@ def test_search_goes_through_what_is_said(page: Page) -> None:
 # One message, one robot, one moment
 
 
+def test_the_reasons_for_a_nogood(page: Page) -> None:
+    sender = TRACE.messages.sender
+    message = next(m for m in range(COUNT) if TRACE.kinds[TRACE.messages.kind[m]] == "Nogood")
+    choose(page, message)
+    page.wait_for_selector("#message .why")
+    step = list(states_of(JOURNAL, TRACE.robots[sender[message]]))[
+        sum(TRACE.steps.robot[one] == sender[message] for one in range(TRACE.messages.step[message]))
+    ]
+    assert any(line.startswith("no value was left") for line in step.why)
+    assert page.locator("#message .why li").all_inner_texts() == step.why
+    choose(page, 0)
+    until(lambda: "no value was left" not in page.inner_text("#message"), "the reasons of another message")
+
+
 def test_a_message_in_full(page: Page, tmp_path: Path) -> None:
     page.click("#grid .row[data-message='5']")
     detail = FEED.detail(5)

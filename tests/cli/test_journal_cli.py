@@ -17,10 +17,13 @@ from click.testing import CliRunner, Result
 
 from robochoc.cli.group import cli
 from robochoc.cli.reports.failures import INVALID, USAGE
+from robochoc.formats import PREDEFINED
 from robochoc.formats.team_writer import write_team
 from robochoc.generators.coloring import coloring
 from robochoc.journal.events import AnyEvent, Began, Decided, Received, Sent, Settled
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
+from robochoc.model.problem import Constraint
+from robochoc.run import Options, Runtime
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.export import MOST_ARROWS, drawable, mermaid
@@ -28,8 +31,9 @@ from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.patterns import matching, patterns_in
 from robochoc.sniffer.trace import Trace
 from tests.support.cases import cases
+from tests.support.problems import team_of
 from tests.support.program import robochoc_within
-from tests.support.recorded_journals import recorded
+from tests.support.recorded_journals import record, recorded
 
 NAME = "R;#1\nend"
 
@@ -238,6 +242,50 @@ def test_a_diagram_that_nobody_could_read_is_refused(tmp_path: Path) -> None:
     result = journal("export", path, "--format", "mermaid")
     assert result.exit_code == USAGE
     assert f"the maximum is {MOST_ARROWS} (select fewer with --robots" in result.output
+
+
+def test_words_give_the_reason_of_each_nogood(tmp_path: Path) -> None:
+    path, page = tmp_path / "a.journal", tmp_path / "words.txt"
+    pairs = [Constraint(f"C{pair}", PREDEFINED["ne"], (*pair,), (*pair,)) for pair in ("AB", "AC", "BC")]
+    team = team_of({"A": [1, 2], "B": [1, 2], "C": [1, 2]}, pairs)
+    path.write_bytes(content_of(record(team, Options(protocol="abt", runtime=Runtime.SIMULATOR))))
+    words = exported(path, "words")
+    assert (
+        """
+RC receives 3
+    C = 1 was ruled out by: A = 1
+    C = 2 was ruled out by: B = 2
+    no value was left, and it said Nogood to RB: while A = 1: B != 2
+    it keeps C = 2, the first value that nothing rules out
+  4 to RB: as long as A = 1, B cannot be 2
+"""
+        in words
+    )
+    assert words.startswith(
+        "RA starts\n    it takes A = 1, the first value that nothing rules out\n  0 to RB: A = 1 from"
+    )
+    assert words.endswith("it concluded that there is no solution: no value is left, whatever the others take\n")
+    nogoods = exported(path, "words", "--types", "Nogood")
+    assert re.findall(r"^  (\d+) to (\w+)", nogoods, re.MULTILINE) == [
+        ("4", "RB"),
+        ("5", "RA"),
+        ("9", "RB"),
+        ("10", "RA"),
+    ]
+    assert nogoods.count("no value was left") == nogoods.count("receives") == 4
+    assert (
+        journal("export", path, "--format", "words", "-o", page).stdout
+        == f"{page}: 12 messages, {len(words):,} bytes\n"
+    )
+
+
+def test_words_without_a_replay_are_the_messages(tmp_path: Path) -> None:
+    path = tmp_path / "a.journal"
+    recorder = JournalRecorder(Header(team="x", protocol="nowhere", runtime="simulator", seed=1, order=("a", "b")))
+    recorder(Sent(t=0, sender="a", receiver="b", type="Bid", content={"price": 3}, bytes=1, clock=0))
+    recorder(Settled(t=0, robot="a", clock=0, checks=0))
+    path.write_bytes(recorder.content())
+    assert exported(path, "words") == "a starts\n  0 to b: a says Bid (inform): price = 3\n"
 
 
 @pytest.mark.parametrize("chosen", [(), ("--types", "*", "--from", "7", "--conversation", "1")])

@@ -53,6 +53,7 @@ def main() -> None:
             for panel in ("#show-left", "#fold"):
                 shown_page.click(panel)
             choose(shown_page, NOGOOD)
+            shown_page.wait_for_selector("#message .why")
             shown_page.evaluate("Sniffer.page.view.set({ rowHeight: 36, top: 0 })")
             drawn(shown_page)
             shown_page.mouse.move(0, 0)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from robochoc.sniffer.selection import Selection
     from robochoc.sniffer.trace import Trace
 
-FORMATS = ("jsonl", "acl", "csv", "mermaid", "html", "costs")
+FORMATS = ("words", "jsonl", "acl", "csv", "mermaid", "html", "costs")
 MOST_IN_PAGE = 100_000
 """The maximum number of messages in a page. With more, the page would be too large for browsers."""
 
@@ -66,6 +66,7 @@ def export(
     """Export all or selected messages of the journal FILE.
 
     \b
+    words    each robot's steps: messages received, reasons, messages sent
     jsonl    the journal as text, one JSON object per line; robochoc reads it
     acl      FIPA ACL messages as text (FIPA00070), one per line
     csv      a table with one row per message: cause, explanation, content
@@ -143,12 +144,14 @@ def _pieces(
 ) -> Iterable[bytes]:
     """Return the export piece by piece."""
     from robochoc.journal.journal import lines_of
-    from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, mermaid, table
+    from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, in_words, mermaid, table
     from robochoc.sniffer.page_data import PageData
     from robochoc.sniffer.selection import excerpt_of
 
     is_complete = len(messages) == len(trace.messages.t)
     match form:
+        case "words":
+            return in_words(PageData(trace), read, messages)
         case "jsonl":
             return lines_of(read if is_complete else excerpt_of(read, trace, messages))
         case "acl":

@@ -58,8 +58,8 @@
   };
 
   Sniffer.Detail = class {
-    constructor(model, view, texts, saving, handlers) {
-      Object.assign(this, { model, view, texts, saving, handlers });
+    constructor(model, view, source, texts, saving, handlers) {
+      Object.assign(this, { model, view, source, texts, saving, handlers });
       this.element = Sniffer.byId("message");
     }
 
@@ -91,6 +91,7 @@
       mark.style.background = Sniffer.palette.colour(model.messages.kind[m]);
       const robot = (number) => make("button", { type: "button", class: "plain robot", onclick: () => handlers.robot(number) }, model.nameOf(number));
       this.words = make("blockquote", {}, "…");
+      this.why = make("div");
       this.more = make("div");
       const causes = model.causesOf(m);
       const fate = taken === Sniffer.NONE ? (model.whole ? "never" : "not yet")
@@ -100,6 +101,7 @@
         make("p", { class: "who" }, robot(sender[m]), " → ", robot(receiver[m])),
         this.words,
         kind.why ? make("p", { class: "soft" }, ...Sniffer.coded(kind.why)) : null,
+        this.why,
         make("h3", {}, "Causes"),
         Sniffer.links(model, causes, handlers, this._uncaused(sender[m], step[m])),
         make("h3", {}, "Consequences"),
@@ -113,6 +115,17 @@
         this.saving.panel(m));
       this.element.scrollTop = 0;
       this._details(m);
+      this._reasons(m);
+    }
+
+    /* Shows the sender's reasons in the step of the message. The panel "Robot" reports errors. */
+    async _reasons(m) {
+      const { model, why } = this;
+      if (model.about.replay) return;
+      const own = model.ordinal[model.messages.step[m]];
+      const states = await this.source.states(model.messages.sender[m], Math.floor(own / Sniffer.STATES), (own % Sniffer.STATES) + 1).catch(() => []);
+      const state = states[own % Sniffer.STATES];
+      if (state && this.why === why) Sniffer.fill(why, Sniffer.why(state));
     }
 
     /* The reason for a message without a cause. */

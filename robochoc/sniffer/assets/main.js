@@ -32,7 +32,7 @@
       } });
       this.robots = new Sniffer.RobotList(model, view, this.lanes, handlers);
       this.filters = new Sniffer.FilterPane(model, view, this.filter);
-      this.detail = new Sniffer.Detail(model, view, this.texts, this.saving, handlers);
+      this.detail = new Sniffer.Detail(model, view, source, this.texts, this.saving, handlers);
       this.state = new Sniffer.StatePane(model, view, source, handlers);
       this.following = new Sniffer.Following(model, source, {
         grown: () => this.grown(), changed: () => this.status(), about: () => this.met(), anew: () => this.anew() });

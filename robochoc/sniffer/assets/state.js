@@ -3,6 +3,7 @@
    its value. */
 (() => {
   const CHUNK = 64;
+  Sniffer.STATES = CHUNK;
   const MOST = 200; // the maximum number of shown entries of a list
   const BACK = 8; // the number of chunks that are searched for the reason of the end
 
@@ -10,6 +11,14 @@
   const ending = (state) => {
     const note = state && state.more && state.more.replay;
     return note && note.startsWith("ends here") ? note.replace(/^ends here: */, "") : "";
+  };
+
+  /* The reasons of a robot in a step; null if there are none. */
+  Sniffer.why = (state) => {
+    const { make } = Sniffer;
+    const why = [state.why || []].flat();
+    return why.length ? make("div", { class: "why" }, make("h3", {}, "Why"),
+      make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, ...Sniffer.coded(reason))))) : null;
   };
 
   Sniffer.StatePane = class {
@@ -109,10 +118,9 @@
         ? make("ul", { class: "knows" }, ...entries.slice(0, MOST).map(entry),
           entries.length > MOST ? make("li", { class: "soft" }, `and ${Sniffer.count(entries.length - MOST)} more`) : null)
         : make("p", { class: "soft" }, none));
-      const why = [state.why || []].flat();
       const left = state.domain.filter((value) => !value.ruled_out_by).length;
       Sniffer.fill(target,
-        why.length ? make("div", { class: "why" }, make("h3", {}, "Why"), make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, ...Sniffer.coded(reason))))) : null,
+        Sniffer.why(state),
         make("h3", {}, "Agent view"),
         state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It does not know any other robot's value yet."),
         make("h3", {}, `Domain, ${Sniffer.count(left)} of ${Sniffer.count(state.domain.length)} left`),
