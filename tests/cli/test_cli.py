@@ -316,3 +316,12 @@ def test_the_help_of_commands_imports_nothing_heavy() -> None:
     assert {f"robochoc.cli.commands.{name}" for name in COMMANDS} <= {*modules}
     heavy = {"numpy", "meshcat", "lxml", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
     assert not heavy & set(modules)
+
+
+def test_options_of_pydcop_are_answered_by_ours() -> None:
+    for theirs, ours in (("--algo", "--protocol"), ("--algo_params", "--set"), ("--mode", "--runtime")):
+        done = robochoc_within("solve", "instances/queens3d-3", theirs, "dsa")
+        assert done.returncode == 2
+        assert f"No such option '{theirs}': instead of this option of pyDCOP, use {ours}." in done.stderr
+    done = robochoc_within("solve", "instances/queens3d-3", "--protocoll", "dsa")
+    assert "Did you mean '--protocol'?" in done.stderr

@@ -240,7 +240,7 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
             (
                 ["report", "{}", "-o", "figures.pdf"],
                 2,
-                "or a folder for figures in SVG and PDF (without an ending)",
+                "or a folder (without an extension) for figures in SVG and PDF",
             ),
             (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
             (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "the folder /nothing does not exist"),

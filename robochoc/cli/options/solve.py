@@ -149,7 +149,17 @@ class SolveCommand(SectionedCommand):
                 _check_path(ctx, following, "number of robots", ())
             if alone:
                 args = [*args[:place], alone, *args[place + 1 :]]
-        return super().parse_args(ctx, args)
+        try:
+            return super().parse_args(ctx, args)
+        except click.NoSuchOption as error:
+            if (name := error.option_name) in _PYDCOP_OPTIONS:
+                text = f"No such option {name!r}: instead of this option of pyDCOP, use {_PYDCOP_OPTIONS[name]}."
+                raise click.UsageError(text, ctx) from None
+            raise
+
+
+_PYDCOP_OPTIONS = {"--algo": "--protocol", "--algo_params": "--set", "--mode": "--runtime", "--output": "--json"}
+"""Options of `pydcop solve`, and the corresponding options of robochoc."""
 
 
 def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str]) -> None:
