@@ -40,7 +40,7 @@ def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
             f"'{shown}' is not a valid name of a robot: use a letter, then letters, digits, '_' and '.'"
         )
     if len(name) > LONGEST_NAME:
-        raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
+        raise InvalidNameError(f"'{shown}' is too long: use at most {LONGEST_NAME} characters")
     if name.upper() == MASTER or role == Role.MASTER:
         raise InvalidNameError(
             f"the name {MASTER} is reserved for the master, which needs no token; choose another name or role"

@@ -62,7 +62,9 @@ def _trees(findings: Mapping[str, Findings]) -> Iterator[_Tree]:
     for root, places in trees.items():
         sizes = {len(own) for own in places.values()}
         if len(sizes) > 1:
-            raise RefutedError(f"the robots below {root} have listed {min(sizes)} to {max(sizes)} optima")
+            raise RefutedError(
+                f"the robots below {root} have listed different numbers of optima, from {min(sizes)} to {max(sizes)}"
+            )
         yield _Tree(places, *sizes)
 
 

@@ -73,7 +73,7 @@ def test_who_has_stopped_is_told_nothing_more_and_may_tell_nothing() -> None:
     robot = middle(STAYS)
     assert replies(robot, ("RA", last(1)), ("RC", now(2))) == [("RC", now(1))]
     for sender in ("RA", "RZ"):
-        with pytest.raises(ValueError, match="is not a neighbour of RB, or has made its last tick"):
+        with pytest.raises(ValueError, match="is not a neighbour of RB, or has ended already"):
             replies(robot, (sender, now(1)))
 
 

@@ -286,7 +286,9 @@ def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, t
     if options.bounds and not outputs.journal:
         raise click.UsageError("--bounds writes to the journal: add --journal FILE")
     if options.runtime == "arrays" and (outputs.journal or outputs.sniffer):
-        raise click.UsageError("--journal and --sniff show messages, but --runtime arrays sends none: remove it")
+        raise click.UsageError(
+            "--journal and --sniff show messages, but --runtime arrays sends no messages: use another runtime"
+        )
     if outputs.serve and outputs.sniffer:
         raise click.UsageError(
             "--serve cannot be used with --sniff: remove --serve, since the page of --sniff also shows the scene"

@@ -143,7 +143,7 @@ def _definition(record: Record) -> Definition:
         raise SharedConstraintError(f"duplicate tuple in {shortened(record.name)!r}")
     costs = len(record.tuples) if record.semantics == Semantics.SOFT else 0
     if len(record.costs) != costs or not all(cost >= 0 for cost in (*record.costs, record.default_cost)):
-        raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are none")
+        raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are invalid")
     return Relation(record.name, record.arity, record.semantics, record.tuples, record.costs, record.default_cost)
 
 
@@ -168,7 +168,7 @@ def _in_intension(record: PredicateRecord | FunctionRecord) -> Predicate | Funct
     function = Function(record.name, names, _body(record, Type.INTEGER))
     low, high = bounds(function.body, dict.fromkeys(names, ANY_INTEGER))
     if low < 0 or high > BOUND:
-        raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are none")
+        raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are invalid")
     return function
 
 

@@ -82,7 +82,7 @@ def _read_other(content: bytes, name: str, *, adds_alpha: bool) -> Image:
         raise MistakeError("has too many pixels", hint) from None
     except (*_BROKEN, zlib.error) as error:
         reason = "" if isinstance(error, UnidentifiedImageError) else f": {shortened(str(error))}"
-        raise MistakeError(f"is a damaged {name} image{reason}", "the image is incomplete or damaged") from None
+        raise MistakeError(f"is a damaged {name} image{reason}", "save the image again") from None
 
 
 def _summed(opened: Pillow.Image, *, adds_alpha: bool) -> Image:

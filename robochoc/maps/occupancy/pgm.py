@@ -62,7 +62,9 @@ def _raw(content: bytes, place: int, count: int, white: int) -> Pixels:
     end = place + 1 + count * size
     raster = content[place + 1 : end]
     if len(raster) < count * size:
-        raise MistakeError(f"ends after {len(raster) // size} of {count} pixels", "the image is incomplete")
+        raise MistakeError(
+            f"ends after {len(raster) // size} of {count} pixels", "the image is incomplete: save it again"
+        )
     _check_end(content[end:], count)
     return np.frombuffer(raster, dtype=np.dtype(f">u{size}")).astype(np.int64)
 
@@ -71,7 +73,7 @@ def _plain(content: bytes, place: int, count: int, white: int) -> Pixels:
     """Return the pixels, given as numbers separated by whitespace."""
     words = _COMMENT.sub(b"", content[place:]).split(None, count)
     if len(words) < count:
-        raise MistakeError(f"ends after {len(words)} of {count} pixels", "the image is incomplete")
+        raise MistakeError(f"ends after {len(words)} of {count} pixels", "the image is incomplete: save it again")
     _check_end(b"".join(words[count:]), count)
     del words[count:]
     return np.fromiter((_number(word, "pixel", 0, white) for word in words), np.int64, count)

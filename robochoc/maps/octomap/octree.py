@@ -94,7 +94,9 @@ def read_octree(content: bytes) -> Octree:
 def _check_end(content: bytes, end: int) -> None:
     """Raise `MistakeError` if anything but whitespace follows the last node."""
     if content[end:].strip():
-        raise MistakeError(f"has {len(content) - end:,} bytes after its last node", "the file is damaged")
+        raise MistakeError(
+            f"has {len(content) - end:,} bytes after its last node", "the file is damaged: save the map again"
+        )
 
 
 class _Header:
@@ -199,7 +201,10 @@ class _Nodes:
     def check_depth(self, exponent: int, nodes: Integers) -> None:
         """Raise `MistakeError` if there are inner nodes below the last level."""
         if exponent < 1 and nodes.size:
-            raise MistakeError(f"has a node below level {DEPTH} at {self.place(int(nodes[0]))}", "the file is damaged")
+            raise MistakeError(
+                f"has a node below level {DEPTH} at {self.place(int(nodes[0]))}",
+                "the file is damaged: save the map again",
+            )
 
 
 class _BinaryNodes(_Nodes):
@@ -224,7 +229,10 @@ class _BinaryNodes(_Nodes):
             words, following = self._words[nodes], nodes + 1
             empty = nodes[words == 0]
             if empty.size:
-                raise MistakeError(f"has a node without children at {self.place(int(empty[0]))}", "the file is damaged")
+                raise MistakeError(
+                    f"has a node without children at {self.place(int(empty[0]))}",
+                    "the file is damaged: save the map again",
+                )
             inner: list[tuple[Integers, Integers]] = []
             known: list[tuple[Corners, npt.NDArray[np.bool_]]] = []
             for child in range(8):
@@ -280,7 +288,9 @@ class _FullNodes(_Nodes):
 
 
 def _other_count(found: int, expected: int) -> MistakeError:
-    return MistakeError(f"has {found:,} nodes, but its header states {expected:,}", "the file is damaged")
+    return MistakeError(
+        f"has {found:,} nodes, but its header states {expected:,}", "the file is damaged: save the map again"
+    )
 
 
 def _child_corners(corners: Integers, child: int) -> Integers:

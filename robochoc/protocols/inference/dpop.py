@@ -446,7 +446,7 @@ class DPOP(TreeProtocol):
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
         """Store a piece of the child's table; compute this robot's table when all children's tables are complete."""
         if child not in self._axes:
-            raise ValueError(f"{child} was not asked for a table")
+            raise ValueError(f"{child} sent a table without a request")
         if child not in self.utils:
             dimensions = self.dimensions[child]
             self.utils[child] = IncomingTable(

@@ -187,7 +187,7 @@ class ODPOP(DPOP):
     def _receive_bound(self, child: str, cost: float) -> None:
         """Record that all remaining combinations of `child` cost at least `cost`."""
         if child not in self._waiting:
-            raise ValueError(f"{child} was not asked for a good")
+            raise ValueError(f"{child} sent a good without a request")
         self._waiting.discard(child)
         self.last[child] = cost
         self._ask_or_answer()

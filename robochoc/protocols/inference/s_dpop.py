@@ -346,7 +346,7 @@ class SDPOP(DPOP, DynamicProtocol):
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
         """Store a piece of a child's new table."""
         if child not in self._waiting:
-            raise ValueError(f"{child} was not asked for a table")
+            raise ValueError(f"{child} sent a table without a request")
         if child not in self._incoming:
             dimensions = self.dimensions[child]
             shape = [dimensions.separator[name] for name in self._axes[child]]

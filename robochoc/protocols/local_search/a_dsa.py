@@ -108,7 +108,7 @@ class ADSA(DSA):
     def receive(self, sender: str, message: wire.Message) -> None:
         """Store a neighbour's value."""
         if sender not in self.active:
-            raise ValueError(f"{sender} is not a neighbour of {self.problem.agent}, or has made its last tick")
+            raise ValueError(f"{sender} is not a neighbour of {self.problem.agent}, or has ended already")
         tick = cast("Tick", message)
         self.check_value(sender, tick.value)
         self.view[sender] = tick.value

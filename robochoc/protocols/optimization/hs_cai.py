@@ -468,7 +468,7 @@ class HSCAI(BranchingProtocol):
     def _store_tighter(self, child: str, table: RobotTable) -> None:
         """Use a child's table, for this search or for the parent: answers arrive in the order of the requests."""
         if not self.inferring.get(child) or not self._is_below(child, table):
-            raise ValueError(f"unexpected table from {child}, or one over other robots")
+            raise ValueError(f"{child} sent an unexpected table, or a table over other robots")
         purpose = self.inferring[child].pop(0)
         if purpose is None:
             self._made[child] = table

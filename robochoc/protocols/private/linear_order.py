@@ -165,7 +165,7 @@ def step_after(problem: LocalProblem, own: OwnAxis, incoming: Shape, later: Mapp
         for agent in agents:
             size = len(later[agent].values)
             if outgoing.setdefault(later[agent].codename, size) != size:
-                raise ValueError(f"the axis of {agent} has {size} values, and another number in the table")
+                raise ValueError(f"the axis of {agent} has {size} values, but a different number in the table")
     return EliminationStep(incoming, dict(sorted(outgoing.items())), later)
 
 

@@ -272,7 +272,7 @@ class P2DPOP(LinearOrderProtocol):
         own = self.own_axis(self.turn)
         incoming = {own.codename: len(own.order)} if self.is_root else self.places[self.turn].incoming
         if len(table.ciphers) != cells_of(incoming) * self.cipher.levels * self.cipher.size:
-            raise ValueError(f"received a table of {len(table.ciphers):,} bytes, another size than planned")
+            raise ValueError(f"received a table of {len(table.ciphers):,} bytes, a size other than planned")
         cells = self.cipher.cells(table.ciphers)
         if self.is_root:
             self._start_reading([cells[code] for code in sorted(range(len(cells)), key=own.order.__getitem__)])

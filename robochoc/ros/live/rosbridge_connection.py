@@ -301,7 +301,7 @@ def incoming(message: object) -> tuple[dict[str, Any], int]:
 
 def _object(message: dict[str, Any], depth: int) -> tuple[dict[str, Any], int]:
     if depth > _DEPTH_MAX:
-        raise MalformedMessageError(f"nested more than {_DEPTH_MAX} deep")
+        raise MalformedMessageError(f"nested more than {_DEPTH_MAX} levels deep")
     fields: dict[str, Any] = {}
     weight = 1
     for name, value in message.items():
@@ -316,7 +316,7 @@ def _decoded(value: object, depth: int) -> tuple[Any, int]:
             return _object(value, depth)
         case list():
             if depth > _DEPTH_MAX:
-                raise MalformedMessageError(f"nested more than {_DEPTH_MAX} deep")
+                raise MalformedMessageError(f"nested more than {_DEPTH_MAX} levels deep")
             parts = [_decoded(item, depth + 1) for item in value]
             return [part for part, _ in parts], 1 + sum(weight for _, weight in parts)
         case str():

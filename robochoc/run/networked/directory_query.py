@@ -45,7 +45,7 @@ def search_template(slots: Sequence[str]) -> AgentDescription:
             raise TemplateError(f"{word!r} is not of the form SLOT=VALUE; the slots are {', '.join(SLOTS)}")
         given[slot].append(value)
     if len(given["name"]) > 1:
-        raise TemplateError("the slot `name` is given twice: an agent has one name")
+        raise TemplateError("the slot `name` is given twice: give it once")
     services = [ServiceDescription(name=one, type=kind) for kind in ("variable", "topic") for one in given[kind]]
     name = given["name"][0] if given["name"] else ""
     return AgentDescription(

@@ -123,8 +123,8 @@ def run(*words: str) -> tuple[int, str]:
     ("words", "said"),
     [
         ((PATROL, "--protocol", "sfb"), "sfb has no array implementation"),
-        ((PATROL, "--protocol", "dsa", "--journal", "out.journal"), "--runtime arrays sends none"),
-        ((PATROL, "--protocol", "dsa", "--sniff"), "--runtime arrays sends none"),
+        ((PATROL, "--protocol", "dsa", "--journal", "out.journal"), "--runtime arrays sends no messages"),
+        ((PATROL, "--protocol", "dsa", "--sniff"), "--runtime arrays sends no messages"),
         ((PATROL, "--protocol", "dsa", "--schedule", str(ScheduleName.CYCLES)), "are only for the simulator"),
         ((RESCUE, "--protocol", "mgm"), "is for problems that do not change"),
     ],
