@@ -192,7 +192,7 @@ sbom: $(TOOLS)/.ready  ## what robochoc consists of, with its extras network and
 
 # hatchling and mypyc are those of the compiled core's environment.
 release: $(TOOLS)/.ready $(COMPILED)/.ready sbom  ## sdist and wheels, checked and tried, and the SBOM: out/release; publishes nothing
-	PYTHONPATH=. $(COMPILED)/bin/python -m tests.support.release --twine $(TOOLS)/bin/twine --sbom out/sbom.cdx.json -o out/release
+	PYTHONPATH=. $(COMPILED)/bin/python -m tests.support.release --tools $(TOOLS)/bin --sbom out/sbom.cdx.json -o out/release
 
 audit: $(TOOLS)/.ready  ## known vulnerabilities of what is locked, as PyPI's service knows them
 	@$(PYTHON) tests/support/audit.py $(TOOLS)/bin/pip-audit requirements/*.txt

@@ -121,7 +121,7 @@ def _compile_here(modules: list[str]) -> None:
     files = [f"{module.replace('.', '/')}.py" for module in modules]
     extensions = mypycify([*MYPY, *files], group_name="robochoc", debug_level="0")
     command = Distribution({"ext_modules": extensions}).get_command_obj("build_ext")
-    command.inplace = True  # type: ignore[attr-defined]
+    command.inplace = True
     command.ensure_finalized()
     command.run()
 

@@ -18,6 +18,7 @@ from robochoc import __version__
 from tests.support.program import ROOT
 from tests.support.release import NEEDED, faults_of, package_files, too_large
 
+PATH = r"(?:robochoc|tests)/[\w/.]+"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
@@ -48,6 +49,7 @@ def test_the_citation_has_what_its_format_requires() -> None:
 def test_workflows_run_targets_that_exist_and_actions_of_known_owners() -> None:
     targets = {*re.findall(r"^([a-z0-9-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)}
     used, actions = set(), set()
+    paths = {*re.findall(PATH, PROJECT["tool"]["cibuildwheel"]["test-command"])}
     for file in (ROOT / ".github" / "workflows").glob("*.yml"):
         workflow = yaml.safe_load(file.read_text())
         assert workflow["permissions"] == {"contents": "read"}, file  # more is granted to single jobs
@@ -55,6 +57,7 @@ def test_workflows_run_targets_that_exist_and_actions_of_known_owners() -> None:
             assert job["timeout-minutes"] <= 120, file
             actions |= {step["uses"].partition("/")[0] for step in job["steps"] if "uses" in step}
             runs = [step["run"] for step in job["steps"] if "run" in step]
+            paths |= {path for run in runs for path in re.findall(PATH, run)}
             used |= {
                 word
                 for run in runs
@@ -62,6 +65,8 @@ def test_workflows_run_targets_that_exist_and_actions_of_known_owners() -> None:
                 for word in words.split()
             }
     assert {"lint", "type", "test", "docs", "release"} <= used <= targets
+    assert {"robochoc/__init__.py", "tests/portable"} <= paths
+    assert [path for path in sorted(paths) if not (ROOT / path).exists()] == []
     assert actions == {"actions", "pypa"}
 
 

@@ -1,7 +1,8 @@
 """`make release`: build the files of a release, check them, and try the wheel with each Python. It publishes nothing.
 
 The wheels are built from the source distribution, as pip would do, and everything is built twice: the files must be the
-same, byte by byte. Then each Python that is there gets an environment with the pure wheel, and runs the program.
+same, byte by byte. Then each Python that is there gets an environment with the pure wheel, and runs the program; and
+each extra gets an environment of its own, in which all that needs it is imported.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import sys
 import tarfile
 import tempfile
 import time
+import tomllib
 import zipfile
 from collections.abc import Iterator, Sequence
 from email.parser import HeaderParser
@@ -29,6 +31,7 @@ from tests.support.snippets import blocks_of
 
 ROOT = Path(__file__).parents[2]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
+FOR_DEVELOPERS = {"dev", "docs", "fuzz"}
 NEEDED = {"robochoc/py.typed", "robochoc/xsd/robot.xsd", "robochoc/sniffer/assets/index.html", "robochoc/app/icon.svg"}
 """Some of what a wheel is not complete without. All must be there that is in git; these are also not to leave git."""
 MOST_BYTES = {"sdist": 30_000_000, "wheel": 4_000_000, "compiled": 12_000_000}
@@ -144,7 +147,7 @@ def tried(python: Path, wheel: Path) -> str:
         run(bin_ / "robochoc", "demo", "--no-open", folder=folder)
         if not (folder / "robochoc-demo.html").stat().st_size:
             raise ReleaseError(f"{python}: robochoc demo wrote an empty page")
-        size = sum(file.stat().st_size for file in (folder / "venv").rglob("*") if file.is_file())
+        size = size_of(folder / "venv")
         packages = run(bin_ / "pip", "list", "--disable-pip-version-check", "--format=freeze").splitlines()
     return (
         f"{version}, Python {python.name.removeprefix('python')}: installed in {seconds:.0f} s ({len(packages)}"
@@ -152,7 +155,30 @@ def tried(python: Path, wheel: Path) -> str:
     )
 
 
-def release(folder: Path, twine: Path, sbom: Path) -> None:
+def size_of(folder: Path) -> int:
+    """Return the size of all files in a folder, in bytes."""
+    return sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+
+
+def tried_extra(python: Path, uv: Path, wheel: Path, extra: str) -> str:
+    """Install the wheel with one extra in a new environment, and import all that needs the extra; return a line."""
+    with tempfile.TemporaryDirectory() as place:
+        venv = Path(place) / "venv"
+        inside = venv / "bin" / "python"
+        run(uv, "venv", "--quiet", "--python", python, venv)
+        run(uv, "pip", "install", "--quiet", "--python", inside, f"robochoc[{extra}] @ {wheel.as_uri()}")
+        said = run(inside, "-P", ROOT / "tests" / "support" / "extra_imports.py", extra, folder=Path(place)).strip()
+        count = len([*venv.glob("lib/*/site-packages/*.dist-info")])
+        return f"extra {extra}: {count} packages, {size_of(venv) / 1e6:.0f} MB; {said}"
+
+
+def extras() -> list[str]:
+    """Return the names of the extras for users."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    return sorted({*project["optional-dependencies"]} - FOR_DEVELOPERS)
+
+
+def release(folder: Path, tools: Path, sbom: Path) -> None:
     """Make all of it in `folder`. Raises `ReleaseError`."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -170,7 +196,7 @@ def release(folder: Path, twine: Path, sbom: Path) -> None:
     faults = [fault for wheel in wheels for fault in faults_of(wheel, package_files(tracked))] + [*too_large(files)]
     if faults:
         raise ReleaseError("\n".join(faults))
-    run(twine, "check", "--strict", *files)
+    run(tools / "twine", "check", "--strict", *files)
     shutil.copy(sbom, folder / f"robochoc-{__version__}.cdx.json")
     for file in files:
         print(f"{file.stat().st_size:>12,} bytes  {file.name}")  # noqa: T201 - the same
@@ -178,6 +204,8 @@ def release(folder: Path, twine: Path, sbom: Path) -> None:
     (wheel,) = (file for file in wheels if file.name.endswith("-none-any.whl"))
     for python in pythons():
         print(tried(python, wheel), flush=True)  # noqa: T201 - the same
+    for extra in extras():
+        print(tried_extra(Path(sys.executable), tools / "uv", wheel, extra), flush=True)  # noqa: T201 - the same
     sums = "".join(f"{digest(file)}  {file.name}\n" for file in sorted(folder.iterdir()))
     (folder / "SHA256SUMS").write_text(sums)
     print(f"{folder}: {len(files) + 2} files; nothing has been published")  # noqa: T201 - the same
@@ -187,11 +215,11 @@ def main() -> int:
     """Read the arguments, and release."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("-o", "--output", type=Path, default=Path("out/release"), help="the folder to write, anew")
-    parser.add_argument("--twine", type=Path, required=True, help="the program twine")
+    parser.add_argument("--tools", type=Path, required=True, help="the folder with the programs twine and uv")
     parser.add_argument("--sbom", type=Path, required=True, help="the bill of materials")
     asked = parser.parse_args()
     try:
-        release(asked.output.absolute(), asked.twine.absolute(), asked.sbom.absolute())
+        release(asked.output.absolute(), asked.tools.absolute(), asked.sbom.absolute())
     except ReleaseError as error:
         print(f"not ready for a release: {error}", file=sys.stderr)  # noqa: T201 - the same
         return 1
