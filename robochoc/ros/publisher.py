@@ -59,7 +59,9 @@ class Publisher:
         if all(drone.topic is None for drone in drones):
             problem = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
             raise NothingToPublishError(
-                on_one_line(f"{problem}: give its robot's file a <topic> (documentation, page Format)")
+                on_one_line(
+                    f"{problem}: give its robot's file a <topic>, in Python by `topic` (documentation, page ROS)"
+                )
             )
         self.names = TopicNames(drones)
         self._team = team
