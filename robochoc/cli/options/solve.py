@@ -47,7 +47,7 @@ class WithdrawalName(click.Choice[str]):
 
 def protocol_option(*, central: bool) -> Callable[[Command], Command]:
     """Return the option `--protocol NAME`. With `central`, its help also explains the central solver."""
-    alone = "; central: one model, no robots" if central else ""
+    alone = "; central: no robots" if central else ""
     words = f"Protocol ('robochoc protocols' lists them); auto: chosen by the problem{alone}."
     return click.option("--protocol", type=ProtocolName(), default=AUTO, show_default=True, metavar="NAME", help=words)
 
