@@ -337,9 +337,9 @@ def test_what_is_too_much_is_refused_before_it_takes_minutes() -> None:
         ValueError, match=r"the homes of a and b are 1e-11 m apart, and the minimum is .* a larger scale$"
     ):
         Flight(["a", "b"], PAIR * 5e-12, FlightConditions())
-    with pytest.raises(ValueError, match=r"b: the place \(inf, 0, 0\) m is over"):
+    with pytest.raises(ValueError, match=r"b: the position \(inf, 0, 0\) m is more than"):
         Flight(["a", "b"], np.array([[0.0, 0, 0], [math.inf, 0, 0]]), FlightConditions())
-    with pytest.raises(ValueError, match="an obstacle: the place"):
+    with pytest.raises(ValueError, match="an obstacle: the position"):
         Flight(["a", "b"], PAIR, FlightConditions(obstacles=((0.0, 0.0, 1e200),)))
     flight = Flight(["a", "b"], PAIR, FlightConditions())
     with pytest.raises(ValueError, match=r"b would have to fly 5,000 m, more than the maximum of 2,000 m"):
