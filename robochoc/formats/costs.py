@@ -153,7 +153,7 @@ class CostConversion:
 def _check_forbids(word: str, units: CostUnits) -> None:
     if (word == "-infinity") != units.maximize:
         aim, right = ("maximised", "-infinity") if units.maximize else ("minimised", "infinity")
-        raise MistakeError(f"the cost {word}, where costs are {aim}", f"write {right} to forbid")
+        raise MistakeError(f"the cost {word} is not possible where costs are {aim}", f"write {right} to forbid")
 
 
 def _integer(word: str, places: int) -> int:

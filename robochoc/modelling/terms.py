@@ -219,7 +219,7 @@ class ModelVariable(Term):
         return tuple(self.codes.value(code) for code in self.codes)
 
     def value(self, values: Values) -> object:
-        """Return its value."""
+        """Return the value of the term for these `values` of variables."""
         return values[self]
 
     def __repr__(self) -> str:
@@ -233,7 +233,7 @@ class ConstantTerm(Term):
         self.given, self.kind = given, kind_of(given)
 
     def value(self, values: Values) -> object:  # noqa: ARG002 - see Term
-        """Return its value."""
+        """Return the value of the term for these `values` of variables."""
         return self.given
 
     def __repr__(self) -> str:
@@ -268,7 +268,7 @@ class Linear(Term):
         return tuple(term for _, term in self.parts)
 
     def value(self, values: Values) -> object:
-        """Return its value."""
+        """Return the value of the term for these `values` of variables."""
         total = self.constant
         for factor, term in self.parts:
             total += factor * exact(term.value(values))
@@ -293,7 +293,7 @@ class Operation(Term):
         return self.operator in PARTIAL or any(one.is_partial for one in self.arguments)
 
     def value(self, values: Values) -> object:
-        """Return its value."""
+        """Return the value of the term for these `values` of variables."""
         meaning = OPERATORS[self.operator]
         if meaning.lazy is not None:
             return meaning.lazy(*(lambda one=one: one.value(values) for one in self.arguments))
@@ -314,7 +314,7 @@ class FunctionCall(Term):
         self.size = size_of(arguments)
 
     def value(self, values: Values) -> object:
-        """Return its value."""
+        """Return the value of the term for these `values` of variables."""
         given = [one.value(values) for one in self.arguments]
         try:
             return self.function(*given)
@@ -338,7 +338,7 @@ class TableTerm(Term):
         self.size = size_of(arguments)
 
     def value(self, values: Values) -> object:
-        """Return its value."""
+        """Return the value of the term for these `values` of variables."""
         return self.rows.get(tuple(one.value(values) for one in self.arguments), self.default)
 
     def __repr__(self) -> str:

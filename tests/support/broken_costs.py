@@ -18,7 +18,7 @@ FUNCTION = """
 COSTS = [
     weighted("a cost that forbids the wrong way",
              [relation('<relation name="r1" semantics="soft">-infinity:1 1</relation>')],
-             (R2, "<relation ", ("-infinity, where costs are minimised", "write infinity"))),
+             (R2, "<relation ", ("-infinity is not possible where costs are minimised", "write infinity"))),
     weighted("a cost of ten decimal places",
              [relation('<relation name="r1" semantics="soft">0.1234567891:1 1</relation>')],
              (R2, "<relation ", ("is not a cost", "9 places"))),

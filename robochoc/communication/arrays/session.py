@@ -100,7 +100,7 @@ class ArraysRun(Session):
         return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
     def change(self, epoch: Epoch) -> None:  # noqa: ARG002 - of `Session`
-        """Refuse: see `robochoc.run.compatibility`."""
+        """Raise `UnsupportedError`: this runtime does not support changes."""
         raise UnsupportedError("--runtime arrays is for problems that do not change: use --runtime simulator")
 
     def close(self) -> None:

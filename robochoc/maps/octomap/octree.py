@@ -294,6 +294,6 @@ def _other_count(found: int, expected: int) -> MistakeError:
 
 
 def _child_corners(corners: Integers, child: int) -> Integers:
-    """Return the corners of the children with the number `child`, in sides of a child."""
+    """Return the corners of the child number `child` of each node, in units of the side of a child."""
     upper: Integers = np.array([child & 1, child >> 1 & 1, child >> 2 & 1], dtype=np.int64)
     return 2 * corners + upper
