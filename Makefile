@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom release audit nox test-newest clean
+.PHONY: demo demo-11 docs docs-version test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom release audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -119,6 +119,13 @@ $(DOCS): $(READY) requirements/docs.txt
 # The theme says when its maintenance ends: docs/explanation/design/dependencies.md.
 docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without a network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+# One of several versions, with a selector: a commit of the branch gh-pages, which the workflow `release` pushes.
+DOCS_VERSION ?= $(basename $(VERSION)) latest
+MIKE = PATH="$(abspath $(BIN)):$$PATH" NO_MKDOCS_2_WARNING=1 mike
+docs-version: $(DOCS)  ## this version of the site, 1.0 of 1.0.0, into the branch gh-pages; pushes nothing
+	$(MIKE) deploy --update-aliases $(DOCS_VERSION)
+	$(MIKE) set-default latest
 
 # Findings are kept in out/fuzz. A seed repeats what the loop did; a kept input is tried again by
 # .venv/bin/python -m tests.fuzz --target NAME FILE

@@ -70,12 +70,18 @@ def test_workflows_run_targets_that_exist_and_actions_of_known_owners() -> None:
     assert actions == {"actions", "pypa"}
 
 
-def test_only_the_job_that_publishes_may_publish() -> None:
+def test_only_the_jobs_that_publish_may_publish() -> None:
     workflow = yaml.safe_load((ROOT / ".github" / "workflows" / "release.yml").read_text())
     allowed = {name: job.get("permissions") for name, job in workflow["jobs"].items()}
-    assert allowed == {"sdist": None, "wheels": None, "publish": {"id-token": "write", "attestations": "write"}}
+    assert allowed == {
+        "sdist": None,
+        "wheels": None,
+        "publish": {"id-token": "write", "attestations": "write"},
+        "site": {"contents": "write"},
+    }
     assert {*workflow["jobs"]["publish"]["needs"]} == {"sdist", "wheels"}
     assert workflow["jobs"]["publish"]["environment"]["name"] == "pypi"
+    assert workflow["jobs"]["site"]["needs"] == "publish"
 
 
 def test_the_classifiers_name_the_systems_and_pythons_that_the_workflow_tests() -> None:
