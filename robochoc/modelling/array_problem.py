@@ -6,8 +6,10 @@ The runtime `arrays` solves them (docs/guides/arrays.md).
 from __future__ import annotations
 
 import operator
+import re
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,6 +25,7 @@ from robochoc.communication.arrays.layout import ArrayLayout
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.modelling.option_names import errors_in_python
+from robochoc.modelling.solving import ARGUMENTS
 from robochoc.protocols.message import encode
 from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
@@ -31,6 +34,7 @@ from robochoc.run.option_values import texts_by_name
 from robochoc.run.options import Options
 from robochoc.run.registry import protocol_named
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import OptionTypeError
 from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError
 
@@ -155,9 +159,12 @@ class ArrayProblem:
 
     def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
         """Return an unstarted run, for callers that need each cycle (`cycles_of`). See `solve` for the arguments."""
+        kind = protocol_named(Options(protocol=protocol).protocol)
+        for name in settings:
+            if name in ARGUMENTS and not hasattr(kind.settings, name):
+                raise OptionTypeError(f"ArrayProblem has no option {name!r}: it runs as arrays; robochoc.Model has it")
         options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
-        kind = protocol_named(options.protocol)
-        with errors_in_python(("settings", "runtime")):
+        with errors_in_python(("settings", "runtime")), _without_runtimes():
             refuse_settings(options.protocol, kind, options.settings)
             form = array_run_for(kind)
             if not issubclass(kind, CycleProtocol):
@@ -264,6 +271,16 @@ class ArrayProblem:
                 and not _are_names(self.names, self.robots),
             }
         )
+
+
+@contextmanager
+def _without_runtimes() -> Iterator[None]:
+    """Name `robochoc.Model` instead of another runtime, which an array problem does not have."""
+    try:
+        yield
+    except UnsupportedError as error:
+        text = re.sub(r"\b(add|use) --runtime simulator\b", "use robochoc.Model", str(error))
+        raise UnsupportedError(text) from None
 
 
 def _refuse_first(faults: Mapping[str, bool]) -> None:

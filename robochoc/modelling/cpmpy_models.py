@@ -26,6 +26,7 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Apply, Expression
 from robochoc.model.problem import Domain, ProblemKind, Team, Variable
 from robochoc.modelling.cpmpy_terms import COMPARISONS, TRANSLATED, Translation, integer_of, is_variable
+from robochoc.modelling.errors import ModelError, ModelTypeError
 from robochoc.modelling.model import Model
 
 if TYPE_CHECKING:
@@ -47,24 +48,33 @@ def from_cpmpy(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
 
     Returns:
         The model. Its variables have CPMpy's names, with `_` in place of characters invalid in names: `x[0]` is `x_0`.
+        The model and its solutions can be indexed by CPMpy's variables: `solution[x[0]]`.
 
     Raises:
         ImportError: if CPMpy is not installed.
-        ValueError: if an expression has no counterpart, the model is too large, or a variable has no owner.
+        ModelError: if an expression has no counterpart, the model is too large, or a variable has no owner.
 
     Example:
         >>> import cpmpy, robochoc
         >>> x = cpmpy.intvar(1, 3, shape=3, name="x")
         >>> model = cpmpy.Model(cpmpy.AllDifferent(x), maximize=2 * x[0] + x[2])
         >>> outcome = robochoc.from_cpmpy(model).solve("dpop", runtime="simulator")
-        >>> outcome.cost, outcome.assignment
-        (8, {'x_0': 3, 'x_1': 1, 'x_2': 2})
+        >>> outcome.cost, outcome.assignment, outcome[x[0]]
+        (8, {'x_0': 3, 'x_1': 1, 'x_2': 2}, 3)
     """
-    return Model.of(cpmpy_team(model, owner, name))
+    team, names = _translated(model, owner, name)
+    translated = Model.of(team)
+    translated.imported = names
+    return translated
 
 
 def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmpy") -> Team:
     """Return a CPMpy model as a team; see `from_cpmpy`."""
+    return _translated(model, owner, name)[0]
+
+
+def _translated(model: cpmpy.Model, owner: Owner | None, name: str) -> tuple[Team, Mapping[str, str]]:
+    """Return a CPMpy model as a team, and the name in the team of each variable; see `from_cpmpy`."""
     try:
         import cpmpy  # noqa: PLC0415 - an extra
         from cpmpy.transformations.get_variables import get_variables  # noqa: PLC0415 - the same
@@ -72,12 +82,15 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
     except ImportError as error:
         raise ImportError(f"from_cpmpy requires CPMpy: run pip install 'robochoc[cpmpy]' ({error})") from error
     if not isinstance(model, cpmpy.Model):
-        raise TypeError(f"from_cpmpy requires a cpmpy.Model, not a {type(model).__name__}")
+        raise ModelTypeError(f"from_cpmpy requires a cpmpy.Model, not {model!r}")
+    if not (owner is None or callable(owner) or hasattr(owner, "get")):
+        hint = "expected a mapping from names of variables to names of robots, or a function of a variable's name"
+        raise ModelTypeError(f"owner={owner!r} is not allowed", hint)
     constraints = toplevel_list(model.constraints)
     has_objective = hasattr(model.objective_, "name")
     own = {one.name: one for one in get_variables([*constraints, *([model.objective_] if has_objective else [])])}
     if not own:
-        raise ValueError("the CPMpy model has no variables")
+        raise ModelError("the CPMpy model has no variables")
     robots = _Robots({variable: _owner_of(variable, owner) for variable in own})
     posting = _posting(own, robots.names)
     translation = Translation(posting, lambda variable: robots.add(variable, posting))
@@ -91,13 +104,14 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
             robots.owner_of_further(get_variables([model.objective_]))
             _post_objective(model.objective_, translation)
     except MistakeError as mistake:
-        raise ValueError(f"{mistake.message} ({mistake.hint})") from None
+        raise ModelError(mistake.message, mistake.hint) from None
     except RecursionError:
-        raise ValueError("an expression of the CPMpy model is nested too deeply") from None
+        raise ModelError("an expression of the CPMpy model is nested too deeply", "use variables for parts") from None
     constant = 0 if has_objective or model.objective_ is None else integer_of(model.objective_)
     units = CostUnits(model.objective_ is not None and not model.objective_is_min, 0, posting.constant + constant)
     kind = ProblemKind.DISCSP if model.objective_ is None else ProblemKind.DISWCSP
-    return assemble(name, robots.variables(posting), [*posting.constraints, *posting.costs], kind=kind, costs=units)
+    every = [*posting.constraints, *posting.costs]
+    return assemble(name, robots.variables(posting), every, kind=kind, costs=units), posting.names
 
 
 class _Robots:
@@ -144,11 +158,10 @@ class _Robots:
 def _owner_of(variable: str, owner: Owner | None) -> str:
     if owner is None:
         return variable
-    if callable(owner):
-        return str(owner(variable))
-    if variable not in owner:
-        raise ValueError(f"owner has no robot for the variable {variable!r}")
-    return str(owner[variable])
+    robot = owner(variable) if callable(owner) else owner.get(variable)
+    if robot is None:
+        raise ModelError(f"owner has no robot for the variable {variable!r}", "each variable needs one robot")
+    return str(robot)
 
 
 def _title(constraint: Any) -> str:  # noqa: ANN401 - CPMpy's expressions
@@ -162,8 +175,8 @@ def _pretty(name: str) -> str:
 def _values(variable: Any) -> range:  # noqa: ANN401 - CPMpy's expressions
     low, high = integer_of(variable.lb), integer_of(variable.ub)
     if high - low >= MAX_VALUES:
-        message = f"the variable {variable.name} has {high - low + 1:,} values"
-        raise ValueError(f"{message}; the maximum is {MAX_VALUES:,}")
+        hint = f"the maximum is {MAX_VALUES:,}: narrow its bounds, or use a larger unit"
+        raise ModelError(f"the variable {variable.name} has {high - low + 1:,} values", hint)
     return range(low, high + 1)
 
 

@@ -8,11 +8,13 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from robochoc.model.outcome import Verdict
-from robochoc.modelling.terms import any_of
+from robochoc.modelling.functions import forbidden
+from robochoc.modelling.numbers import whole_number
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.solver.ace import AceProcess
+from robochoc.solver.compile import CompileLimits
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import OptionError, RobochocError
 
@@ -36,19 +38,24 @@ def solutions_of(model: Model, protocol: str, limit: int | None, options: dict[s
     if options.get("withdraw"):
         raise OptionError("solutions() cannot be used with withdraw: it lists solutions for all robots")
     _refuse_events(model, "solutions()")
+    if limit is not None and ((number := whole_number(limit)) is None or number < 0):
+        raise OptionError(f"limit={limit!r} is not allowed; expected None, or an integer, 0 or more")
     rest = copy.copy(model)
     number = 0
-    while limit is None or number < limit:
-        solution = rest.solve(protocol, **options)  # type: ignore[arg-type] # options of `solve`
-        if solution.verdict == Verdict.UNKNOWN:
-            why = solution.reason or "a limit was reached"
-            raise ExplorationError(f"the search for solution {number + 1} ended without a verdict: {why}")
-        if not solution:
-            return
-        yield solution
-        number += 1
-        values = solution.values
-        rest.add(any_of(variable != values[name] for name, variable in rest.variables.items() if name in values))
+    local = options.get("local")
+    with AceProcess(always=isinstance(local, CompileLimits) and local.always_ace) as solver:
+        rest._solver = solver  # noqa: SLF001 - not for users; starting Java takes longer than most searches
+        while limit is None or number < limit:
+            solution = rest.solve(protocol, **options)  # type: ignore[arg-type] # options of `solve`
+            if solution.verdict == Verdict.UNKNOWN:
+                why = solution.reason or "a limit was reached"
+                raise ExplorationError(f"the search for solution {number + 1} ended without a verdict: {why}")
+            if not solution:
+                return
+            yield solution
+            number += 1
+            values = {one: solution.values[name] for name, one in rest.variables.items() if name in solution.values}
+            rest.add(forbidden([*values], [[*values.values()]]))
 
 
 class ExplorationError(RobochocError):
@@ -71,6 +78,10 @@ def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, .
     """
     _refuse_events(model, "conflict()")
     if model.given is not None:
+        if model.imported:
+            raise UnsupportedError(
+                "conflict() does not know CPMpy's constraints; use cpmpy.tools.mus(model.constraints) of the CPMpy model"
+            )
         raise UnsupportedError(
             "conflict() requires constraints that were added by add(); this model was loaded from files"
         )

@@ -36,7 +36,7 @@ from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.numbers import Exact, check_places, whole_number
 from robochoc.modelling.option_names import errors_in_python
 from robochoc.modelling.robots import ModelRobot, check_robot
-from robochoc.modelling.solution import NamedValues, Solution, UserValues
+from robochoc.modelling.solution import NamedValues, Solution, UserValues, team_name
 from robochoc.modelling.solving import Solvable
 from robochoc.modelling.team_builder import build_team, saved_order
 from robochoc.modelling.team_contents import TeamContents, contents_of, model_variable
@@ -60,6 +60,7 @@ class Model(Solvable):
         self.constant: Exact = 0
         self.maximized: bool | None = None
         self.given: TeamContents | None = None
+        self.imported: Mapping[str, str] = {}
         self._team: Team | None = None
         self._named = 0
 
@@ -78,8 +79,7 @@ class Model(Solvable):
         """Return a model of a team. The model can be extended."""
         model = cls(team.name)
         model.given = contents_of(team)
-        units = model.given.units
-        model.maximized = units.maximize if units != PLAIN_COSTS else None
+        model.maximized = model._given_sense()
         place = calling_line()
         for robot in team.robots:
             added = model.add_robot(robot.name, 0, robot.weight, place)
@@ -151,7 +151,8 @@ class Model(Solvable):
         self.changed()
 
     def __getitem__(self, name: str) -> ModelVariable:
-        """Return the variable named `name` in the team, such as `drone3.slot`."""
+        """Return the variable named `name` in the team, such as `drone3.slot`; also for a variable of CPMpy."""
+        name = team_name(name, self.imported)
         if name not in self.variables:
             raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
         return self.variables[name]
@@ -354,9 +355,16 @@ class Model(Solvable):
 
         return conflict_of(self, timeout)
 
+    def _given_sense(self) -> bool | None:
+        """Return whether the costs of the given team are maximised; None: it has no costs."""
+        units = self.given.units if self.given else PLAIN_COSTS
+        return units.maximize if units != PLAIN_COSTS else None
+
     def clear_objective(self) -> None:
         """Remove all costs added by `minimize` or `maximize`."""
         self._objective.clear()
+        self.constant = 0
+        self.maximized = self._given_sense()
         self.changed()
 
     def save(self, folder: Path | str, *, replace: bool = False) -> None:
@@ -396,7 +404,7 @@ class Model(Solvable):
         return self.given is not None or any(robot.priority for robot in self.robots.values())
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
-        return Solution.of(outcome, team, dict(self.variables))
+        return Solution.of(outcome, team, dict(self.variables), self.imported)
 
     def __copy__(self) -> Self:
         """Return an independent copy."""
@@ -408,4 +416,5 @@ class Model(Solvable):
 
     def __repr__(self) -> str:
         robots, variables = counted(len(self.robots), "robot"), counted(len(self.variables), "variable")
-        return f"<model {self.name}: {robots}, {variables}, {counted(len(self.constraints), 'constraint')}>"
+        constraints = len(self.constraints) + (self.given.number if self.given else 0)
+        return f"<model {self.name}: {robots}, {variables}, {counted(constraints, 'constraint')}>"

@@ -59,21 +59,29 @@ class Solution(Outcome, Mapping[str, object]):
         epochs: The epochs, each with its `values`, if there were several epochs.
         variables: The variables of the model, by name; empty for a problem from files.
         problem: The team that solved the problem. None: unknown.
+        imported: The names in the team of CPMpy's variables.
     """
 
     epochs: tuple[SolutionEpoch, ...] = ()
     variables: Mapping[str, ModelVariable] = field(default_factory=dict, compare=False)
     problem: Team | None = field(default=None, compare=False)
+    imported: Mapping[str, str] = field(default_factory=dict, compare=False)
 
     @classmethod
-    def of(cls, outcome: Outcome, team: Team, variables: Mapping[str, ModelVariable] | None = None) -> Solution:
+    def of(
+        cls,
+        outcome: Outcome,
+        team: Team,
+        variables: Mapping[str, ModelVariable] | None = None,
+        imported: Mapping[str, str] = {},
+    ) -> Solution:
         """Return an outcome of `team` as a solution."""
         same = outcome.parts(Outcome)
         values = UserValues(variables or {}, team)
         epochs = [
             SolutionEpoch(**epoch.parts(EpochOutcome), values=values(epoch.assignment)) for epoch in outcome.epochs
         ]
-        return cls(**same | {"epochs": tuple(epochs)}, variables=variables or {}, problem=team)
+        return cls(**same | {"epochs": tuple(epochs)}, variables=variables or {}, problem=team, imported=imported)
 
     @cached_property
     def values(self) -> NamedValues:  # callable, since it is a method of other mappings
@@ -113,6 +121,7 @@ class Solution(Outcome, Mapping[str, object]):
                 return what.value({variable: self[variable] for variable in what.variables})
             except UndefinedTermError:
                 raise UnknownNameError(f"{what!r} has no value: its evaluation divides by zero") from None
+        what = team_name(what, self.imported)
         if not isinstance(what, str):
             raise ModelTypeError(f"{what!r} is not a key", "expected a variable, a term of variables, or a name")
         return self._value(what)
@@ -127,7 +136,8 @@ class Solution(Outcome, Mapping[str, object]):
     def __contains__(self, what: object) -> bool:
         """Return whether a variable, a term, or the variable with this name has a value."""
         try:
-            return isinstance(what, Term | str) and (self[what], True)[1]
+            key = team_name(what, self.imported)
+            return isinstance(key, Term | str) and (self[key], True)[1]
         except UnknownNameError:
             return False
 
@@ -219,3 +229,9 @@ class UserValues:
 
 def _in_json(number: Real | Decimal) -> float | Decimal | str:
     return number if isinstance(number, Decimal) else str(number) if isinstance(number, Fraction) else float(number)
+
+
+def team_name(what: Any, imported: Mapping[str, str]) -> Any:  # noqa: ANN401 - any key
+    """Return the name in the team of a variable of CPMpy, or of its name. Return any other key unchanged."""
+    name = what if isinstance(what, str) else getattr(what, "name", None)
+    return imported.get(name, what) if imported and isinstance(name, str) else what

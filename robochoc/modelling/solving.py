@@ -30,14 +30,28 @@ if TYPE_CHECKING:
     from robochoc.communication.search_result import Progress
     from robochoc.communication.simulator.channel import ChannelModel
     from robochoc.protocols.protocol import Protocol
+    from robochoc.solver.ace import AceProcess
 
 NO_LIMITS = CompileLimits()
 """The default limits on the compilation of domains."""
+_OF_OTHER_SOLVERS = {
+    "time_limit": "timeout",
+    "max_time_in_seconds": "timeout",
+    "random_seed": "seed",
+    "solver": "central_with",
+    "solution_callback": "observer",
+    "callback": "observer",
+    "log_search_progress": "progress",
+}
+"""The arguments that correspond to options of CPMpy and OR-Tools."""
 _OPTIONS = frozenset(one.name for one in fields(Options))
 
 
 class Solvable(ABC):
     """A problem that a team of robots can solve: the base class of `Problem` and `Model`."""
+
+    _solver: AceProcess | None = None
+    """A running constraint solver for several searches. None: each search starts its own."""
 
     def solve(  # noqa: PLR0913 - options of a run, by their names
         self,
@@ -146,12 +160,13 @@ class Solvable(ABC):
         """
         given = {name: value for name, value in locals().items() if name in _OPTIONS}
         _refuse(unknown)
+        _refuse_types(stop, progress, observer)
         team = self._team_to_solve()
         with errors_in_python(ARGUMENTS), stopped_by(stop):
             options = _with_team_names(Options(**given | {"protocol": protocol or AUTO}), self._robots_called(team))
             refuse_options(options, environment=environment is not None)
             run = prepare(team, options, environment=environment is not None, ordered=self._is_ordered)
-            outcome = _solve_recorded(run, journal, observer, progress, environment)
+            outcome = _solve_recorded(run, journal, observer, progress, environment, self._solver)
         solution = self._solution(_texts_in_python(outcome), team)
         if html is not None:
             solution.scene().save(html)
@@ -217,10 +232,11 @@ def _solve_recorded(
     observer: Observer | None,
     progress: Callable[[Progress], None] | None,
     environment: Environment | None,
+    solver: AceProcess | None,
 ) -> Outcome:
     """Run the search, with a journal if there is a path for it. Raises `OSError` if the journal cannot be written."""
     if journal is None:
-        return run.solve(observer=observer, progress=progress, environment=environment)
+        return run.solve(observer=observer, progress=progress, solver=solver, environment=environment)
     from robochoc.journal.recorder import recorded  # noqa: PLC0415 - start-up: seldom used
     from robochoc.run.recording import journal_header, objective_to_record  # noqa: PLC0415 - start-up: seldom used
 
@@ -228,7 +244,7 @@ def _solve_recorded(
     objective = None if environment else objective_to_record(run.team, options)  # otherwise the problem changes
     with recorded(Path(journal), journal_header(run.team, options), objective) as recorder:
         observers = combined(observer, recorder)
-        outcome = run.solve(observer=observers, progress=progress, environment=environment)
+        outcome = run.solve(observer=observers, progress=progress, solver=solver, environment=environment)
         recorder.outcome = outcome
     for failure in recorder.failures:
         raise failure
@@ -238,8 +254,19 @@ def _solve_recorded(
 def _refuse(unknown: Iterable[str]) -> None:
     """Raise `OptionTypeError` for unknown options."""
     for name in unknown:
-        hint = did_you_mean(name, ARGUMENTS, f"its options: {', '.join(sorted(ARGUMENTS))}")
+        listed = f"its options: {', '.join(sorted(ARGUMENTS))}"
+        ours = _OF_OTHER_SOLVERS.get(name)
+        hint = f"did you mean {ours!r}?" if ours else did_you_mean(name, ARGUMENTS, listed)
         raise OptionTypeError(f"solve() has no option {name!r}; {hint}")
+
+
+def _refuse_types(stop: object, progress: object, observer: object) -> None:
+    """Raise `OptionTypeError` for arguments that are called during the run, but cannot be called."""
+    if stop is not None and not callable(getattr(stop, "is_set", None)):
+        raise OptionTypeError(f"stop={stop!r} is not allowed; expected a threading.Event, which another thread sets")
+    for name, given in (("progress", progress), ("observer", observer)):
+        if given is not None and not callable(given):
+            raise OptionTypeError(f"{name}={given!r} is not allowed; expected a function")
 
 
 def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:

@@ -39,6 +39,11 @@ class TeamContents:
         return {one.name for one in self._all}
 
     @property
+    def number(self) -> int:
+        """The number of constraints, without those that events add."""
+        return len(self.constraints) + sum(map(len, self.parts.values()))
+
+    @property
     def definitions(self) -> set[str]:
         """The names of the team's relations, predicates and functions."""
         return {one.definition.name for one in self._all}

@@ -19,6 +19,7 @@ from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PseudoTree
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RebuiltRobots, ReplayOptions
 from robochoc.replay.steps import RecordedRun, runs_of
+from robochoc.run.defaults import CENTRAL
 from robochoc.run.registry import protocol_by_class
 from robochoc.sniffer.recorded_messages import message_of, types_by_name
 from robochoc.solver.agent_problem import RunParameters
@@ -48,6 +49,8 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
     """
     runs = list(runs_of(journal.events))
     if not runs:
+        if journal.header.protocol == CENTRAL:
+            raise PrivacyError("no robot sent a message: the central solver got the problems of all robots")
         raise PrivacyError("the journal ends before the beginning of a run")
     number = len(runs) if number is None else number
     if not 1 <= number <= len(runs):

@@ -11,7 +11,7 @@ from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.problem import INFINITE, Constraint, Domain, Value
 from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import MAX_TUPLES, Cost, allows_function, cost_function, is_soft, max_cost
-from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.errors import TooLargeError
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that exclude a value of this robot: the left side of a nogood."""
@@ -265,14 +265,14 @@ class SharedConstraint:
         Combinations that drop the constraint are skipped; `size` is the number of own values.
 
         Raises:
-            UnsupportedError: if there are too many combinations.
+            TooLargeError: if there are too many combinations.
         """
         columns = [domains[agent] for agent in self.agents]
         entries = math.prod(map(len, columns)) * size
         if entries > MAX_TUPLES:
-            raise UnsupportedError(
-                f"the table of constraint {self.key} has {entries:,} entries, more than {MAX_TUPLES:,}; split the"
-                " constraint, or choose a protocol without tables"
+            raise TooLargeError(
+                f"the table of constraint {self.key} has {entries:,} entries, more than {MAX_TUPLES:,}: split the"
+                " constraint, or choose another protocol"
             )
         for place in itertools.product(*(range(len(column)) for column in columns)):
             chosen = (column[index] for column, index in zip(columns, place, strict=True))

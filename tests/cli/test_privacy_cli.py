@@ -12,6 +12,7 @@ from robochoc.cli.group import cli
 from robochoc.cli.reports.failures import INVALID, USAGE
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.modelling.model import Model
 
 
 def run(*words: object) -> Result:
@@ -71,6 +72,14 @@ def test_a_journal_that_ends_before_a_run_begins_is_not_measured(saved: Path, tm
     result = run("privacy", cut, "--no-cache")
     assert result.exit_code == USAGE
     assert result.output.strip().endswith("cut.journal: the journal ends before the beginning of a run")
+
+
+def test_a_run_of_the_central_solver_has_no_messages(tmp_path: Path) -> None:
+    path = tmp_path / "run.journal"
+    Model.of(queens3d(2)).solve("central", journal=path)
+    result = run("privacy", path, "--no-cache")
+    assert result.exit_code == USAGE
+    assert "the central solver got the problems of all robots" in result.output
 
 
 def test_what_is_no_journal_is_invalid(tmp_path: Path) -> None:

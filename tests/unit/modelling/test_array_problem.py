@@ -223,10 +223,12 @@ def test_names_may_be_an_array() -> None:
 def test_protocols_and_settings_are_looked_up() -> None:
     problem = ArrayProblem(2, 2, PAIR, SAME)
     assert repr(problem) == "<array problem: 2 robots, 1 edges, 2 values>"
-    with pytest.raises(UnsupportedError, match="ABT has no array implementation"):
+    with pytest.raises(UnsupportedError, match=r"ABT has no array implementation; use robochoc\.Model, or one of"):
         problem.solve("abt")
     with pytest.raises(UnsupportedError, match=r"settings: .*cycle"):
         problem.solve("dsa", cycle=3)
+    with pytest.raises(robochoc.OptionError, match="ArrayProblem has no option 'runtime'"):
+        problem.solve("dsa", runtime="simulator")
     with pytest.raises(UnknownProtocolError):
         problem.solve("das")
 

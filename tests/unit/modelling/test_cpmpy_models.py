@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib.util
 from collections.abc import Callable
 from contextlib import suppress
@@ -163,8 +164,24 @@ def test_owners_names_and_kinds() -> None:
     assert cpmpy_team(model, named).order == ("all",)
     outcome = robochoc.from_cpmpy(model, name="grid").solve("dpop", runtime="simulator")
     assert (outcome.team, outcome.cost) == ("grid", 11)
-    with pytest.raises(ValueError, match="owner has no robot"):
-        cpmpy_team(model, {"grid[0,0]": "r"})
+    for owner in ({"grid[0,0]": "r"}, lambda _: None):
+        with pytest.raises(robochoc.ModelError, match="owner has no robot"):
+            cpmpy_team(model, owner)  # type: ignore[arg-type] # wrong on purpose
+    with pytest.raises(robochoc.ModelError, match="owner='r' is not allowed"):
+        cpmpy_team(model, "r")  # type: ignore[arg-type] # wrong on purpose
+
+
+def test_models_and_solutions_are_indexed_by_variables_of_cpmpy() -> None:
+    x = cp.intvar(1, 3, shape=2, name="x")
+    team = robochoc.from_cpmpy(cp.Model(x[0] < x[1], maximize=2 * x[0] + x[1]))
+    team.add(team[x[1]] > 2)
+    solution = copy.deepcopy(team).solve("dpop")
+    assert [solution[one] for one in x] == [solution[one.name] for one in x] == [solution["x_0"], 3] == [2, 3]
+    assert x[0] in solution
+    assert cp.intvar(0, 1, name="y") not in solution
+    assert "4 constraints" in repr(team)
+    with pytest.raises(robochoc.UnsupportedError, match=r"cpmpy\.tools\.mus"):
+        team.conflict()
 
 
 def test_what_has_no_counterpart_is_refused() -> None:

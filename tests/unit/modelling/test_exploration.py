@@ -10,6 +10,8 @@ import pytest
 
 import robochoc
 from robochoc.modelling.exploration import ExplorationError
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.compile import CompileLimits
 from tests.support.cases import looped
 
 DIFFERENCES = (-1, 0, 1)
@@ -92,9 +94,39 @@ def test_withdrawal_events_and_loaded_constraints_are_refused() -> None:
     model, _ = random_model(3)
     with pytest.raises(robochoc.OptionError, match="cannot be used with withdraw"):
         list(model.solutions(withdraw=True))
-    with pytest.raises(robochoc.UnsupportedError, match="was loaded"):
+    with pytest.raises(robochoc.UnsupportedError, match="loaded from files"):
         robochoc.Model.of(model.team).conflict()
     model.after_solution().add(model["r0.x"] == 1)
     for explore in (model.conflict, lambda: list(model.solutions())):
         with pytest.raises(robochoc.UnsupportedError, match="do not change"):
             explore()
+
+
+@pytest.mark.parametrize("limit", [-1, "3", 1.5])
+def test_a_wrong_limit_is_refused(limit: Any) -> None:  # noqa: ANN401 - wrong on purpose
+    with pytest.raises(robochoc.OptionError, match="limit="):
+        next(random_model(3)[0].solutions(limit=limit))
+
+
+def test_all_searches_of_the_central_solver_use_one_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[AceProcess] = []
+    start = AceProcess._start  # noqa: SLF001 - counts the processes
+
+    def counted_start(process: AceProcess) -> None:
+        started.append(process)
+        start(process)
+
+    monkeypatch.setattr(AceProcess, "_start", counted_start)
+    model, _ = random_model(3)
+    assert len(list(model.solutions(local=CompileLimits(always_ace=True)))) > 1
+    assert len(started) == 1
+
+
+def test_a_cleared_objective_leaves_no_trace() -> None:
+    model = robochoc.Model()
+    x = model.robot("a").variable("x", range(3))
+    model.minimize(x + 5)
+    model.clear_objective()
+    assert model.team.kind == "DisCSP"
+    model.maximize(x)
+    assert model.solve("dpop").cost == 2

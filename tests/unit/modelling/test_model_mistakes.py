@@ -177,6 +177,9 @@ def test_every_option_of_a_run_has_its_name() -> None:
 
 OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
     ({"timout": 3}, TypeError, "did you mean 'timeout'"),
+    ({"time_limit": 3}, TypeError, "did you mean 'timeout'"),
+    ({"stop": lambda: True}, TypeError, r"stop=<.*expected a threading\.Event"),
+    ({"progress": True}, TypeError, "progress=True is not allowed"),
     ({"runtime": "simulater"}, ValueError, "did you mean 'simulator'"),
     ({"order": "dom-dge"}, ValueError, "did you mean 'dom-deg'"),
     ({"order": ["a", "bb"]}, ValueError, "no robot 'bb'"),
