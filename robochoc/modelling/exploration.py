@@ -80,7 +80,7 @@ def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, .
     if model.given is not None:
         if model.imported:
             raise UnsupportedError(
-                "conflict() does not know CPMpy's constraints; use cpmpy.tools.mus(model.constraints) of the CPMpy model"
+                "conflict() does not know CPMpy's constraints; call cpmpy.tools.mus(model.constraints) for these"
             )
         raise UnsupportedError(
             "conflict() requires constraints that were added by add(); this model was loaded from files"
