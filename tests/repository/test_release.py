@@ -15,8 +15,9 @@ from hatchling.plugin.manager import PluginManager
 
 from hatch_build import long_description
 from robochoc import __version__
+from tests.support.extra_imports import imports_of, modules_for
 from tests.support.program import ROOT
-from tests.support.release import NEEDED, faults_of, package_files, too_large
+from tests.support.release import FOR_DEVELOPERS, NEEDED, extras, faults_of, package_files, too_large
 
 PATH = r"(?:robochoc|tests)/[\w/.]+"
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
@@ -172,6 +173,14 @@ def test_a_relative_link_in_the_description_is_noticed(tmp_path: Path) -> None:
         PURE, __version__, tmp_path, *files, description="See [a](https://b.c/d) and [guide](docs/e.md)."
     )
     assert [*faults_of(wheel, files)] == [f"{PURE}: its description has a relative link, docs/e.md"]
+
+
+def test_the_imports_of_an_extra_are_found_in_the_sources() -> None:
+    source = "import a.b\ndef f():\n    from c import d\n    importlib.import_module('e')\nfrom . import g"
+    assert [*imports_of(source)] == ["a.b", "c", "e"]
+    assert modules_for({"roslibpy"}) == ({"roslibpy", "roslibpy.comm"}, {"robochoc.ros.live.rosbridge_connection"})
+    assert {"app", "ros", "rosbridge"} <= {*extras()}
+    assert FOR_DEVELOPERS.isdisjoint(extras())
 
 
 def test_a_wheel_that_has_grown_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
