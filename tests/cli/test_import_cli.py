@@ -53,7 +53,7 @@ def test_import_replaces_nothing_unless_told(problem: Path, tmp_path: Path) -> N
     team = tmp_path / "team"
     assert robochoc_within("import", problem, "-o", team).returncode == 0
     again = robochoc_within("import", problem, "-o", team)
-    assert (again.returncode, "it exists already" in again.stderr) == (1, True)
+    assert (again.returncode, "the folder exists already" in again.stderr) == (1, True)
     assert robochoc_within("import", problem, "-o", team, "--force", "--order", "lexicographic").returncode == 0
     (team / "notes.txt").write_text("mine")
     other = robochoc_within("import", problem, "-o", team, "--force")

@@ -239,8 +239,11 @@ def test_its_journal_is_replayed(protocol: str, team: Team) -> None:
 @looped(
     ("options", "told"),
     [
-        (replace(AC, runtime=Runtime.NETWORK), "--preprocess is only for robots in processes or in the simulator"),
-        (replace(AC, runtime=Runtime.ARRAYS, protocol="dsa"), "--preprocess is only for robots in processes"),
+        (
+            replace(AC, runtime=Runtime.NETWORK),
+            "--preprocess is only for robots that run as processes or in the simulator",
+        ),
+        (replace(AC, runtime=Runtime.ARRAYS, protocol="dsa"), "--preprocess is only for robots that run as processes"),
         (
             Options(protocol="central", preprocess=Preprocess.AC),
             "--preprocess is for robots that solve the problem together",

@@ -190,7 +190,7 @@ def test_an_axis_that_cannot_be_is_refused(answer: Axis, why: str) -> None:
 def test_an_axis_of_another_size_than_the_table_s_is_refused() -> None:
     one = robot()
     one.receive("RA", Plan(0, {CODENAME: 3}))
-    with pytest.raises(ValueError, match="another number in the table"):
+    with pytest.raises(ValueError, match="a different number in the table"):
         one.receive("RA", Axis(0, CODENAME, [(1,), (2,)]))
 
 

@@ -187,7 +187,7 @@ def test_answers_come_in_the_order_of_the_requests() -> None:
     ("RC", PreUtil([("RB", 1, 3)], [], 0, [3, 3, 3]), "another depth or number of values"),
     ("RC", PreUtil([("RA", 1, 2)], [], 0, [3, 3]), "another depth or number of values"),
     ("RA", CPA(3, {"RA": 0}), "lacks values of robots above"),
-    ("RA", InferCtxt({"RA": 0}), "cannot infer a table"), ("RC", CtxtUtil([], [3]), "unexpected table from"),
+    ("RA", InferCtxt({"RA": 0}), "cannot infer a table"), ("RC", CtxtUtil([], [3]), "sent an unexpected table"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(sender: str, message: Message, fault: str) -> None:
     robot = middle()
@@ -203,7 +203,7 @@ def test_places_beyond_a_domain_and_tables_of_other_robots_are_refused() -> None
             replies(informed(), ("RA", message))
     robot = informed()
     replies(robot, ("RA", InferCtxt({"RA": 0})))
-    with pytest.raises(ValueError, match="one over other robots"):
+    with pytest.raises(ValueError, match="a table over other robots"):
         replies(robot, ("RC", CtxtUtil([("RX", 0, 2)], [1, 1])))
 
 

@@ -26,7 +26,7 @@ from tests.support.flown_teams import FlownTeam
 from tests.support.octomaps import FREE, Voxel, write_octomap
 
 NO_ROOM = re.compile(
-    r"that keeps its radius of|are to be kept"
+    r"that keeps its radius of|and the minimum is"
     r"|no order of flying was found in which (\w+ gets past the others|\w+, .+ get past each other) between the walls"
 )
 """Words of the refusals of a flight: a way is too narrow, places are too near, or drones block each other."""

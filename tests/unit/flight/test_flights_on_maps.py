@@ -31,7 +31,7 @@ from tests.support.program import ROOT
 from tests.support.ways_on_maps import NO_TEAM, refused_way
 
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
-NO_ROOM = "are to be kept"
+NO_ROOM = "and the minimum is"
 """Words of the refusal of a flight: places are too near each other."""
 
 

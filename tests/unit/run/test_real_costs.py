@@ -225,7 +225,7 @@ def test_who_was_lost_counts_values_that_are_still_to_come(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("old", "new", "why"),
     [
-        ('objective="maximize"', "", "another objective"),
+        ('objective="maximize"', "", "the objective differs"),
         ('scale="0.1"', 'scale="0.01"', "more decimal places"),
         ('nbValues="3">0..2', ">0..7", "y has new values"),
         ('<domain name="E" nbValues="3">0..2', '<domain name="E" type="symbolic">u v', "the team has no symbol 'u'"),
