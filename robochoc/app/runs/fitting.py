@@ -12,6 +12,7 @@ from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import read_team
 from robochoc.model.problem import Team
 from robochoc.run.choice import accepts, choose
+from robochoc.run.facts import Facts
 from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import installed_protocols
 
@@ -21,6 +22,7 @@ class Fitting(msgspec.Struct, frozen=True):
 
     Attributes:
         protocols: The protocols that accept the team, complete ones first, each with whether it is complete.
+        costs: Whether the team has costs.
         chosen: The protocol that `auto` chooses.
         why: The reason for the choice, in words.
         facts: Facts about the team, in words.
@@ -28,6 +30,7 @@ class Fitting(msgspec.Struct, frozen=True):
     """
 
     protocols: tuple[tuple[str, bool], ...]
+    costs: bool
     chosen: str
     why: str
     facts: tuple[str, ...]
@@ -68,6 +71,7 @@ def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runti
     choice = choose(team, options)
     return Fitting(
         protocols=fitting_protocols(team, options),
+        costs=Facts(team).has_costs,
         chosen=choice.options.protocol,
         why=choice.options.chosen.get("protocol", ""),
         facts=choice.facts,

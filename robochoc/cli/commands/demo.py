@@ -59,7 +59,7 @@ def demo(context: click.Context, page: Path, *, no_open: bool) -> None:
             if status:
                 context.exit(status)
             click.echo()
-    click.echo("Next: robochoc solve --help; robochoc protocols; in Python: help('robochoc')")
+    click.echo("Next: the pages 'Your first team' and 'Lessons'; robochoc solve --help; in Python: help('robochoc')")
     if not no_open and on_a_desktop():
         import webbrowser
 

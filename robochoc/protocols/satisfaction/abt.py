@@ -3,7 +3,7 @@
 Complete search for satisfaction, in which all robots act at the same time. A robot sends its value to lower-priority
 neighbours. A robot without a value left sends a nogood to the lowest-priority robot that caused it.
 
-- **When to use**: no costs. It is the default for such problems.
+- **When to use**: no costs; easy problems, or hundreds of robots with few neighbours.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial: one
   nogood for each value.
 - **Parameters**: none.

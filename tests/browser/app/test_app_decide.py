@@ -46,6 +46,11 @@ def test_a_team_decides_and_another_tab_sees_it(browser: Browser, application: A
         assert "robochoc solve Berths --json" in one.page.inner_text(".command pre")
         one.page.click("text=How they decide")
         one.page.wait_for_selector("text=auto chooses sfb")
+        one.page.click("[aria-label^='Protocol']")
+        one.page.wait_for_selector('text="adopt: finds the best answer, and proves it"', state="attached")
+        one.page.keyboard.press("Escape")
+        one.page.click("text=All messages, with the robots' reasons")
+        one.page.wait_for_url("**/fly")
 
 
 def test_a_short_conversation_is_played_slowly_and_in_steps(

@@ -77,6 +77,7 @@ class _Page:
                 self._legend = ui.label(say("decide.legend")).classes("soft small")
                 self._falling = ui.html("", sanitize=False).classes("cost-line")
                 self._player = ConversationPlayer(self._draw)
+                self._reasons = ui.link(say("decide.talk-reasons"), f"/team/{project.id}/fly").classes("small")
             self._answer = ui.element("section").classes("panel answer")
         self._below = ui.element("div").classes("decide-below")
         on_leave(project.on_change(self._follow_team))
@@ -167,6 +168,7 @@ class _Page:
 
     def _show_conversation(self, shown: Run | None) -> None:
         """Show the messages. In the tab where the run was started, a short conversation is played back."""
+        self._reasons.set_visibility(shown is not None and shown.result is not None)
         if shown is not None and shown.state == RunState.RUNNING:
             self._player.show_live(shown.live.last_messages)
             return

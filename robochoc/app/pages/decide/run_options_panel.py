@@ -66,7 +66,8 @@ class RunOptionsPanel:
             ui.label(text).classes("soft")
 
     def _show(self, found: Fitting) -> None:
-        words = {True: "decide.complete", False: "decide.incomplete"}
+        complete = "decide.costs-complete" if found.costs else "decide.complete"
+        words = {True: complete, False: "decide.incomplete"}
         fit = {name: say(words[complete], name=name) for name, complete in found.protocols}
         chosen = self._protocol.value if self._protocol.value in fit else AUTO
         self._protocol.set_options({AUTO: say("decide.auto"), **fit}, value=chosen)

@@ -241,6 +241,8 @@ def test_that_only_protocols_that_fit_are_offered() -> None:
     assert "abt" not in dict(with_costs.protocols)
     assert with_costs.chosen in dict(with_costs.protocols)
     assert with_costs.why
+    assert with_costs.costs
+    assert not without.costs
 
 
 @looped("content", [b"", b"{", b'{"verdict":"optimal"}', b"nonsense\n", b"[]\n", b"\xff\n"])
