@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import robochoc
+
 ROOT = Path(__file__).resolve().parents[3]
 TEAM = str(ROOT / "instances" / "queens3d-4")
 SOLVED = {
@@ -75,3 +77,13 @@ def test_command_line(tmp_path: Path, command: list[str], status: int, text: str
     assert done.returncode == status, done.stderr
     assert text in done.stdout + done.stderr
     assert "Traceback" not in done.stderr
+
+
+def test_a_journal_becomes_a_page(tmp_path: Path) -> None:
+    model = robochoc.Model("pair")
+    model.add(robochoc.all_different([model.robot(name).variable("x", range(2)) for name in "ab"]))
+    model.solve("abt", journal=tmp_path / "run.journal")
+    export = ["journal", "export", "run.journal", "--format", "html", "-o", "page.html"]
+    done = without_posix(tmp_path, "-c", "from robochoc.cli.main import main; main()", *export)
+    assert done.returncode == 0, done.stderr
+    assert "abt on " in (tmp_path / "page.html").read_text()
