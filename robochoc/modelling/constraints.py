@@ -61,7 +61,9 @@ def conditions_in(given: object, place: SourceLine) -> list[Term]:
     if isinstance(given, Term):
         return [condition(given)]
     if not is_truth(given):
-        raise ModelTypeError(f"{given!r} is not a condition", "compare terms: x != y", place)
+        foreign = type(given).__module__.split(".")[0] in {"cpmpy", "ortools"}
+        hint = "use variables of a robot, or robochoc.from_cpmpy" if foreign else "compare terms: x != y"
+        raise ModelTypeError(f"{given!r} is not a condition", hint, place)
     if not given:
         raise ModelError("this constraint is always False", "compare variables of the model", place)
     return []

@@ -181,6 +181,12 @@ class Term:
             " all_of, any_of, minimum, maximum for all, any, min, max",
         )
 
+    def __float__(self) -> NoReturn:
+        raise ModelTypeError(
+            f"{self!r} has no value before the problem is solved",
+            "write robochoc.function(math.sqrt, x) for math.sqrt(x)",
+        )
+
     def __iter__(self) -> NoReturn:
         raise ModelTypeError(f"{self!r} is one term, not a list of terms", "put it in a list")
 

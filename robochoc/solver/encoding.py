@@ -378,7 +378,7 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
     if size > MAX_TUPLES:
         raise UnsupportedError(
             f"constraint {constraint.name} has {size:,} combinations of values, more than {MAX_TUPLES:,};"
-            " write it as a relation, or split it"
+            " write it as a table (`allowed`, `forbidden` in Python; a relation in files), or split it"
         )
     test = allows_function(constraint, scope)
     sorted_out: tuple[list[tuple[int, ...]], list[tuple[int, ...]]] = ([], [])

@@ -180,6 +180,8 @@ def test_models_and_solutions_are_indexed_by_variables_of_cpmpy() -> None:
     assert x[0] in solution
     assert cp.intvar(0, 1, name="y") not in solution
     assert "4 constraints" in repr(team)
+    with pytest.raises(robochoc.ModelError, match=r"or robochoc\.from_cpmpy"):
+        team.add(x[0] > 1)
     with pytest.raises(robochoc.UnsupportedError, match=r"cpmpy\.tools\.mus"):
         team.conflict()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
 from dataclasses import fields
 from enum import Enum
@@ -58,6 +59,8 @@ def _built(made: Made, mistake: Callable[[Made], object]) -> Team:
 
 MISTAKES: list[tuple[Callable[[Made], object], str]] = [
     (lambda m: bool(m.x == m.y), "has no truth value before"),
+    (lambda m: math.sqrt(m.x + 1), "before the problem is solved (write robochoc.function(math.sqrt, x)"),
+    (lambda m: m.model.add(object()), "compare terms"),
     (lambda m: 1 < m.x < 3, "1 < x < 3"),
     (lambda m: m.x in [m.y, 3], ".is_in"),
     (lambda m: min(m.x, m.y), "minimum"),
