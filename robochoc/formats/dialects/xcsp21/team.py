@@ -1,4 +1,4 @@
-"""From an `Instance` to a team: valid names, owners of variables, costs as integers of one unit."""
+"""Convert an `Instance` to a team, with valid names, an owner for each variable, and integer costs in one unit."""
 
 from __future__ import annotations
 

@@ -25,9 +25,9 @@ from robochoc.formats.dialects.xcsp3.posting import Item, Posting
 from robochoc.model.expression import Apply, Constant, Expression
 
 MAX_WRITTEN_OUT = 100_000
-"""The maximum number of tuples of the expansion of a table with `*`; a larger one becomes an expression."""
+"""The maximum number of tuples in the expansion of a table with `*`; a larger table becomes an expression."""
 MAX_CASES = 9_000
-"""The maximum number of tuples of a table with `*` that is not expanded."""
+"""The maximum number of tuples in a table with `*` that is not expanded."""
 
 Row = tuple[int, ...]
 Arcs = Mapping[str, Mapping[int, set[str]]]
