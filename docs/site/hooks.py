@@ -95,8 +95,19 @@ def with_whole_options(command: re.Match[str]) -> str:
 
 
 def on_post_page(html: str, *, page: Page, config: MkDocsConfig) -> str:
-    """Return the page with names that the theme leaves out: of the search, and of each part of the navigation."""
+    """Return the page with the names that the theme leaves out."""
     del page, config
+    return with_names(html)
+
+
+def on_post_template(output_content: str, *, template_name: str, config: MkDocsConfig) -> str:
+    """Return a file made from a template alone; of the page for missing addresses, with names as in other pages."""
+    del config
+    return with_names(output_content) if template_name == "404.html" else output_content
+
+
+def with_names(html: str) -> str:
+    """Return a page with names of the search and of each part of the navigation, for screen readers."""
     names = dict(
         re.findall(r'<label class="md-nav__title" for="(__nav_\w+)">\s*<span[^>]*></span>([^<]*)</label>', html)
     )
