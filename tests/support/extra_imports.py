@@ -17,6 +17,9 @@ from pathlib import Path
 
 import robochoc
 
+NETWORK = "robochoc.communication.network"
+"""It needs all of the extra `network`; ROS over zenoh needs zenoh alone."""
+
 
 def normalised(name: str) -> str:
     """Return the name of a distribution as indexes write it."""
@@ -71,6 +74,8 @@ def main() -> None:
     provided = packages_distributions()
     packages = {name for name, by in provided.items() if requirements & {normalised(one) for one in by}}
     theirs, ours = modules_for(packages)
+    if "cryptography" not in packages:
+        ours = {name for name in ours if not name.startswith(NETWORK)}
     if not theirs:
         sys.exit("robochoc imports nothing of this extra")
     for name in sorted(theirs) + sorted(ours):
