@@ -27,7 +27,7 @@ TRANSLATED = ARGUMENTS | {"format", "infinity", "owner", "allow_code", "hosts", 
 """The arguments of `solve`, `load`, and `AgentsContainer`."""
 OF_COMMANDS = {
     *("--private", "--sniffable", "--may"),  # of `robochoc master` and `robochoc authority`
-    *("--situation", "--long", "--help"),  # of other commands, or of all
+    *("--situation", "--long", "--help", "--scale"),  # of other commands, or of all
     *("--intension", "--distribution"),  # of export, and of pyDCOP
     "--force",  # `Model.save` has its own message
     "--force-reinstall",  # of pip
