@@ -116,6 +116,7 @@ def with_names(html: str) -> str:
         lambda found: f'{found[1]}<span class="spoken">{names[found[2]].strip()}</span>',
         html,
     )
+    html = html.replace('class="md-search__options" aria-label="Search"', 'class="md-search__options" role="none"', 1)
     return html.replace('class="md-search"', 'class="md-search" aria-label="Search"', 1)
 
 
