@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from importlib import import_module
 from pkgutil import resolve_name
 from types import MappingProxyType
@@ -18,6 +19,8 @@ from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings import read_settings
+from robochoc.protocols.shared.cycles import CycleCount
 from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -27,6 +30,10 @@ from robochoc.system.posix import IS_POSIX, REQUIREMENT
 if TYPE_CHECKING:
     from robochoc.communication.simulator.losses import Losses
     from robochoc.communication.simulator.schedule import Schedule
+
+
+ROBOT_CYCLES = 3_000
+"""The product of robots and cycles from which arrays save more time than importing numpy takes."""
 
 
 class CommonArguments(TypedDict):
@@ -49,6 +56,7 @@ class SessionRequest:
         observer: Receives all events.
         progress: Receives the number of messages so far, from time to time.
         kills: The robots whose processes are to be killed.
+        changes: True if the problem may change after the first search.
         deadline: The end of the run's time, on the monotonic clock. None: no limit.
     """
 
@@ -59,6 +67,7 @@ class SessionRequest:
     observer: Observer | None = None
     progress: Callable[[Progress], None] | None = None
     kills: KillSchedule | None = None
+    changes: bool = False
     deadline: float | None = None
 
     @property
@@ -119,7 +128,39 @@ def _import_tables(request: SessionRequest) -> None:
 
 
 def open_simulator(request: SessionRequest) -> Session:
-    """Open a session in which all robots run in one thread."""
+    """Open a session in which all robots run in one thread.
+
+    Long runs of local search whose messages nobody observes are computed as arrays, with the same results and counts.
+    """
+    if not _is_for_arrays(request):
+        return _simulation(request)
+    from robochoc.communication.arrays.session import SimulatedArrays  # noqa: PLC0415 - start-up: numpy
+
+    try:
+        session = SimulatedArrays(request.team, request.protocol, deadline=request.deadline, **request.common)
+    except UnsupportedError:
+        return _simulation(request)
+    session.simulate = partial(_simulation, request)
+    return session
+
+
+def _is_for_arrays(request: SessionRequest) -> bool:
+    """Return whether arrays are faster for a run in the simulator, and have the same results."""
+    options, parameters, protocol = request.options, request.parameters, request.protocol
+    settings = read_settings(protocol, parameters.settings) if protocol.traits.arrays else None
+    return (
+        isinstance(settings, CycleCount)
+        and settings.cycles * len(request.team.team.robots) >= ROBOT_CYCLES
+        and request.observer is None
+        and not request.changes
+        and options.schedule == ScheduleName.CONCURRENT
+        and not (options.delay or options.channel or options.loss)
+        and (options.messages, options.ncccs, options.cycles, parameters.withdrawal_cost) == (None, None, None, None)
+    )
+
+
+def _simulation(request: SessionRequest) -> Session:
+    """Open a session that simulates every message."""
     from robochoc.communication.simulator.simulator import (  # noqa: PLC0415 - as above
         EffortLimits,
         Simulation,
@@ -154,7 +195,7 @@ def open_arrays(request: SessionRequest) -> Session:
     """Open a session in which all robots are rows in arrays."""
     from robochoc.communication.arrays.session import ArraysRun  # noqa: PLC0415 - one runtime is enough
 
-    return ArraysRun(request.team, request.protocol, **request.common)
+    return ArraysRun(request.team, request.protocol, deadline=request.deadline, **request.common)
 
 
 def _schedule_of(options: Options) -> Schedule:

@@ -335,7 +335,8 @@ class ThisMachine(Deployment):
             context.observer,
             context.progress,
             context.kills,
-            None if self._dynamic and self.options.deadline is not None else context.deadline,
+            changes=self._dynamic,
+            deadline=None if self._dynamic and self.options.deadline is not None else context.deadline,
         )
         return open_session(request)
 

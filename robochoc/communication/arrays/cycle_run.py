@@ -88,6 +88,7 @@ class CycleRun(ABC):
         self.values: Integers = np.zeros(layout.many, layout.kind)
         self.cycle = -1
         self.costs: list[float] = []
+        self._lowest: float = INFINITE
         self.changes: list[CycleChange] | None = [] if changes else None
         self.best: Integers = self.values
         self.verdict: Verdict | None = None
@@ -193,8 +194,8 @@ class CycleRun(ABC):
 
     def note(self, cost: float) -> None:
         """Record the cost of the current values."""
-        if not self.costs or cost < min(self.costs) or cost == INFINITE == min(self.costs):
-            self.best = self.values.copy()
+        if cost < self._lowest or cost == INFINITE == self._lowest:
+            self.best, self._lowest = self.values.copy(), cost
         self.costs.append(cost)
 
     def present(self, number: int, value_costs: Integers) -> Integers:

@@ -22,9 +22,11 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
+from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.stopping import stop_requested
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 
 class ArraysRun(Session):
@@ -36,9 +38,11 @@ class ArraysRun(Session):
         observer: Receives the robots' decisions, with the cycle as their time, and no messages.
         progress: Receives the message count after each cycle, before the decisions in the cycle.
         parameters: The robots' parameters besides the problem.
+        deadline: The end of the run's time, on the monotonic clock. None: no limit.
 
     Raises:
         UnsupportedError: if the protocol cannot run as arrays, or costs or tables are too large.
+        TeamCompileTimeoutError: if the deadline passes before the arrays are complete.
     """
 
     def __init__(
@@ -49,6 +53,7 @@ class ArraysRun(Session):
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
+        deadline: float | None = None,
     ) -> None:
         super().__init__(team)
         self._observer = observer
@@ -57,7 +62,11 @@ class ArraysRun(Session):
         assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
         given = read_settings(protocol, parameters.settings)
         settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
-        self._layout = _laid_out(Epoch(self.compiled, parameters=parameters).parts(protocol))
+        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
+        try:
+            self._layout = computed_by(deadline, _laid_out, parts)
+        except TimeLimitError:
+            raise TeamCompileTimeoutError("the time was over before the robots knew their problems") from None
         self._run = form(self._layout, settings, parameters.seed, changes=True)
         self._names = self._layout.description.names
 
@@ -146,6 +155,26 @@ class ArraysRun(Session):
             last = run.cycle if self._layout.degrees[row] else run.settings.cycles
             found[self._names[robot]] = Findings(trail=Trail(entries[row], last))
         return found
+
+
+class SimulatedArrays(ArraysRun):
+    """Runs one team as arrays, with the results and the counts of the simulator.
+
+    The counts differ only if Max-Sum proves that there is no solution, since the simulator stops within a cycle. Such a
+    run is simulated again, message by message, by the session that `simulate` opens.
+    """
+
+    simulate: Callable[[], Session]
+
+    def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
+        """See `Session.search`."""
+        began = time.monotonic()
+        result = super().search(timeout, messages)
+        if result.verdict != Verdict.NO_SOLUTION:
+            return result
+        session = self.simulate()
+        session.watch = self.watch
+        return session.search(timeout and max(0.0, timeout - (time.monotonic() - began)), messages)
 
 
 def _laid_out(parts: Mapping[str, AgentProblem]) -> ArrayLayout:

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.arrays.session import ArraysRun
+from robochoc.communication.arrays.session import ArraysRun, SimulatedArrays
 from robochoc.communication.search_result import SearchResult
+from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.run import runtimes, solve
 from robochoc.run.incumbent import costs_by_cycle
+from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.errors import UnsupportedError
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, random_hard_team, with_costs
 from tests.support.examples import count, examples
@@ -109,3 +115,57 @@ def test_the_costs_of_cycles_are_those_of_the_values(protocol: str) -> None:
         trails = {name: found.trail for name, found in result.findings.items() if found.trail}
         if result.verdict is Verdict.SOLUTION:
             assert run.costs == list(costs_by_cycle(run.compiled, trails))
+
+
+# The simulator, which computes long runs that nobody observes as arrays
+
+LIMITS: tuple[dict[str, Any], ...] = (
+    {}, {}, {"timeout": 60}, {"deadline": 60}, {"withdraw": "minimum"}, {"withdraw": "maximal"},
+    {"order": "random"}, {"delay": 3}, {"schedule": "cycles"}, {"schedule": "random"}, {"message_loss": 0.2},
+    {"channel": next(iter(CHANNELS.values()))}, {"messages": 40}, {"ncccs": 60}, {"preprocess": "ac"},
+)  # fmt: skip
+
+
+def outcome_in(monkeypatch: pytest.MonkeyPatch, team: Team, options: Options, robot_cycles: int) -> Outcome | str:
+    """Return the outcome of a run in which arrays are used from this size on, without wall times; or the refusal."""
+    monkeypatch.setattr(runtimes, "ROBOT_CYCLES", robot_cycles)
+    try:
+        found = solve(team, options)
+    except UnsupportedError as refusal:
+        return str(refusal)
+    untimed = {"wall_s": 0.0, "compile_s": 0.0}
+    epochs = tuple(replace(one, metrics=replace(one.metrics, **untimed)) for one in found.epochs)
+    return replace(found, metrics=replace(found.metrics, **untimed), preprocessing=None, epochs=epochs)
+
+
+@count("many", 60, 3000)
+def test_the_simulator_has_the_same_outcomes_with_and_without_arrays(
+    monkeypatch: pytest.MonkeyPatch, many: int
+) -> None:
+    """All options that the simulator accepts; `search` is counted, so that arrays are known to be used."""
+    searched: list[str] = []
+    search = SimulatedArrays.search
+
+    def counted(self: SimulatedArrays, timeout: float | None = None, messages: int | None = None) -> SearchResult:
+        searched.append(used)
+        return search(self, timeout, messages)
+
+    monkeypatch.setattr(SimulatedArrays, "search", counted)
+    for seed in range(many):
+        chance = Random(f"outcomes {seed}")
+        used = chance.choice(PROTOCOLS)
+        settings = random_settings(used, chance) | ({"anytime": "yes"} if chance.random() < 0.1 else {})
+        limits = chance.choice(LIMITS)
+        options = Options(used, Runtime.SIMULATOR, seed, settings=settings, cache=False, **limits)
+        team = chance.choice(MAKERS)(chance)
+        arrays, objects = (outcome_in(monkeypatch, team, options, size) for size in (0, 10**12))
+        assert arrays == objects, (seed, options)
+    assert {*searched} == {*PROTOCOLS}
+
+
+def test_an_observer_sees_every_message(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(runtimes, "ROBOT_CYCLES", 0)
+    team = random_cost_team(Random(1))
+    seen: list[object] = []
+    found = solve(team, Options("dsa", Runtime.SIMULATOR, settings={"cycles": "5"}), observer=seen.append)
+    assert sum(type(event).__name__ == "Sent" for event in seen) == sum(found.metrics.messages.values()) > 0
