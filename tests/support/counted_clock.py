@@ -9,7 +9,13 @@ from contextlib import ExitStack, contextmanager
 from types import SimpleNamespace
 from unittest.mock import patch
 
-MODULES = ("communication.arrays.session", "communication.simulator.simulator", "run.context", "run.orchestrator", "run.improvement")
+MODULES = (
+    "communication.arrays.session",
+    "communication.simulator.simulator",
+    "run.context",
+    "run.orchestrator",
+    "run.improvement",
+)
 """Where the time of a simulated run is looked at."""
 
 

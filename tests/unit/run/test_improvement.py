@@ -96,7 +96,9 @@ def test_utilities_rise() -> None:
     team = costly(costs=CostUnits(maximize=True, places=0, constant=0))
     for protocol, deadline_s in (("dsa", 3), ("afb", 20)):
         told = Told()
-        outcome = solve(team, simulated(protocol, deadline_s, 500, settings=LONG if protocol == "dsa" else {}), audience=told)
+        outcome = solve(
+            team, simulated(protocol, deadline_s, 500, settings=LONG if protocol == "dsa" else {}), audience=told
+        )
         assert len(told.costs) > 1
         assert told.costs == sorted(set(told.costs))
         assert outcome.cost == told.costs[-1]
