@@ -110,9 +110,9 @@ def test_numbers_that_cannot_be_are_refused() -> None:
     for wrong, why in (
         (Counts(1, bytes([1, 0])), "a number does not match its cost"),
         (Counts(1, bytes([4, 1])), "larger than 2\\^2"),
-        (Counts(2, bytes([1, 0, 1, 0])), "do not fit"),
-        (Counts(1, bytes([1, 1, 1])), "do not fit"),
-        (Counts(1, b""), "do not fit"),
+        (Counts(2, bytes([1, 0, 1, 0])), "the table lacks"),
+        (Counts(1, bytes([1, 1, 1])), "the table lacks"),
+        (Counts(1, b""), "the table lacks"),
     ):
         assert_refused(with_costs, [("RB", wrong)], why)
     assert_refused(root, [("RB", Counts(1, bytes([1, 1])))], "before its costs")

@@ -58,11 +58,17 @@ def plain(table: Table) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     return costs
 
 
+@looped("small", (0, 20, 1 << 12))
 @looped(("block", "longest"), SMALL)
-def test_a_projection_is_the_least_of_the_sum(monkeypatch: pytest.MonkeyPatch, block: int, longest: int) -> None:
+@pytest.mark.parametrize("seeds", [range(60), pytest.param(range(60, 1000), marks=pytest.mark.more)], ids=str)
+def test_a_projection_is_the_least_of_the_sum(
+    monkeypatch: pytest.MonkeyPatch, block: int, longest: int, small: int, seeds: range
+) -> None:
+    """With `small` = 0 all numbers are integers, with the largest one all joins here are of floats."""
     monkeypatch.setattr(dpop_tables, "BLOCK", block)
     monkeypatch.setattr(dpop_tables, "LONGEST", longest)
-    for seed in range(60):
+    monkeypatch.setattr(dpop_tables, "SMALL", small)
+    for seed in seeds:
         chance = np.random.default_rng(seed)
         most = int(chance.choice([3, 80, 20_000, 2_000_000, 10**14]))
         shape = [int(size) for size in chance.integers(2, 5, chance.integers(0, 5))]
@@ -72,7 +78,7 @@ def test_a_projection_is_the_least_of_the_sum(monkeypatch: pytest.MonkeyPatch, b
         for _ in range(chance.integers(0, 4)):
             lengths = [own, *(size if chance.random() < 0.6 else 1 for size in shape)]
             tables.append(random_table(chance, lengths, most, coded=bool(chance.random() < 0.5)))
-        costs, choices = project(shape, charges, tables, width_for(most * (len(tables) + 1)))
+        costs, choices = project(shape, charges, tables, most * (len(tables) + 1))
         start = np.array(charges).reshape(-1, *(1 for _ in shape))
         joined = np.broadcast_to(sum(map(plain, tables), start=start), (own, *shape))
         np.testing.assert_array_equal(plain(costs), joined.min(axis=0))
@@ -137,7 +143,7 @@ def test_arrays_never_hold_more_than_was_told_before(seed: int) -> None:
         kinds = (np.dtype(np.float64), *[np.dtype(f"<u{width_for(most)}")] * 2)
         tables: list[Table] = [np.full(length, most, kind) for length, kind in zip(lengths, kinds, strict=True)]
         tracemalloc.reset_peak()
-        costs, choices = project(shape, [0.0] * own, tables, width)
+        costs, choices = project(shape, [0.0] * own, tables, 3 * most)
         tables.clear()
         pieces = list(packed_costs(costs))
         peak = tracemalloc.get_traced_memory()[1]

@@ -229,7 +229,10 @@ def test_of_a_robot_that_nobody_sees_one_value_is_listed() -> None:
 
 @looped(
     ("places", "why"),
-    [({"RA": [0], "RB": [0, 1]}, "listed 1 to 2 optima"), ({"RA": [0, 0], "RB": [1, 1]}, "are equal")],
+    [
+        ({"RA": [0], "RB": [0, 1]}, "different numbers of optima, from 1 to 2"),
+        ({"RA": [0, 0], "RB": [1, 1]}, "are equal"),
+    ],
 )
 def test_lists_that_do_not_go_together_are_refuted(places: dict[str, list[int]], why: str) -> None:
     pair = team_of({"A": [1, 2], "B": [1, 2]}, [differ("A", "B")])

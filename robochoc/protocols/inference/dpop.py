@@ -478,7 +478,7 @@ class DPOP(TreeProtocol):
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree for each combination of values in the separator."""
         shape = [self._sizes[name] for name in self.separator or ()]
-        costs, self.choices = project(shape, self.problem.charges, self._joined, width_of(self._dearest))
+        costs, self.choices = project(shape, self.problem.charges, self._joined, self._dearest)
         self._process_joined(costs)
         self._joined.clear()
         self._send_or_choose(costs)

@@ -1,9 +1,9 @@
 """Tables of costs in DPOP: how they are joined, projected, stored and sent (see `dpop`).
 
 An axis belongs to a robot, an index on it to one of the robot's values. Costs are integers, or `inf` if a hard
-constraint is broken; they are added up in float64, which is exact below 2^53. Stored and sent tables contain unsigned
-integers, as narrow as the costs allow; the largest number represents `inf`. The memory that an operation needs is known
-before: `bytes_of`.
+constraint is broken; they are added up as the narrowest integers that have room for the sums, or in float64, which is
+exact below 2^53. Stored and sent tables contain unsigned integers, as narrow as the costs allow; the largest number
+represents `inf`. The memory that an operation needs is known before: `bytes_of`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,9 @@ Width = Literal[1, 2, 4, 8]
 BLOCK = 1 << 17
 """The number of cells of a join that are made at a time, small enough for the processor's cache."""
 TEMPORARY = 32
-"""The maximum bytes for each of these: sums, a table's costs as they are added, and the search for the minimum."""
+"""The maximum bytes for each of these cells: sums, a table's costs as they are added, and the least of them."""
+SMALL = 1 << 12
+"""The maximum number of cells of a table that is converted once, not again for each block; and of a join of floats."""
 LONGEST = 16
 """The number of blocks that may form one block if a single axis needs it."""
 PIECE = 1 << 24
@@ -81,25 +83,133 @@ def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
     return table[tuple([slice(None) if name in kept else np.newaxis for name in onto])]
 
 
-def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Table], width: Width) -> Projection:
+def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Table], dearest: int) -> Projection:
     """Add up `charges`, the costs of this robot's values, and `tables`; then minimise over its values.
 
-    `tables` have this robot's axis first, then the axes of `shape` (see `aligned`). The join is larger than the result
-    by this axis. It is never in memory as a whole, but is made block by block. Small tables are added up first.
+    `tables` have this robot's axis first, then the axes of `shape` (see `aligned`); no finite sum is above `dearest`.
+    The join is larger than the result by this robot's axis. It is never in memory as a whole, but is made block by
+    block: a block has one index on each leading axis of `shape`, and all indices on the others.
     """
-    costs = np.full(shape, _top(width), f"<u{width}")
-    choices = np.zeros(shape, _choice(len(charges)))
+    width = width_of(dearest)
+    result = Projection(np.empty(shape, f"<u{width}"), np.empty(shape, _choice(len(charges))))
     split = _stepped(shape, len(charges))
-    own = np.array(charges, np.float64).reshape(-1, *(1 for _ in shape[split:]))
-    tables = sorted(tables, key=lambda table: [length > 1 for length in table.shape[split + 1 :]])
-    for place in np.ndindex(*shape[:split]):
-        joined = own
-        for table in tables:
-            joined = joined + _block(table, place)
-        least = joined.min(axis=0)
-        np.copyto(costs[*place, ...], least, where=least < np.inf, casting="unsafe")
-        choices[*place, ...] = joined.argmin(axis=0)
-    return Projection(costs, choices)
+    steps: list[list[Table]] = [[] for _ in shape[:split]]
+    fixed: Array = np.array(charges, np.float64).reshape(-1, *(1 for _ in shape[split:]))
+    for table in sorted(tables, key=lambda table: [length > 1 for length in table.shape[split + 1 :]]):
+        varying = [axis for axis, length in enumerate(table.shape[1 : split + 1]) if length > 1]
+        if varying:
+            steps[varying[-1]].append(table)
+        else:
+            fixed = np.add(fixed, _floats(_part(table, [0] * split)))
+    codes = _Codes.least(len(charges), dearest, sum(map(len, steps)), math.prod(shape) * len(charges))
+    numbers = codes.first(fixed)
+    del fixed
+    _Join(result, steps, codes, numbers).fill((), None)
+    return result
+
+
+class _Codes:
+    """Numbers for a cost and the value that attains it, so that a single minimum finds the cheapest and first value.
+
+    The number is `cost * many + value`, where `many` is the number of this robot's values. Any number from `infinite`
+    on is an infinite cost. If no integer type has room for these numbers, or there are few, they are floats for costs
+    alone.
+    """
+
+    def __init__(self, kind: str, many: int, infinite: int) -> None:
+        self.kind = np.dtype(kind)
+        self.many = many
+        self.infinite = infinite
+        self.exact = self.kind.kind == "u"
+
+    @classmethod
+    def least(cls, many: int, dearest: int, added: int, cells: int) -> _Codes:
+        """Return the narrowest numbers for costs up to `dearest`, for sums of a block and `added` tables.
+
+        For few `cells`, conversions would take longer than the sums.
+        """
+        infinite = (dearest + 1) * many
+        largest = infinite * (added + 1)
+        kinds = [f"=u{width}" for width in _WIDTHS if largest <= _top(width)] if cells > SMALL else []
+        return cls(kinds[0] if kinds else "=f8", many, infinite)
+
+    def first(self, costs: Array) -> Table:
+        """Return numbers for `costs`, whose first axis belongs to this robot."""
+        if not self.exact:
+            return costs
+        places = np.arange(self.many, dtype=self.kind).reshape(-1, *(1 for _ in costs.shape[1:]))
+        numbers: Codes = np.ascontiguousarray(self.further(costs))
+        np.add(numbers, places, out=numbers, where=numbers < self.infinite)
+        return numbers
+
+    def further(self, table: Table) -> Any:  # noqa: ANN401 - integers or floats
+        """Return numbers for the costs in `table`, to be added to numbers with values."""
+        if not self.exact:
+            return _floats(table)
+        if table.dtype.kind == "u":
+            broken = table == _top(table.itemsize) if table.max() == _top(table.itemsize) else None
+            numbers = np.multiply(table, self.kind.type(self.many), dtype=self.kind, casting="unsafe")
+        else:
+            broken = np.isinf(table)
+            numbers = np.where(broken, 0, table).astype(self.kind)
+            numbers *= self.kind.type(self.many)
+        if broken is not None:
+            np.copyto(numbers, self.kind.type(self.infinite), where=broken)
+        return numbers
+
+    def store(self, numbers: Any, costs: Codes, choices: Codes) -> None:  # noqa: ANN401 - integers or floats
+        """Store the costs and values of the least of `numbers`, a row for each of this robot's values."""
+        least = numbers.min(axis=0)
+        if not self.exact:
+            choices[...] = numbers.argmin(axis=0)
+            infinite = np.isinf(least)
+            np.copyto(costs, least, where=~infinite, casting="unsafe")
+        else:
+            infinite = least >= self.infinite if least.max() >= self.infinite else None
+            found = least // self.kind.type(self.many)
+            np.copyto(costs, found, casting="unsafe")
+            found *= self.kind.type(self.many)
+            np.subtract(least, found, out=least)
+            np.copyto(choices, least, casting="unsafe")
+        if infinite is not None:
+            costs[infinite] = _top(costs.itemsize)
+            choices[infinite] = 0
+
+
+class _Join:
+    """A join that is made block by block, and its projection, the `result`.
+
+    `steps`: for each leading axis, the tables that have this axis and no later leading axis. `fixed`: the sum of all
+    tables without leading axes. A sum of tables is made again only if an index on one of their leading axes changes.
+    """
+
+    def __init__(self, result: Projection, steps: Sequence[Sequence[Table]], codes: _Codes, fixed: Table) -> None:
+        self._result = result
+        self._codes = codes
+        self._fixed = fixed
+        self._joined = np.empty((codes.many, *result.costs.shape[len(steps) :]), codes.kind)
+        self._small = [[codes.further(table) for table in tables if table.size <= SMALL] for tables in steps]
+        self._large = [[table for table in tables if table.size > SMALL] for tables in steps]
+
+    def fill(self, place: tuple[int, ...], added: Any) -> None:  # noqa: ANN401 - integers or floats, or None
+        """Compute all blocks with the indices `place` on the first axes; `added` is the sum of their tables so far."""
+        costs, choices = self._result
+        depth = len(place)
+        if depth == len(self._small):
+            np.add(self._fixed, 0 if added is None else added, out=self._joined)
+            rows = self._joined.reshape(self._codes.many, -1)
+            here: tuple[Any, ...] = (*place, ...)
+            self._codes.store(rows, costs[here].reshape(-1), choices[here].reshape(-1))
+            return
+        after = [0] * (len(self._small) - depth - 1)
+        for index in range(costs.shape[depth]):
+            full = (*place, index, *after)
+            blocks = [_part(table, full) for table in self._small[depth]]
+            blocks += [self._codes.further(_part(table, full)) for table in self._large[depth]]
+            total = added
+            for block in blocks:
+                total = block if total is None else total + block
+            self.fill((*place, index), total)
 
 
 def place_type(sizes: Iterable[int]) -> np.dtype[np.unsignedinteger[Any]]:
@@ -163,20 +273,24 @@ class IncomingTable:
         self._left -= codes.size
 
 
-def _block(table: Table, place: Sequence[int]) -> Array:
-    """Return the block of `table` at these indices on the first axes after this robot's, as floats."""
+def _part(table: Table, place: Sequence[int]) -> Table:
+    """Return the part of `table` at these indices on the first axes after this robot's."""
     steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
     index: tuple[slice | int, ...] = (slice(None), *steps)
-    block = table[index]
-    costs = block.astype(np.float64, copy=False)
-    if block.dtype.kind == "u":
-        np.copyto(costs, np.inf, where=block == _top(block.itemsize))
+    return table[index]
+
+
+def _floats(table: Table) -> Array:
+    """Return the costs in `table` as floats."""
+    costs = table.astype(np.float64, copy=False)
+    if table.dtype.kind == "u":
+        np.copyto(costs, np.inf, where=table == _top(table.itemsize))
     return costs
 
 
 def costs_for(table: Table, value: int) -> Array:
     """Return, as floats, the part of `table` at one index of its first axis; all of it if the axis has length 1."""
-    return _block(table[value : value + 1] if len(table) > 1 else table, ()).reshape(table.shape[1:])
+    return _floats(table[value : value + 1] if len(table) > 1 else table).reshape(table.shape[1:])
 
 
 def place_at(table: NDArray[Any], places: Sequence[int]) -> tuple[int, ...]:
@@ -192,8 +306,10 @@ def cost_at(table: Table, at: tuple[int, ...]) -> float:
 def _max_finite(costs: Codes) -> int:
     """Return the largest finite cost; 0 if there is none."""
     flat = costs.reshape(-1)
-    blocks = (flat[start : start + BLOCK] for start in range(0, flat.size, BLOCK))
-    return int(max((block.max(where=block < _top(costs.itemsize), initial=0) for block in blocks), default=0))
+    one = costs.dtype.type(1)
+    # The code of `inf` plus one is 0.
+    blocks = (flat[start : start + BLOCK] + one for start in range(0, flat.size, BLOCK))
+    return max(0, max((int(block.max()) for block in blocks), default=0) - 1)
 
 
 def _stepped(shape: Sequence[int], own: int) -> int:

@@ -366,7 +366,7 @@ class MBDPOP(DPOP):
         tables = [aligned(*self._fixed(table, over, context), onto) for table, over in [*self._own_tables, *children]]
         own = context.get(self.problem.agent)
         charges = self.problem.charges if own is None else self.problem.charges[own : own + 1]
-        return project([self._sizes[name] for name in axes], charges, tables, width_of(self._dearest))
+        return project([self._sizes[name] for name in axes], charges, tables, self._dearest)
 
     def _fixed(self, table: Table, axes: Sequence[str], context: Mapping[str, int]) -> tuple[Table, list[str]]:
         """Return the part of `table` in `context`, and its axes; this robot's axis remains, with one index."""

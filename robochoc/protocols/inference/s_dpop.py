@@ -373,7 +373,7 @@ class SDPOP(DPOP, DynamicProtocol):
         joined = [self._aligned(table, axes) for table, axes in self._own_tables]
         joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
         shape = [self._sizes[name] for name in self.separator or ()]
-        costs, self.choices = project(shape, self.problem.charges, joined, width_of(self._dearest))
+        costs, self.choices = project(shape, self.problem.charges, joined, self._dearest)
         self.basis = self._inputs
         self._send_or_choose(costs)
         self._last_optimum = self.optimum
