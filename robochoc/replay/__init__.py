@@ -4,7 +4,7 @@ from robochoc.replay.claims import Contradiction
 from robochoc.replay.comparison import StepDifference
 from robochoc.replay.rebuild import CannotReplayError, ReplayOptions
 from robochoc.replay.replay import ReplayResult, StoppedRobot, replay
-from robochoc.replay.robot_states import RobotState, ValueState, states_of
+from robochoc.replay.robot_states import RobotState, TeamStates, ValueState, states_of
 
 __all__ = [
     "CannotReplayError",
@@ -14,6 +14,7 @@ __all__ = [
     "RobotState",
     "StepDifference",
     "StoppedRobot",
+    "TeamStates",
     "ValueState",
     "replay",
     "states_of",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from collections.abc import Set as AbstractSet
+from functools import cache
 from itertools import islice
 from typing import Any
 
@@ -51,6 +52,9 @@ _KNOWN = {
 }
 """Attributes that are shown elsewhere, or are not informative."""
 
+Seen = Callable[[], dict[str, Value]]
+"""Returns the others' values against which a robot checks its own."""
+
 
 class Inspector:
     """Describes the state of a robot with its `part` of the problem."""
@@ -81,11 +85,10 @@ class Inspector:
         elif known is not None:
             pairs = {name: others.own_value_text(name, value) for name, value in known.items()}
         else:
-            pairs = {
-                name: self.message_text(name, message) or type(message).__name__
-                for name, message in self._last_messages.items()
-            }
-            pairs |= {name: self._own.own_value_text(name, value) for name, value in self._last_values.items()}
+            pairs = {name: self._own.own_value_text(name, value) for name, value in self._last_values.items()}
+            for name, message in self._last_messages.items():
+                if name not in pairs:
+                    pairs[name] = self.message_text(name, message) or type(message).__name__
         shown = [(name, pairs[name]) for name in sorted(pairs, key=self._rank)[:MOST_SEEN]]
         more = len(pairs) - len(shown)
         return [*shown, ("", f"and {more:,} more")] if more else shown
@@ -119,33 +122,34 @@ class Inspector:
         places = list(range(min(count, MOST_VALUES)))
         if protocol.value is not None and protocol.value >= len(places):
             places.append(protocol.value)
-        shown = [(self.own_value(protocol, index), self.against(protocol, index)) for index in places]
+        seen = cache(lambda: self._seen(protocol))  # computed at most once, and only if a value needs it
+        shown = [(self.own_value(protocol, index, seen), self.against(protocol, index, seen)) for index in places]
         more = count - len(places)
         return [*shown, (f"and {more:,} more", None)] if more else shown
 
-    def own_value(self, protocol: Protocol, index: int) -> str:
-        """Return the value at `index` as text, with its cost if any value has a cost."""
+    def own_value(self, protocol: Protocol, index: int, seen: Seen | None = None) -> str:
+        """Return the value at `index` as text, with its cost if any value has a cost. `seen`: see `_seen`."""
         text = self._own.own_value_text(self.agent, protocol.problem.values[index])
         notes = protocol.value_notes(index)
         if notes:
             return f"{text} ({', '.join(f'{name} {safe_repr(number)}' for name, number in notes.items())})"
         if protocol.traits.costs:
-            cost = self._problem.cost(index, self._seen(protocol))
+            cost = self._problem.cost(index, seen() if seen else self._seen(protocol))
             return f"{text} (costs {safe_repr(cost)})" if cost < INFINITE else text
         return text
 
-    def against(self, protocol: Protocol, index: int) -> str | None:
+    def against(self, protocol: Protocol, index: int, seen: Seen | None = None) -> str | None:
         """Return the known reason that excludes the value at `index`; None if it is not excluded."""
-        found = self.ruling(protocol, index)
+        found = self.ruling(protocol, index, seen)
         return None if found is None else found[0]
 
-    def ruling(self, protocol: Protocol, index: int) -> tuple[str, Collection[str]] | None:
+    def ruling(self, protocol: Protocol, index: int, seen: Seen | None = None) -> tuple[str, Collection[str]] | None:
         """Return the reason that excludes the value at `index`, with the robots whose values it involves."""
         store = attributes_of(protocol).get("store")
         if isinstance(store, NogoodStore):
             lhs = store[index]
             return None if lhs is None else (self._others(protocol).all(lhs) or ALWAYS, lhs)
-        broken = self._problem.conflict_with_key(index, self._seen(protocol))
+        broken = self._problem.conflict_with_key(index, seen() if seen else self._seen(protocol))
         if broken is not None:
             lhs, key = broken
             return f"{self._own.all(lhs) or 'its own constraints'}, by {cut(key.partition(':')[2])}", lhs

@@ -23,7 +23,7 @@ from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_stage
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.agent_problem import AgentProblem, RunParameters
+from robochoc.solver.agent_problem import AgentProblem, AgentProblems, RunParameters
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import CompileError, CompileLimits, Compiler, CompileTimeoutError
 from robochoc.solver.compiled_domain import CompiledDomain, TooManySolutionsError
@@ -99,18 +99,51 @@ def reads_files(events: Iterable[AnyEvent]) -> bool:
     return not given or any(one.why for one in given)
 
 
+class RecordedTeams:
+    """The teams in a journal's `Given` events, for several rebuilders of the journal: each team is read once."""
+
+    def __init__(self, header: Header | None) -> None:
+        self._reader = TeamReader(header.team if header else "")
+        self._teams: dict[int, tuple[Given, Team]] = {}
+        self._problems: dict[tuple[int, bool, bool], AgentProblems] = {}
+
+    def team(self, given: Given) -> Team:
+        """Return the team after `given`. Each rebuilder requests the events in order. Raises `GivenProblemError`."""
+        if (found := self._teams.get(id(given))) is None:
+            found = self._teams[id(given)] = given, self._reader.team(given)  # keeps the event, and thus its id
+        return found[1]
+
+    def parts(self, epoch: Epoch, given: Given, protocol: type[Protocol]) -> dict[str, AgentProblem]:
+        """Return each compiled robot's part of the problem in `epoch`, which is the epoch of `given`."""
+        traits = protocol.traits
+        key = id(given), traits.shared_scopes, traits.tree
+        if (problems := self._problems.get(key)) is None:
+            problems = self._problems[key] = AgentProblems(
+                epoch.team, epoch.parameters, shared_scopes=traits.shared_scopes, tree=traits.tree
+            )
+        return {name: problems.problem(own) for name, own in epoch.compiled.robots.items()}
+
+
 class Rebuilder:
     """Creates the robots of each run in turn. Robots that continue into an epoch remain the same objects.
 
-    `only` names the robots to create; None for all. Raises `CannotReplayError` for a run in which messages may be lost.
+    `only` names the robots to create; None for all. `teams`: shared by the rebuilders of one journal. Raises
+    `CannotReplayError` for a run in which messages may be lost.
     """
 
-    def __init__(self, header: Header | None, options: ReplayOptions, only: Collection[str] | None = None) -> None:
+    def __init__(
+        self,
+        header: Header | None,
+        options: ReplayOptions,
+        only: Collection[str] | None = None,
+        teams: RecordedTeams | None = None,
+    ) -> None:
         if header is not None and header.message_loss:
             raise CannotReplayError("messages were lost (--message-loss), and journals do not record which")
         self._header = header
         self._options = options
         self._only = only
+        self._teams = teams
         self._reader = TeamReader(header.team if header else "")
         self._hosts: dict[type[Protocol], dict[str, Host]] = {}
         """The hosts of each protocol's last run: before an epoch, there may be a run of another protocol."""
@@ -122,7 +155,7 @@ class Rebuilder:
         protocol = self._protocol(run)
         try:
             epoch = self._epoch(run, protocol)
-            parts = epoch.parts(protocol)
+            parts = self._parts(run, epoch, protocol)
             continues = run.began is not None and isinstance(run.began.epoch, int)
             before = self._hosts.get(protocol, {}) if continues else {}
             hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
@@ -159,12 +192,22 @@ class Rebuilder:
             raise CannotReplayError(str(unknown)) from unknown
 
     def _epoch(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
-        if run.given is not None and not (run.given.why and self._options.team):
-            return self._from_event(run.given)
+        if (given := self._given(run)) is not None:
+            return self._from_event(given)
         return self._from_files(run, protocol)
 
+    def _given(self, run: RecordedRun) -> Given | None:
+        """Return the event with the robots' problems; None if the team's files are used instead."""
+        return None if run.given is not None and run.given.why and self._options.team else run.given
+
+    def _parts(self, run: RecordedRun, epoch: Epoch, protocol: type[Protocol]) -> dict[str, AgentProblem]:
+        given = self._given(run)
+        return (
+            epoch.parts(protocol) if self._teams is None or given is None else self._teams.parts(epoch, given, protocol)
+        )
+
     def _from_event(self, given: Given) -> Epoch:
-        compiled = self._compiled(self._reader.team(given))
+        compiled = self._compiled((self._teams or self._reader).team(given))
         return Epoch(compiled, invalidated_of(given), frozenset(given.fresh), run_parameters_of(given))
 
     def _from_files(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:

@@ -10,11 +10,11 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 
 import msgspec
 
-from robochoc.journal.events import AnyEvent
+from robochoc.journal.events import AnyEvent, Began, Given, Sent, actor
 from robochoc.journal.journal import Header, Journal
 from robochoc.replay.inspection import Inspector, safely
 from robochoc.replay.reasons import Reasons
-from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
+from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RecordedTeams, ReplayOptions
 from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import RecordedStep, runs_of, steps_of
 
@@ -56,6 +56,7 @@ def states_of(
     header: Header | None = None,
     since: int = 0,
     everything: Callable[[], Iterable[AnyEvent]] | None = None,
+    teams: RecordedTeams | None = None,
 ) -> Iterator[RobotState]:
     """Yield the states of `robot` after its complete steps.
 
@@ -69,6 +70,7 @@ def states_of(
         header: The journal's header, if `journal` is only events.
         since: The number of the first step for which a state is yielded.
         everything: Returns the events of all robots; called only if they are needed.
+        teams: The teams of the journal, if several robots of one journal are replayed one after the other.
 
     Raises:
         CannotReplayError: if there is nothing to replay, or the installed protocol is not the recorded one.
@@ -80,7 +82,7 @@ def states_of(
     for alone in (True, False):
         if not alone and everything is not None:
             events = tuple(everything())
-        player = _Player(header, robot, options or ReplayOptions(), alone=alone)
+        player = _Player(header, robot, options or ReplayOptions(), teams, alone=alone)
         try:
             for state in player.states(events, since):
                 yield state
@@ -90,6 +92,34 @@ def states_of(
         return
 
 
+class TeamStates:
+    """The states of all robots in one journal, robot by robot: the teams are read, and the events grouped, once."""
+
+    def __init__(self, journal: Journal) -> None:
+        self._journal = journal
+        self._teams = RecordedTeams(journal.header)
+        self._events: dict[str, list[AnyEvent]] = {}
+        self._starts: list[AnyEvent] = []
+        for event in journal.events:
+            if isinstance(event, Began | Given):
+                for own in (self._starts, *self._events.values()):
+                    own.append(event)
+                continue
+            for robot in {event.sender, event.receiver} if isinstance(event, Sent) else {actor(event)}:
+                if robot is not None:
+                    self._events.setdefault(robot, self._starts.copy()).append(event)
+
+    def of(self, robot: str) -> Iterator[RobotState]:
+        """Yield the states of `robot`, as `states_of` does. Raises `CannotReplayError`."""
+        return states_of(
+            self._events.get(robot, self._starts),
+            robot,
+            header=self._journal.header,
+            everything=lambda: self._journal.events,
+            teams=self._teams,
+        )
+
+
 class _MissingContentError(Exception):
     """A message to the robot can only be restored by replaying its sender."""
 
@@ -97,8 +127,10 @@ class _MissingContentError(Exception):
 class _Player:
     """Replays the robot's steps, and inspects the robot after each step; `alone`, or with all other robots."""
 
-    def __init__(self, header: Header | None, robot: str, options: ReplayOptions, *, alone: bool) -> None:
-        self._rebuilder = Rebuilder(header, options, {robot} if alone else None)
+    def __init__(
+        self, header: Header | None, robot: str, options: ReplayOptions, teams: RecordedTeams | None, *, alone: bool
+    ) -> None:
+        self._rebuilder = Rebuilder(header, options, {robot} if alone else None, teams)
         self._header = header
         self._robot = robot
         self._alone = alone

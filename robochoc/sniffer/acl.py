@@ -9,6 +9,7 @@ r"""FIPA ACL messages (FIPA00061), and their text form (FIPA00070).
 from __future__ import annotations
 
 import re
+from functools import lru_cache
 
 import msgspec
 
@@ -19,10 +20,8 @@ from robochoc.services.symbolic import (
     Expression,
     String,
     SymbolicExpressionError,
-    Word,
     head_of,
     items_of,
-    list_of,
     name,
     parameters,
     read,
@@ -87,21 +86,26 @@ _KNOWN = {"sender", "receiver", "reply-to", *_TEXTS, "reply-by"}
 
 def text(message: ACLMessage) -> str:
     """Return the message in the form of FIPA00070, without missing parameters. Only strings can contain line breaks."""
-    items: list[Expression] = []
+    items = [message.performative.upper()]
     if message.sender is not None:
-        items += [Word(":sender"), expression_of(message.sender)]
+        items += [":sender", _agent_text(message.sender)]
     for key, agents in (("receiver", message.receiver), ("reply-to", message.reply_to)):
         if agents:
-            items += [Word(f":{key}"), list_of("set", *map(expression_of, agents))]
+            items += [f":{key}", f"(set {' '.join(map(_agent_text, agents))})"]
     for key in _TEXTS:
         value: str | None = getattr(message, key.replace("-", "_"))
         if value is not None:
-            items += [Word(f":{key}"), String(value) if key == "content" else name(value)]
+            items += [f":{key}", text_form(String(value) if key == "content" else name(value))]
     if message.reply_by is not None:
-        items += [Word(":reply-by"), Word(message.reply_by)]
+        items += [":reply-by", message.reply_by]
     for key, value in message.user:
-        items += [Word(f":X-{key[2:]}"), name(value)]
-    return text_form(list_of(message.performative.upper(), *items))
+        items += [f":X-{key[2:]}", text_form(name(value))]
+    return f"({' '.join(items)})"
+
+
+@lru_cache(maxsize=4096)
+def _agent_text(agent: AgentIdentifier) -> str:
+    return text_form(expression_of(agent))
 
 
 def parse(message: str) -> ACLMessage:

@@ -282,10 +282,14 @@ class AclMessages:
         kind = self._protocols.type_of(message)
         if kind is None:
             return None
-        size, said = of.bytes[message], list(_packings(kind, trace.content(message)))
-        if not said:
+        size, content = of.bytes[message], None
+        for packed in _packings(kind, trace.content(message)):
+            if content is None or len(packed) == size:
+                content = packed
+            if len(content) == size:
+                break
+        if content is None:
             return None
-        content = next((one for one in said if len(one) == size), said[0])
         sender, receiver = trace.robots[of.sender[message]], trace.robots[of.receiver[message]]
         return Envelope(sender, receiver, content, int(of.clock[message]))
 

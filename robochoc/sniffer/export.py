@@ -16,7 +16,7 @@ from itertools import accumulate, islice
 import msgspec
 
 from robochoc.journal.journal import Journal
-from robochoc.replay import CannotReplayError, states_of
+from robochoc.replay import CannotReplayError, TeamStates
 from robochoc.sniffer.acl import text
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.page_data import DETAILS, STATES, PageData, message_columns, step_columns
@@ -50,12 +50,13 @@ def _answers(data: PageData, journal: Journal | None, most_states: int) -> Itera
 
 
 def _states(data: PageData, journal: Journal, most: int) -> Iterator[tuple[str, bytes]]:
+    states = TeamStates(journal)
     for number in _replayable(data.trace, most):
         try:
-            coming = iter(states_of(journal, data.trace.robots[number]))
+            coming = states.of(data.trace.robots[number])
             chunk = 0
-            while states := list(islice(coming, STATES)):
-                yield f"states:{number}:{chunk}", _encode(states)
+            while part := list(islice(coming, STATES)):
+                yield f"states:{number}:{chunk}", _encode(part)
                 chunk += 1
         except CannotReplayError:
             continue  # the page shows that its states are not available
@@ -100,9 +101,10 @@ def _reasons(trace: Trace, journal: Journal, most: int) -> Iterator[tuple[int, l
     steps: dict[int, list[int]] = {}
     for step, robot in enumerate(trace.steps.robot):
         steps.setdefault(robot, []).append(step)
+    states = TeamStates(journal)
     for number in _replayable(trace, most):
         with suppress(CannotReplayError):
-            for state in states_of(journal, trace.robots[number]):
+            for state in states.of(trace.robots[number]):
                 if state.step < len(steps.get(number, ())):
                     yield steps[number][state.step], state.why
 

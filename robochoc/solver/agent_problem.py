@@ -116,6 +116,49 @@ class AgentProblem(NamedTuple):
         return self.own.domain
 
 
+class AgentProblems:
+    """The problems of the agents in a team: their common parts are computed once.
+
+    Args:
+        team: The team.
+        parameters: The parameters of the run.
+        shared_scopes: True if every robot in a constraint's scope knows the constraint.
+        tree: True if all robots know the parents of each robot.
+    """
+
+    def __init__(
+        self,
+        team: Team,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
+        *,
+        shared_scopes: bool = False,
+        tree: bool = False,
+    ) -> None:
+        shown = {robot.name: robot.interface for robot in team.robots}
+        domains = {name: team.variables[name].domain for names in shown.values() for name in names}
+        links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
+        self._everyone = TeamKnowledge(tuple(team.order), shown, domains, links)
+        self._parameters = parameters
+        self._copies: dict[str, list[KeyedConstraint]] = {robot.name: [] for robot in team.robots}
+        if shared_scopes:
+            for robot in team.robots:
+                for one in constraints_above(robot):
+                    for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
+                        if one.constraint.model != ConstraintModel.PKC:
+                            self._copies[owner].append(one)
+        self._pkc_holders: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
+        for robot in team.robots:
+            for child in robot.children:
+                if child.constraints:
+                    self._pkc_holders[child.name].append(robot.name)
+
+    def problem(self, own: CompiledRobot) -> AgentProblem:
+        """Return the problem of the agent with the robot `own`."""
+        name = own.robot.name
+        copies, pkc_holders = tuple(self._copies[name]), tuple(self._pkc_holders[name])
+        return AgentProblem(own, self._everyone, copies, pkc_holders, self._parameters)
+
+
 def agent_problems(
     team: Team | CompiledTeam,
     parameters: RunParameters = DEFAULT_PARAMETERS,
@@ -123,33 +166,7 @@ def agent_problems(
     shared_scopes: bool = False,
     tree: bool = False,
 ) -> dict[str, AgentProblem]:
-    """Return the problem of each agent in `team`, by the robot's name, in priority order.
-
-    Args:
-        team: The team. Only compiled robots get a problem.
-        parameters: The parameters of the run.
-        shared_scopes: True if every robot in a constraint's scope knows the constraint.
-        tree: True if all robots know the parents of each robot.
-    """
+    """Return the problem of each compiled agent in `team`, by the robot's name, in priority order (`AgentProblems`)."""
     compiled = ensure_compiled(team)
-    team = compiled.team
-    shown = {robot.name: robot.interface for robot in team.robots}
-    domains = {name: team.variables[name].domain for names in shown.values() for name in names}
-    links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
-    everyone = TeamKnowledge(tuple(team.order), shown, domains, links)
-    copies: dict[str, list[KeyedConstraint]] = {robot.name: [] for robot in team.robots}
-    if shared_scopes:
-        for robot in team.robots:
-            for one in constraints_above(robot):
-                for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
-                    if one.constraint.model != ConstraintModel.PKC:
-                        copies[owner].append(one)
-    pkc_holders: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
-    for robot in team.robots:
-        for child in robot.children:
-            if child.constraints:
-                pkc_holders[child.name].append(robot.name)
-    return {
-        name: AgentProblem(own, everyone, tuple(copies[name]), tuple(pkc_holders[name]), parameters)
-        for name, own in compiled.robots.items()
-    }
+    problems = AgentProblems(compiled.team, parameters, shared_scopes=shared_scopes, tree=tree)
+    return {name: problems.problem(own) for name, own in compiled.robots.items()}

@@ -52,6 +52,8 @@ def kind_of_core() -> str:
 def attributes_of(thing: object) -> Mapping[str, Any]:
     """Return the attributes of an object, like `vars`, but also for compiled classes without `__dict__`."""
     names: Sequence[str] = getattr(type(thing), "__mypyc_attrs__", ())
+    if not names:
+        return getattr(thing, "__dict__", {})
     found = {name: getattr(thing, name) for name in names if name != "__dict__" and hasattr(thing, name)}
     return {**found, **getattr(thing, "__dict__", {})}
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 from types import SimpleNamespace
@@ -18,7 +19,7 @@ from robochoc.journal.events import Concluded, Sent, actor
 from robochoc.model.problem import Constraint, Team
 from robochoc.protocols.findings import Incumbent
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.replay import CannotReplayError, ReplayOptions, RobotState, states_of
+from robochoc.replay import CannotReplayError, ReplayOptions, RobotState, TeamStates, states_of
 from robochoc.replay.inspection import MOST_VALUES
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS
 from robochoc.replay.safe_repr import MAX_LENGTH, safe_repr
@@ -27,8 +28,9 @@ from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.cases import cases
 from tests.support.compiled import plain_python_only
+from tests.support.examples import count
 from tests.support.problems import random_team, team_of
-from tests.support.replays import in_text, recorded, with_events
+from tests.support.replays import in_text, random_run, recorded, with_events
 
 pytestmark = pytest.mark.usefixtures("quick_encryption")
 
@@ -184,6 +186,28 @@ def test_what_the_text_form_loses_is_said_again_by_those_who_said_it() -> None:
     assert any("null" in msgspec.json.encode(e).decode() for e in lossy.events if isinstance(e, Sent))
     for robot in ("RX00", "RX01"):
         assert list(states_of(lossy, robot)) == list(states_of(journal, robot))
+
+
+@pytest.mark.parametrize("protocol", ["abt", "adopt", "dpop", "dynabt", "mgm2"])
+@count("number", fast=4, slow=60)
+def test_the_states_of_a_team_equal_those_of_its_robots(protocol: str, number: int) -> None:
+    """Teams and events are read once for all robots; some runs have epochs, and the text form loses contents."""
+    for seed in range(number):
+        team, options = random_run(protocol, Random(f"team {protocol} {seed}"), seed)
+        if any(robot.private for robot in team.robots):
+            continue
+        journal = recorded(team, options)
+        for read in (journal, in_text(journal)):
+            together = TeamStates(read)
+            for robot in reversed(team.order):
+                assert _states_or_why(together.of(robot)) == _states_or_why(states_of(read, robot))
+
+
+def _states_or_why(found: Iterator[RobotState]) -> list[RobotState] | str:
+    try:
+        return list(found)
+    except CannotReplayError as why:
+        return str(why)
 
 
 def test_large_domains_are_shown_in_part() -> None:
