@@ -116,6 +116,8 @@ def with_names(html: str) -> str:
         lambda found: f'{found[1]}<span class="spoken">{names[found[2]].strip()}</span>',
         html,
     )
+    # Lists of headings are no landmarks: their names would be those of other parts.
+    html = re.sub(r'<nav class="md-nav" aria-label="[^"]*">', '<nav class="md-nav" role="none">', html)
     html = html.replace('class="md-search__options" aria-label="Search"', 'class="md-search__options" role="none"', 1)
     return html.replace('class="md-search"', 'class="md-search" aria-label="Search"', 1)
 
