@@ -41,7 +41,8 @@ def table(rows: Sequence[Row]) -> str:
 
 def machine() -> str:
     """What the figures depend on, in a line."""
-    return f"{os.cpu_count()} cores, Python {platform.python_version()}, {platform.system()} {platform.release()}"
+    kernel = ".".join(platform.release().split(".")[:2])
+    return f"{os.cpu_count()} cores, Python {platform.python_version()}, {platform.system()} {kernel}"
 
 
 def _line(cells: Iterable[str]) -> str:
