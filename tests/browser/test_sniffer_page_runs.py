@@ -123,6 +123,14 @@ def test_an_export_needs_no_server(browser: Browser, tmp_path: Path) -> None:
         text_is(page, "#message blockquote", FEED.detail(100)["words"])
         page.click("#tab-robot")
         page.wait_for_selector("#robot .knows")
+        # Browsers without a window take a screenshot after the event "load".
+        page.add_init_script("""if (location.protocol === "file:") addEventListener("load", () => {
+          const { texts, view } = Sniffer.page;
+          window.atLoad = [texts.words(100), view.selected, view.moment];
+        })""")
+        page.goto("about:blank")
+        page.goto(f"{file.as_uri()}#selected=100")
+        assert page.evaluate("atLoad") == [FEED.detail(100)["words"], 100, FEED.trace.messages.step[100]]
 
 
 # For everybody

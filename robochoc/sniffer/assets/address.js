@@ -59,8 +59,9 @@
     _save() {
       if (!this.first) return;
       const parts = new URLSearchParams();
-      for (const [name, value] of this._entries())
-        if (value !== this.first.get(name) && !(name === "moment" && !this.keepsMoment())) parts.set(name, value);
+      const moved = (name, value) => (name === "moment" ? this.keepsMoment() && (this.view.selected >= 0 || value !== this.first.get(name))
+        : value !== this.first.get(name));
+      for (const [name, value] of this._entries()) if (moved(name, value)) parts.set(name, value);
       const hash = `#${parts}`;
       if (hash === location.hash || (hash === "#" && !location.hash)) return;
       this.own = hash;
@@ -71,7 +72,8 @@
       }
     }
 
-    /* Applies the address. Returns the positions in the run, which are used when these parts are loaded. */
+    /* Applies the address. Returns the positions in the run, which are used when these parts are loaded. Without a
+       moment, the page shows the step of the selected message. */
     read() {
       const { view, model } = this;
       const parts = new URLSearchParams(location.hash.slice(1));
@@ -107,7 +109,7 @@
       if (now.robot >= robots) now.robot = -1;
       if (now.rowHeight) now.rowHeight = Math.min(Math.max(now.rowHeight, 2), 64);
       view.set(now);
-      return { top, moment, selected };
+      return { top, moment, selected, withoutMoment: moment === undefined };
     }
   };
 })();

@@ -4,6 +4,7 @@
 (() => {
   const NARROW = 560; // pixels: in a narrower table, the words are below the names
   const MOST = 8_000_000; // pixels: browsers do not draw much taller elements
+  const PAUSE_MS = 120; // words are loaded at once, but not for each row during scrolling
   const COLUMNS = [["#", "number"], ["Time", "time"], ["From", "from"], ["To", "to"], ["Type", "type"], ["In words", "says"]];
 
   Sniffer.List = class {
@@ -13,6 +14,7 @@
       this.table = Sniffer.byId("table");
       this.rows = [];
       this.said = new Map(); // chunk -> its details, for chunks in the window
+      this._askedAt = -Infinity;
       this._placed = 0; // the position set by the page; any other position was set by the user
       this._build();
     }
@@ -175,7 +177,11 @@
       const missing = [...chunks].filter((chunk) => !this.handlers.has(chunk, this.model.messageCount));
       if (!missing.length) return;
       clearTimeout(this._asking);
-      this._asking = setTimeout(() => this.handlers.ask(missing.slice(0, 4)), 120); // not for each row during scrolling
+      const ask = () => this.handlers.ask(missing.slice(0, 4));
+      const soon = performance.now() - this._askedAt < PAUSE_MS;
+      this._askedAt = performance.now();
+      if (soon) this._asking = setTimeout(ask, PAUSE_MS);
+      else ask();
     }
 
     /* Scrolls a row into the window: as little as possible if it is near, else with some rows around it. */

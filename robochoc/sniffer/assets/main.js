@@ -212,6 +212,10 @@
       filter.extend();
       if (view.follow) this._newest();
       this._restore();
+      if (!this.begun && model.messageCount) { // words for the first picture
+        this.begun = true;
+        this.texts.ask([Math.max(view.selected, 0) >> 10]);
+      }
       if (this.counters) this.counters.update();
       else if (model.stepCount) this.showLower(view.lower);
       this._growScene();
@@ -225,15 +229,22 @@
     _restore() {
       const { wanted, model, view, filter, chart } = this;
       const whole = model.messageCount >= this.following.goal.messages;
+      if (wanted.selected !== undefined && wanted.selected < model.messageCount) {
+        const selected = Math.max(Math.floor(wanted.selected), 0);
+        if (wanted.top === undefined) view.set({ selected }); // scrolls to the message
+        else view.selected = selected;
+        this.list.reveal(filter.rowOf(view.selected));
+        if (view.robot < 0) view.set({ robot: model.messages.sender[view.selected] });
+        if (wanted.withoutMoment) {
+          view.set({ follow: false });
+          wanted.moment = model.messages.step[view.selected];
+        }
+        wanted.selected = undefined;
+      }
       if (wanted.moment !== undefined && wanted.moment < model.stepCount) {
         this.time.touched = true;
         view.set({ moment: Math.max(Math.floor(wanted.moment), 0) });
         wanted.moment = undefined;
-      }
-      if (wanted.selected !== undefined && wanted.selected < model.messageCount) {
-        view.selected = Math.max(Math.floor(wanted.selected), 0);
-        this.list.reveal(filter.rowOf(view.selected));
-        wanted.selected = undefined;
       }
       if (wanted.top !== undefined && (whole || filter.length > wanted.top + 200)) {
         view.set({ top: wanted.top });

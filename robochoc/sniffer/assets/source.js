@@ -2,6 +2,7 @@
 /* The sources of the page's data: a server on this machine, or the page itself (an exported file). */
 (() => {
   const KEPT = 24; // the number of cached chunks of details, and of states
+  const AT_ONCE = 1 << 18; // compressed bytes of an embedded answer that is unpacked before the page's `load` event
 
   /* Caches the last answers, which are lists that may grow: an answer shorter than `least`, or a failed request, is
      requested again. */
@@ -96,6 +97,7 @@
       const element = document.getElementById("feed:" + name);
       if (!element) throw new Error("this page does not contain them");
       const packed = Uint8Array.from(atob(element.textContent.trim()), (sign) => sign.charCodeAt(0));
+      if (packed.length <= AT_ONCE) return Sniffer.inflate(packed);
       const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
       return new Response(stream).arrayBuffer();
     }
