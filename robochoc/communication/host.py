@@ -53,22 +53,33 @@ class MessageCache:
 
     def __init__(self) -> None:
         self._messages: dict[bytes, Message] = {}
+        self._contents: dict[int, bytes] = {}
+        """The content of each message in the cache, by the message's `id`."""
         self._size = 0
 
     def get(self, content: bytes) -> Message | None:
         """Return the message with this content, or None if it is not in the cache."""
         return self._messages.get(content)
 
-    def keep(self, content: bytes, message: Message) -> None:
+    def content(self, message: Message) -> bytes:
+        """Return the content of `message`, and add it to the cache: a robot may send the message that it received."""
+        content = self._contents.get(id(message))
+        if content is None:
+            content = encode(message)
+            self._keep(content, message)
+        return content
+
+    def _keep(self, content: bytes, message: Message) -> None:
         """Add `message`, and remove the oldest messages while the cache is too large."""
         messages = self._messages
         if content in messages:
             return
         messages[content] = message
+        self._contents[id(message)] = content
         self._size += len(content) + _SIZE_OF_A_MESSAGE
         while self._size > _MOST_SHARED and len(messages) > 1:
             oldest = next(iter(messages))
-            del messages[oldest]
+            del self._contents[id(messages.pop(oldest))]
             self._size -= len(oldest) + _SIZE_OF_A_MESSAGE
 
 
@@ -296,14 +307,14 @@ class Host:
         found = []
         last: Message | None = None
         content, kind = b"", ""
+        cache = self.message_cache
         for (receiver, message), clock, checks in zip(
             self.protocol.outbox, self._stamps, self.checks_at_send, strict=True
         ):
             if message is not last:
-                last, content, kind = message, encode(message), type(message).__name__
+                last, kind = message, type(message).__name__
+                content = cache.content(message) if cache is not None and message.shareable else encode(message)
                 self.largest = max(self.largest, len(content))
-                if self.message_cache is not None and message.shareable:
-                    self.message_cache.keep(content, message)
             self.sent[kind] = self.sent.get(kind, 0) + 1
             self.bytes += len(content)
             envelope = Envelope(self.name, receiver, content, clock)

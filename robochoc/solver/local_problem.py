@@ -361,9 +361,8 @@ class LocalProblem:
         None: no constraint becomes complete. All other robots in `view` must be higher. Checks are counted only for the
         constraints that become complete.
         """
-        depth = self._rank[robot]
-        places = slice(bisect_left(self._depths, depth), bisect_right(self._depths, depth))
-        return self._added(self._constraints[places], view) if self._depths[places] else None
+        waiting = self._with_lowest(robot)
+        return self._added(waiting, view) if waiting else None
 
     def added_by(self, robot: str, view: Mapping[str, Value]) -> list[Cost]:
         """Return the result of `added` for a `robot` anywhere in the order; 0 if no constraint becomes complete."""
@@ -397,9 +396,7 @@ class LocalProblem:
         from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - numpy, needed for tables only
 
         found = []
-        for constraint in self._constraints:
-            if lowest is not None and constraint.agents[-1:] != (lowest,):
-                continue
+        for constraint in self._constraints if lowest is None else self._with_lowest(lowest):
             if set(constraint.agents) <= domains.keys():
                 checks, table = cost_table(constraint, domains, len(self.values))
                 self.checks += checks
@@ -423,8 +420,8 @@ class LocalProblem:
             UnsupportedError: if there are too many combinations.
         """
         found = []
-        for constraint in self._constraints:
-            if constraint.agents[-1:] != (lowest,) or not domains.keys() >= set(constraint.agents):
+        for constraint in self._with_lowest(lowest):
+            if not domains.keys() >= set(constraint.agents):
                 continue
             combinations = [*constraint.combinations(domains, len(self.values))]
             self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
@@ -485,6 +482,11 @@ class LocalProblem:
     def _since(self, place: int) -> Sequence[SharedConstraint]:
         """Return the constraints whose lowest robot is not higher in the order than `place`."""
         return self._constraints if place < 0 else self._constraints[bisect_left(self._depths, place) :]
+
+    def _with_lowest(self, robot: str) -> Sequence[SharedConstraint]:
+        """Return the constraints whose lowest other robot is `robot`."""
+        depth = self._rank[robot]
+        return self._constraints[bisect_left(self._depths, depth) : bisect_right(self._depths, depth)]
 
     def _broken(self, index: int, view: Mapping[str, Value], since: int) -> SharedConstraint | None:
         """Return the first constraint that `values[index]` violates in `view`."""

@@ -26,7 +26,7 @@ from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
 from tests.support.problems import team_of
-from tests.support.sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
+from tests.support.sfb_robots import CHAIN, above, agents, below, cpas, introduced, row, rows, team
 
 BOTH = ((1,), (2,))
 
@@ -37,25 +37,25 @@ def test_the_first_robot_tells_its_values_and_each_adds_its_own() -> None:
     robots = agents(team(CHAIN))
     for robot in robots.values():
         robot.start()
-    assert robots["RA"].outbox == [("RB", Above.of([BOTH]))]
+    assert robots["RA"].outbox == [("RB", above([BOTH]))]
     assert robots["RB"].outbox == []
-    assert replies(robots["RB"], ("RA", Above.of([BOTH]))) == [("RC", Above.of([BOTH] * 2))]
+    assert replies(robots["RB"], ("RA", above([BOTH]))) == [("RC", above([BOTH] * 2))]
 
 
 def test_the_last_robot_turns_round_with_what_its_values_are_charged() -> None:
     robots = agents(team(CHAIN))
     robots["RC"].problem.charges = (5.0, 0.0)
-    said = replies(robots["RC"], ("RB", Above.of([BOTH] * 2)))
-    assert said == [("RB", Below.of([(BOTH, (5, 0))], 5))]
-    assert encode(said[0][1]) == encode(Below.of([(BOTH, (5, 0))], 5)), "integers, which take fewer bytes"
+    said = replies(robots["RC"], ("RB", above([BOTH] * 2)))
+    assert said == [("RB", below([(BOTH, (5, 0))], 5))]
+    assert encode(said[0][1]) == encode(below([(BOTH, (5, 0))], 5)), "integers, which take fewer bytes"
 
 
 def test_on_the_way_up_each_robot_adds_the_most_that_it_can_come_to() -> None:
     """Charges, and constraints of which it is the last but one: each constraint counts once, infinite costs not."""
     robots = agents(team({**CHAIN, "BC": (0, math.inf, 2, 1)}))
-    replies(robots["RB"], ("RA", Above.of([BOTH])))
-    said = replies(robots["RB"], ("RC", Below.of([(BOTH, (0, 0))], 0)))
-    assert said == [("RA", Below.of([(BOTH, (0, 0))] * 2, 2))]
+    replies(robots["RB"], ("RA", above([BOTH])))
+    said = replies(robots["RB"], ("RC", below([(BOTH, (0, 0))], 0)))
+    assert said == [("RA", below([(BOTH, (0, 0))] * 2, 2))]
     assert "RC" not in robots["RA"].problem.neighbours
 
 
@@ -68,7 +68,7 @@ def test_a_robot_without_values_ends_the_search_at_the_start() -> None:
     robots = agents(team_of({"A": (1, 2), "B": (), "C": (1,)}, []))
     robots["RB"].start()
     assert robots["RB"].verdict is Verdict.NO_SOLUTION
-    assert replies(robots["RB"], ("RA", Above.of([BOTH]))) == []
+    assert replies(robots["RB"], ("RA", above([BOTH]))) == []
 
 
 def test_a_robot_alone_solves_its_problem_in_silence() -> None:
@@ -80,7 +80,7 @@ def test_a_robot_alone_solves_its_problem_in_silence() -> None:
 
 def test_robots_that_are_alike_are_told_of_once() -> None:
     domains = [BOTH] * 500 + [((7,),)] + [BOTH] * 499
-    said = Above.of(domains)
+    said = above(domains)
     assert said == Above([BOTH, ((7,),)], [(0, 500), (1, 1), (0, 499)])
     assert expanded(said.domains, said.runs) == domains
     assert len(encode(said)) < 60
@@ -102,7 +102,7 @@ def test_domains_of_more_or_fewer_robots_than_there_are_above_are_refused(messag
 )
 def test_charges_that_do_not_fit_are_refused(message: Below) -> None:
     robot = agents(team(CHAIN))["RB"]
-    replies(robot, ("RA", Above.of([BOTH])))
+    replies(robot, ("RA", above([BOTH])))
     with pytest.raises(ValueError, match="unexpected "):
         robot.receive("RC", message)
 
@@ -287,8 +287,8 @@ def test_all_robots_hold_an_optimal_solution_in_the_end(teams: int) -> None:
     ("RA", cpas(row(0))), ("RC", cpas(row(0))), ("RA", CPAs(0, b"", 9, 10)),
     ("RA", CPAs(-1, cpas(row(0)).rows, 9, 10)), ("RA", CPAs(10**12, b"", 9, 10)),
     ("RA", CPAs(1, cpas(row(0)).rows, 9, 2**62)), ("RA", CPAs(1, cpas(row(0)).rows, -1, 10)),
-    ("RA", cpas([0, 0, 99, 0, 0, 0, 0], ceiling=10)), ("RA", Above.of([((1,),)])),
-    ("RC", Below.of([(((1,),), (0,))], 1)), ("RC", Explored()), ("RC", Solution(3, [0, 0])),
+    ("RA", cpas([0, 0, 99, 0, 0, 0, 0], ceiling=10)), ("RA", above([((1,),)])),
+    ("RC", below([(((1,),), (0,))], 1)), ("RC", Explored()), ("RC", Solution(3, [0, 0])),
     ("RC", Solution(3, [0, 9, 0])), ("RA", Solution(3, [0, 0, 0])),
 ])  # fmt: skip
 def test_what_no_robot_says_is_refused(sender: str, message: Message) -> None:

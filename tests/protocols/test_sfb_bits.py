@@ -14,6 +14,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Team
+from robochoc.protocols.optimization.run_lengths import RunLengths
 from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.optimization.sfb_bounds import VALUES, ForwardBounds
@@ -25,6 +26,7 @@ from tests.support.cases import looped
 from tests.support.complex_problems import random_complex_team
 from tests.support.examples import count
 from tests.support.problems import random_team, team_of
+from tests.support.sfb_robots import grouped
 from tests.support.solver_networks import compiled_by_brute_force
 
 
@@ -33,12 +35,13 @@ def both(team: Team) -> list[tuple[ForwardBits, ForwardBounds]]:
     parts = agent_problems(compiled_by_brute_force(team), shared_scopes=True)
     order = PriorityOrder(team.order)
     domains = [LocalProblem(parts[name]).values for name in order.names]
+    known = RunLengths(*grouped(domains))
     if not all(domains):
         return []
     made = []
     for name in order.names:
         first, second = LocalProblem(parts[name]), LocalProblem(parts[name])
-        bits, numbers = ForwardBits(first, order, domains), ForwardBounds(second, order, domains)
+        bits, numbers = ForwardBits(first, order, known), ForwardBounds(second, order, known)
         assert first.checks == second.checks
         bits.count_up_to(1)
         numbers.count_up_to(1)

@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import accumulate
+from random import Random
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.problem import Team, Value
+from robochoc.protocols.optimization.run_lengths import RunLengths
 from robochoc.protocols.optimization.sfb import SFB, Explored
+from robochoc.protocols.optimization.sfb_bounds import BOUND, COST, VALUES, ForwardBounds
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.agent_problem import agent_problems
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies
 from tests.support.cases import looped
+from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
 from tests.support.pseudo_trees import priced
-from tests.support.sfb_robots import CHAIN, cpas, introduced, rows, team
+from tests.support.sfb_robots import CHAIN, cpas, grouped, introduced, rows, team
+from tests.support.solver_networks import compiled_by_brute_force
 
 
 def test_a_cpa_tells_its_bound_its_cost_its_values_and_what_values_below_would_cost() -> None:
@@ -78,3 +91,66 @@ def test_all_constraint_checks_are_done_before_the_search() -> None:
     checks = [robot.problem.checks for robot in robots.values()]
     assert replies(robots["RB"], ("RA", said[0]))
     assert [robot.problem.checks for robot in robots.values()] == checks
+
+
+def plainly_extended(
+    before: Sequence[Sequence[int]], problem: LocalProblem, domains: dict[str, Sequence[Value]], ceiling: int, most: int
+) -> list[list[int]]:
+    """The extensions of rows by the rules on the page, entry by entry."""
+    names = list(domains)
+    rank = names.index(problem.agent)
+    sizes = [len(domains[name]) for name in names[rank + 1 :]]
+    first = VALUES + rank + len(problem.values)
+    found = []
+    for row in before:
+        for value, cost in enumerate(row[VALUES + rank : first]):
+            vectors = [*row[first:]]
+            chosen = dict(zip(names, row[VALUES : VALUES + rank], strict=False))
+            for name, start in zip(names[rank + 1 :], accumulate([0, *sizes]), strict=False):
+                known = {other: domains[other] for other in [*names[:rank], name]}
+                for _, others, charges in problem.tables(known, lowest=name):
+                    at = tuple(chosen[other] for other in others[:-1])
+                    for place in range(len(domains[name])):
+                        vectors[start + place] += int(min(charges[(*at, place, value)], ceiling))
+            vectors = [min(entry, ceiling) for entry in vectors]
+            paid = row[COST] + cost
+            ends = [*accumulate(sizes)]
+            bound = paid + sum(min(vectors[end - size : end]) for size, end in zip(sizes, ends, strict=True))
+            if bound < most:
+                found.append([bound, paid, *row[VALUES : VALUES + rank], value, *vectors])
+    return sorted(found, key=lambda row: (row[BOUND], sum(row[VALUES + rank + 1 :])))
+
+
+@count("teams", 40, 3000)
+def test_rows_are_those_of_a_plain_computation(teams: int) -> None:
+    chance = Random("plain rows")
+    partly = entirely = 0
+    for seed in range(teams):
+        few = random_csp(chance.randrange(4, 12), 3, chance.uniform(0.1, 0.6), 0.1, seed=seed, max_cost=9)
+        made: Team = chance.choice((few, random_cost_team(chance)))
+        parts = agent_problems(compiled_by_brute_force(made), shared_scopes=True)
+        order = PriorityOrder(made.order)
+        problems = [LocalProblem(parts[name]) for name in order.names]
+        domains: dict[str, Sequence[Value]] = {robot.agent: robot.values for robot in problems}
+        if not all(domains.values()):
+            continue
+        known = RunLengths(*grouped([robot.values for robot in problems]))
+        bounds = [ForwardBounds(robot, order, known) for robot in problems]
+        charges = [robot.costs({}) for robot in problems]
+        ceiling = 1 + sum(one.most for one in bounds)
+        ceiling += sum(int(max((cost for cost in one if cost < math.inf), default=0)) for one in charges)
+        for one in bounds:
+            one.count_up_to(ceiling)
+        most = chance.randrange(ceiling // 2, ceiling + 1)
+        several = bounds[0].below(bounds[0].nothing(charges), most)
+        for one, robot in zip(bounds[:-1], problems, strict=False):
+            if not len(several):
+                break
+            wanted = plainly_extended(several.tolist(), robot, domains, ceiling, most)
+            extended = one.extended(several, most)
+            assert extended.tolist() == wanted
+            partly += not one._all  # noqa: SLF001 - both ways of computing must occur
+            entirely += one._all  # noqa: SLF001 - as above
+            several = extended[: chance.randrange(1, 30)]
+    assert partly > teams
+    assert entirely > teams

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Hashable, Iterable, Sequence
+from itertools import groupby
+from typing import TypeVar
 
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Message
-from robochoc.protocols.optimization.sfb import SFB, CPAs, SFBSettings
+from robochoc.protocols.optimization.run_lengths import Run
+from robochoc.protocols.optimization.sfb import SFB, Above, Below, Charges, CPAs, Domain, SFBSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.local_problem import LocalProblem
@@ -15,6 +18,27 @@ from tests.support.pseudo_trees import Costs, priced
 
 CHAIN: Costs = {"AB": (3, 1, 0, 2), "BC": (0, 4, 2, 1), "A": (0, 1)}
 """RA and RB, RB and RC; the cheapest is RA 2, RB 1, RC 1, for 1."""
+
+
+T = TypeVar("T", bound=Hashable)
+
+
+def grouped(items: Iterable[T]) -> tuple[list[T], list[Run]]:
+    """The distinct `items`, in order of first occurrence, and the runs."""
+    places: dict[T, int] = {}
+    numbers = [places.setdefault(item, len(places)) for item in items]
+    return list(places), [(place, len(list(same))) for place, same in groupby(numbers)]
+
+
+def above(domains: Iterable[Domain]) -> Above:
+    """The message for robots with these domains, in priority order."""
+    return Above(*grouped(domains))
+
+
+def below(robots: Iterable[tuple[Domain, Charges]], most: int) -> Below:
+    """The message for robots with these domains and charges, in priority order."""
+    kinds, runs = grouped(robots)
+    return Below([domain for domain, _ in kinds], [charges for _, charges in kinds], runs, most)
 
 
 def team(costs: Costs) -> Team:

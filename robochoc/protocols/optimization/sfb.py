@@ -62,7 +62,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, assert_never, cast
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NO_FINDINGS, Findings, Incumbent
 from robochoc.protocols.message import Message
-from robochoc.protocols.optimization.run_lengths import expanded, fits
+from robochoc.protocols.optimization.run_lengths import RunLengths, appended, expanded, fits, prepended
 from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -74,8 +74,7 @@ if TYPE_CHECKING:
     from robochoc.protocols.optimization.sfb_bounds import ForwardBounds
 
     Bounds = ForwardBounds | ForwardBits
-from collections.abc import Iterable, Iterator
-from typing import Self
+from collections.abc import Iterator
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import (
@@ -91,7 +90,7 @@ from robochoc.protocols.disclosure import (
     partial_assignment,
 )
 from robochoc.protocols.message import Value
-from robochoc.protocols.optimization.run_lengths import Run, cut_off, grouped
+from robochoc.protocols.optimization.run_lengths import Run, cut_off
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.wording import Wording, along, cost_text, incumbent_text
 from robochoc.system.plain_text import counted, listed
@@ -134,11 +133,6 @@ class Above(Message, frozen=True):
 
     act = Act(Performative.INFORM, "the receiver learns the domains above it")
 
-    @classmethod
-    def of(cls, domains: Iterable[Domain]) -> Self:
-        """Return the message for robots with these `domains`, in priority order."""
-        return cls(*grouped(domains))
-
     def in_words(self, words: Wording) -> str:
         domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         return f"above you there are {_sizes(words.order, domains)}"
@@ -160,12 +154,6 @@ class Below(Message, frozen=True):
     most: int
 
     act = Act(Performative.INFORM, "the receiver learns the domains and charges below it")
-
-    @classmethod
-    def of(cls, robots: Iterable[tuple[Domain, Charges]], most: int) -> Self:
-        """Return the message for robots with these domains and charges, in priority order."""
-        kinds, runs = grouped(robots)
-        return cls([domain for domain, _ in kinds], [charges for _, charges in kinds], runs, most)
 
     @property
     def robots(self) -> list[tuple[Domain, Charges]]:
@@ -232,6 +220,7 @@ class Solution(Message, frozen=True):
     cost: int
     places: list[int]
 
+    shareable = True
     act = Act(Performative.INFORM, "the receiver learns a solution that costs less")
 
     def in_words(self, _: Wording) -> str:
@@ -357,9 +346,51 @@ class Batch:
         return rows[:count]
 
 
+class KnownSolution:
+    """A solution of the robots in `order`, whose `domains` are known: checked and spelt out once for a whole process.
+
+    The robots of a simulation receive the same object (`Message.shareable`). For each robot to do this would take
+    quadratic time and memory in all.
+    """
+
+    def __init__(self, solution: Solution, order: PriorityOrder, domains: RunLengths[Domain]) -> None:
+        self.solution = solution
+        self.order = order
+        self._domains = domains
+        self._incumbent: Incumbent | None = None
+        self.fits = self._fits()
+
+    @property
+    def incumbent(self) -> Incumbent:
+        """The values of all robots."""
+        if self._incumbent is None:
+            domains = expanded(self._domains.distinct, self._domains.runs)
+            chosen = zip(self.order.names, domains, self.solution.places, strict=True)
+            values = {name: values[place] for name, values, place in chosen}
+            self._incumbent = Incumbent(self.solution.cost, values)
+        return self._incumbent
+
+    def _fits(self) -> bool:
+        """Return whether each robot has a value at its place."""
+        places, start = self.solution.places, 0
+        if len(places) != len(self._domains):
+            return False
+        for domain, count in self._domains.counted(0, len(places)):
+            part = places[start : start + count]
+            if min(part) < 0 or max(part) >= len(domain):
+                return False
+            start += count
+        return True
+
+
+_last_known: KnownSolution | None = None
+"""The last solution that a robot in this process has received or found."""
+
+
 class SFB(Protocol):
     """One agent. State: the `batches` to explore, the oldest first, and the `best` solution.
 
+    - `domains`: those of this robot and the robots above, then those of all robots.
     - `upper_bound`: the cost of the best solution.
     - `under_way`: for each unanswered message to the next robot, its batch and its minimum lower bound.
     - `width`: the number of CPAs to extend next. `first_sent`: the first CPA was sent, alone.
@@ -385,7 +416,7 @@ class SFB(Protocol):
         self.rank = order.rank[problem.agent]
         self.previous = order.names[self.rank - 1] if self.rank else None
         self.next = order.names[self.rank + 1] if self.rank + 1 < len(order.names) else None
-        self.domains: list[Domain] = []
+        self.domains: RunLengths[Domain] = RunLengths([], [])
         self.best: Solution | None = None
         self.upper_bound = self.ceiling = 0
         self.batches: deque[Batch] = deque()
@@ -398,7 +429,7 @@ class SFB(Protocol):
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif self.previous is None:
-            self._send_domains([])
+            self._send_domains([], [])
             self.settle()
         if self.problem.values and not self.problem.has_costs:
             self.problem.look_ahead()
@@ -412,9 +443,9 @@ class SFB(Protocol):
             raise ValueError(f"unexpected {type(message).__name__} from {sender}")
         match received:
             case Above(domains, runs):
-                self._send_domains(expanded(domains, runs))
+                self._send_domains(domains, runs)
             case Below() as below:
-                self._send_charges(below.robots, below.most)
+                self._send_charges(below)
             case CPAs() as cpas:
                 self._process_cpas(cpas)
             case Explored():
@@ -439,12 +470,8 @@ class SFB(Protocol):
                 return sender == self.previous and self._priced and least >= 0 and 0 < ceiling <= EXACT
             case Explored():
                 return sender == self.next and bool(self.under_way)
-            case Solution(_, places):
-                sizes = [len(domain) for domain in self.domains]
-                fitting = len(places) == len(sizes) and all(
-                    0 <= p < size for p, size in zip(places, sizes, strict=True)
-                )
-                return sender == self.next and fitting
+            case Solution():
+                return sender == self.next and self._priced and self._known(message).fits
             case never:
                 assert_never(never)
 
@@ -467,32 +494,35 @@ class SFB(Protocol):
 
     # Before the search
 
-    def _send_domains(self, domains: Sequence[Domain]) -> None:
-        self.domains = [*domains, self.problem.values]
+    def _send_domains(self, domains: list[Domain], runs: list[Run]) -> None:
+        above = Above(*appended(domains, runs, self.problem.values))
+        self.domains = RunLengths(above.domains, above.runs)
         if self.next is None:
-            self._send_charges([], 0)
+            self._send_charges(Below([], [], [], 0))
         else:
-            self.send(self.next, Above.of(self.domains))
+            self.send(self.next, above)
 
-    def _send_charges(self, below: Sequence[tuple[Domain, Charges]], most: int) -> None:
+    def _send_charges(self, below: Below) -> None:
         """Store the values of all robots and evaluate the constraints; the first robot then begins the search."""
         own = self.problem.values, tuple(map(_as_integer, self.problem.costs({})))
-        self.domains += [domain for domain, _ in below]
-        self.bounds = self._create_bounds()
-        most += self.bounds.most + max_finite(own[1])
+        self.domains = self.domains.followed_by(below.domains, below.runs)
+        self.bounds = self._create_bounds(self.domains)
+        most = below.most + self.bounds.most + max_finite(own[1])
         check_exact(most)
         if self.previous is not None:
-            self.send(self.previous, Below.of([own, *below], most))
+            kinds, runs = prepended(own, [*zip(below.domains, below.charges, strict=True)], below.runs)
+            self.send(self.previous, Below([kind[0] for kind in kinds], [kind[1] for kind in kinds], runs, most))
         else:
             self._count_up_to(most + 1)
-            self.batches.append(Batch(self.bounds.nothing([own[1], *(charges for _, charges in below)]), self.bounds))
+            charges = [own[1], *expanded(below.charges, below.runs)]
+            self.batches.append(Batch(self.bounds.nothing(charges), self.bounds))
 
-    def _create_bounds(self) -> Bounds:
+    def _create_bounds(self, domains: RunLengths[Domain]) -> Bounds:
         if self.problem.has_costs:
             from robochoc.protocols.optimization.sfb_bounds import ForwardBounds  # noqa: PLC0415 - start-up: numpy
 
-            return ForwardBounds(self.problem, self.order, self.domains)
-        return ForwardBits(self.problem, self.order, self.domains)
+            return ForwardBounds(self.problem, self.order, domains)
+        return ForwardBits(self.problem, self.order, domains)
 
     def _count_up_to(self, ceiling: int) -> None:
         self.bounds.count_up_to(ceiling)
@@ -556,10 +586,15 @@ class SFB(Protocol):
     @property
     def incumbent(self) -> Incumbent | None:
         """The best solution that this robot knows."""
-        if self.best is None:
-            return None
-        chosen = zip(self.order.names, self.domains, self.best.places, strict=True)
-        return Incumbent(self.best.cost, {name: values[place] for name, values, place in chosen})
+        return None if self.best is None else self._known(self.best).incumbent
+
+    def _known(self, solution: Solution) -> KnownSolution:
+        """Return the object for `solution` that the robots in this process share."""
+        global _last_known  # noqa: PLW0603 - robots in a process share nothing else that is theirs
+        known = _last_known
+        if known is None or known.solution is not solution or known.order is not self.order:
+            known = _last_known = KnownSolution(solution, self.order, self.domains)
+        return known
 
     @property
     def findings(self) -> Findings:

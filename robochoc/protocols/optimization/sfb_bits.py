@@ -15,14 +15,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import accumulate
 
 from robochoc.protocols.message import Value
+from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.local_problem import LocalProblem
 
 Row = tuple[bytes, int]
 Places = tuple[int, ...]
+Domain = tuple[Value, ...]
 
 CEILING = 1
 """The ceiling without costs."""
@@ -34,24 +35,27 @@ class ForwardBits:
     `domains` are the values of all robots. See `ForwardBounds`, which has the same methods.
     """
 
-    def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
+    def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: RunLengths[Domain]) -> None:
         self.rank = order.rank[problem.agent]
         self.most = 0
-        self._above = [len(domain) for domain in domains[: self.rank]]
+        self._above = domains.counted(0, self.rank)
         self._own = len(domains[self.rank])
-        sizes = [len(domain) for domain in domains[self.rank + 1 :]]
-        starts = [0, *accumulate(size + 1 for size in sizes)]
-        self._bits = starts[-1]
-        self._lowest = sum(1 << start for start in starts[:-1])
-        self._guards = sum(1 << start + size for start, size in zip(starts, sizes, strict=False))
+        below = [(len(domain), count) for domain, count in domains.counted(self.rank + 1, len(domains))]
+        columns = Columns([(size + 1, count) for size, count in below])
+        self._bits = columns.total
+        self._lowest, self._guards = _lowest_and_guards(below)
         self._full = self._guards - self._lowest
-        self._place_bytes = 1 if max(map(len, domains)) <= 1 << 8 else 2 if max(map(len, domains)) <= 1 << 16 else 4
+        largest = max(map(len, domains.distinct))
+        self._place_bytes = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
         self._left = [self._full] * self._own
         self._n_ary: list[tuple[Places, Mapping[Places, list[int]]]] = []
-        above = dict(zip(order.names[: self.rank], domains, strict=False))
-        for place, name in enumerate(order.names[self.rank + 1 :]):
-            for agents, allowed in problem.allowed({**above, name: domains[self.rank + 1 + place]}, lowest=name):
-                ruled_out = self._ruled_out(allowed, starts[place])
+        ranks = [(order.rank[name], name) for name in problem.neighbours]
+        above = {name: domains[rank] for rank, name in ranks if rank < self.rank}
+        for rank, name in ranks:
+            if rank <= self.rank:
+                continue
+            for agents, allowed in problem.allowed({**above, name: domains[rank]}, lowest=name):
+                ruled_out = self._ruled_out(allowed, columns.start(rank - self.rank - 1))
                 if len(agents) == 1:
                     self._left = [left & ~out for left, out in zip(self._left, ruled_out[()], strict=True)]
                 else:
@@ -73,15 +77,12 @@ class ForwardBits:
         length = chosen + _bytes(self._bits + self._own + 1)
         if count < 1 or len(content) != count * length:
             raise ValueError(f"{len(content)} bytes cannot contain {count} partial assignments")
-        for robot, size in enumerate(self._above):
-            first = robot * self._place_bytes
-            if _largest(content, first, self._place_bytes, length) >= size:
-                raise ValueError("a partial assignment contains values that do not exist")
+        _refuse_places(content, length, self._place_bytes, self._above)
         full = self._full << self._own + 1 | (1 << self._own) - 1
         rows = []
         for start in range(0, len(content), length):
             left = int.from_bytes(content[start + chosen : start + length], "little")
-            if left & ~full:
+            if left | full != full:
                 raise ValueError("a partial assignment contains values that do not exist")
             rows.append((content[start : start + chosen], left))
         return rows
@@ -156,6 +157,22 @@ class ForwardBits:
         return tuple([int.from_bytes(chosen[rank * size : (rank + 1) * size], "little") for rank in ranks])
 
 
+def _lowest_and_guards(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:
+    """Return the lowest bits, and the bits above the values, of all fields.
+
+    `sizes` are the numbers of values, each with the number of its successive fields.
+    """
+    parts: list[tuple[int, int, int]] = []  # the lowest bits, the guards, and the number of bits
+    for size, count in sizes:
+        lowest = ((1 << (size + 1) * count) - 1) // ((1 << size + 1) - 1)
+        parts.append((lowest, lowest << size, (size + 1) * count))
+    while len(parts) > 1:  # neighbours are joined, so that there are few long integers
+        odd = parts[len(parts) & ~1 :]
+        pairs = zip(parts[::2], parts[1::2], strict=False)
+        parts = [(one[0] | two[0] << one[2], one[1] | two[1] << one[2], one[2] + two[2]) for one, two in pairs] + odd
+    return (parts[0][0], parts[0][1]) if parts else (0, 0)
+
+
 def _bytes(bits: int) -> int:
     return (bits + 7) // 8
 
@@ -164,9 +181,31 @@ def _count(found: tuple[int, Row]) -> int:
     return found[0]
 
 
+def _refuse_places(content: bytes, length: int, size: int, above: Sequence[tuple[Domain, int]]) -> None:
+    """Raise `ValueError` if a row of `length` bytes has a place, of `size` bytes, that is not in its robot's domain.
+
+    `above` are the domains of the robots above, each with the number of its successive robots.
+    """
+    first = 0
+    for domain, robots in above:
+        end = first + robots * size
+        if size > 1:
+            columns = range(first, end, size)
+            wrong = any(_largest(content, at, size, length) >= len(domain) for at in columns)
+        else:  # the bytes of all rows or of all robots at once, whichever takes fewer steps
+            rows = len(content) // length
+            if rows < robots:
+                parts = [content[at + first : at + end] for at in range(0, len(content), length)]
+            else:
+                parts = [content[at::length] for at in range(first, end)]
+            known = bytes(range(len(domain)))
+            wrong = any(part.translate(None, known) for part in parts)
+        if wrong:
+            raise ValueError("a partial assignment contains values that do not exist")
+        first = end
+
+
 def _largest(content: bytes, first: int, size: int, length: int) -> int:
     """Return the largest number of `size` bytes at offset `first` in the rows of `length` bytes."""
-    if size == 1:
-        return max(content[first::length])
     starts = range(first, len(content), length)
     return max(int.from_bytes(content[start : start + size], "little") for start in starts)

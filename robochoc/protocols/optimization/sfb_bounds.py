@@ -18,9 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.protocols.message import Value
+from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.local_problem import LocalProblem
 
+Domain = tuple[Value, ...]
 Rows = NDArray[np.integer[Any]]
 
 BOUND, COST, VALUES = 0, 1, 2
@@ -30,7 +32,7 @@ _SIZES = ("<u1", "<u2", "<u4", "<i8")
 
 
 class _NAry(NamedTuple):
-    """The costs that an n-ary constraint adds to `columns`, the vector of its lowest robot.
+    """The costs that an n-ary constraint adds to `columns`, the vector of its lowest robot among those that change.
 
     `table` has an axis for the value of each robot in `ranks` (all above), then this robot's axis and the vector's
     axis.
@@ -47,29 +49,50 @@ class ForwardBounds:
     This robot evaluates the constraints in which it is the second-last robot, and adds the costs to the vector of the
     last one. So each constraint is evaluated once, as soon as only one of its robots has no value. `most` is an upper
     bound on the sum of their costs.
+
+    All computations are restricted to the vectors that change, those of the last robots. If these are more than half
+    of the columns, they are done for all vectors, because a contiguous part of an array is faster.
     """
 
-    def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
+    def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: RunLengths[Domain]) -> None:
         self.rank = order.rank[problem.agent]
         self.most = 0
         self.ceiling = 0
         self._own = len(domains[self.rank])
-        self._above = [len(domain) for domain in domains[: self.rank]]
-        self._largest = max(map(len, domains))
-        self._sizes = [len(domain) for domain in domains[self.rank + 1 :]]
+        self._above = _sizes(domains.counted(0, self.rank))
+        self._largest = max(map(len, domains.distinct))
+        columns = Columns([(len(domain), count) for domain, count in domains.counted(self.rank + 1, len(domains))])
+        self._total = columns.total
+        ranks = [(order.rank[name], name) for name in problem.neighbours]
+        above = {name: domains[rank] for rank, name in ranks if rank < self.rank}
+        found = [
+            (rank, agents, charges)
+            for rank, name in ranks
+            if rank > self.rank
+            for _, agents, charges in problem.tables({**above, name: domains[rank]}, lowest=name)
+        ]
+        changed = [*dict.fromkeys([rank for rank, _, _ in found])]
+        if 2 * sum([len(domains[rank]) for rank in changed]) >= self._total:
+            changed = [*range(self.rank + 1, len(domains))]
+        self._sizes = [len(domains[rank]) for rank in changed]
         self._starts = np.cumsum([0, *self._sizes])
+        self._changed: NDArray[np.intp] | slice = slice(0, self._total)
+        self._all = int(self._starts[-1]) == self._total
+        if not self._all:
+            starts = [columns.start(rank - self.rank - 1) for rank in changed]
+            parts = [np.arange(start, start + size) for start, size in zip(starts, self._sizes, strict=True)]
+            self._changed = np.concatenate([np.arange(0), *parts])
         self._prices: NDArray[Any] = np.zeros((self._own, self._starts[-1]))
         self._n_ary: list[_NAry] = []
-        above = dict(zip(order.names[: self.rank], domains, strict=False))
-        for place, name in enumerate(order.names[self.rank + 1 :]):
-            columns = slice(int(self._starts[place]), int(self._starts[place + 1]))
-            for _, agents, charges in problem.tables({**above, name: domains[self.rank + 1 + place]}, lowest=name):
-                self.most += int(charges[np.isfinite(charges)].max(initial=0))
-                table = np.moveaxis(charges, -1, -2)
-                if len(agents) == 1:
-                    self._prices[:, columns] += table
-                else:
-                    self._n_ary.append(_NAry(tuple(order.rank[one] for one in agents[:-1]), columns, table))
+        place = {rank: place for place, rank in enumerate(changed)}
+        for rank, agents, charges in found:
+            self.most += int(charges[np.isfinite(charges)].max(initial=0))
+            vector = slice(int(self._starts[place[rank]]), int(self._starts[place[rank] + 1]))
+            table = np.moveaxis(charges, -1, -2)
+            if len(agents) == 1:
+                self._prices[:, vector] += table
+            else:
+                self._n_ary.append(_NAry(tuple(order.rank[one] for one in agents[:-1]), vector, table))
 
     def count_up_to(self, ceiling: int) -> None:
         """Set the `ceiling`, to which all larger costs are reduced from now on."""
@@ -91,22 +114,23 @@ class ForwardBounds:
         Raises:
             ValueError: if `content` has another form.
         """
-        columns = self._first + self._own + int(self._starts[-1])
+        columns = self._first + self._own + self._total
         if count < 1 or len(content) != count * columns * self._type.itemsize:
             raise ValueError(f"{len(content)} bytes cannot contain {count} partial assignments")
         rows: Rows = np.frombuffer(content, self._type).reshape(count, columns)
-        if (rows[:, VALUES : self._first] >= self._above).any() or (rows < 0).any():
+        if (rows[:, VALUES : self._first] >= self._above).any() or (self._type.kind == "i" and (rows < 0).any()):
             raise ValueError("a partial assignment contains values that do not exist")
         return rows
 
     @property
     def width(self) -> int:
         """The number of bytes of an extended partial assignment."""
-        return (self._first + 1 + int(self._starts[-1])) * self._type.itemsize
+        return (self._first + 1 + self._total) * self._type.itemsize
 
     def below(self, rows: Rows, upper_bound: int) -> Rows:
         """Return the `rows` with a lower bound below `upper_bound`."""
-        return rows[rows[:, BOUND] < upper_bound]
+        fit = rows[:, BOUND] < upper_bound
+        return rows if fit.all() else rows[fit]
 
     def least(self, rows: Rows) -> int:
         """Return the minimum lower bound of `rows`."""
@@ -124,17 +148,27 @@ class ForwardBounds:
         own = rows[:, self._first : self._first + self._own]
         before = rows[:, BOUND].astype(np.int64) - own.min(axis=1)  # the bound, without this robot's part
         row, value = np.nonzero(before[:, None] + own < upper_bound)
-        vectors = self._vectors(rows, row, value)
+        others = rows[:, self._first + self._own :]
+        old = others[:, self._changed]
+        vectors = self._vectors(rows, old, row, value)
         costs = rows[row, COST].astype(np.int64) + own[row, value]
-        bounds = costs + self._cheapest(vectors).sum(axis=1, dtype=np.int64)
+        bounds = costs + _totals(self._cheapest(vectors))
+        if not self._all:  # the other vectors' part of the bound is as before
+            bounds += (before - rows[:, COST] - _totals(self._cheapest(old)))[row]
         (kept,) = np.nonzero(bounds < upper_bound)
-        kept = kept[np.lexsort((vectors[kept].sum(axis=1, dtype=np.int64), bounds[kept]))]
-        extended = np.empty((len(kept), self._first + 1 + vectors.shape[1]), self._type)
+        left = _totals(vectors[kept])
+        if not self._all and len(rows) > 1:
+            left += (_totals(others) - _totals(old))[row[kept]]
+        kept = kept[np.lexsort((left, bounds[kept]))]
+        extended = np.empty((len(kept), self._first + 1 + self._total), self._type)
         extended[:, BOUND] = bounds[kept]
         extended[:, COST] = costs[kept]
         extended[:, VALUES : self._first] = rows[row[kept], VALUES : self._first]
         extended[:, self._first] = value[kept]
-        extended[:, self._first + 1 :] = vectors[kept]
+        after = extended[:, self._first + 1 :]
+        if not self._all:
+            after[:] = others[row[kept]]
+        after[:, self._changed] = vectors[kept]
         return extended
 
     def completed(self, rows: Rows) -> tuple[int, list[int]]:
@@ -143,9 +177,9 @@ class ForwardBounds:
         row, value = divmod(int(costs.argmin()), self._own)
         return int(costs[row, value]), [*rows[row, VALUES : self._first].tolist(), value]
 
-    def _vectors(self, rows: Rows, row: NDArray[np.intp], value: NDArray[np.intp]) -> Rows:
-        """Return the vectors of the robots below, after each of the rows at `row` is extended by `value`."""
-        vectors = rows[row, self._first + self._own :]
+    def _vectors(self, rows: Rows, old: Rows, row: NDArray[np.intp], value: NDArray[np.intp]) -> Rows:
+        """Return the changed vectors, `old` before, after each of the `rows` at `row` is extended by `value`."""
+        vectors = old[row]
         vectors += self._prices[value]
         np.minimum(vectors, self.ceiling, out=vectors)
         for ranks, columns, table in self._n_ary:
@@ -155,7 +189,9 @@ class ForwardBounds:
         return vectors
 
     def _cheapest(self, vectors: Rows) -> Rows:
-        """Return the minimum of each robot's vector."""
+        """Return the minimum of each robot's vector, of those that change."""
+        if not self._sizes:
+            return vectors
         if len(set(self._sizes)) > 1:
             return np.minimum.reduceat(vectors, self._starts[:-1], axis=1)
         blocks = vectors.reshape(len(vectors), len(self._sizes), self._sizes[0])
@@ -171,3 +207,17 @@ class ForwardBounds:
     def _first(self) -> int:
         """The column after the values of the robots above: that of this robot's value, or the first in its vector."""
         return VALUES + self.rank
+
+
+def _sizes(domains: Sequence[tuple[Domain, int]]) -> NDArray[Any] | int:
+    """Return the sizes of `domains`, each with the number of its successive robots; one number if all are equal."""
+    sizes = [len(domain) for domain, _ in domains]
+    if len(set(sizes)) == 1:
+        return sizes[0]
+    small = np.array(sizes, np.min_scalar_type(max(sizes, default=0)))
+    return np.repeat(small, [count for _, count in domains])
+
+
+def _totals(rows: Rows) -> NDArray[np.int64]:
+    totals: NDArray[np.int64] = rows.sum(axis=1, dtype=np.int64)
+    return totals

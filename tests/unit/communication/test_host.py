@@ -131,12 +131,30 @@ def test_a_verdict_is_an_event_once() -> None:
     assert any(isinstance(event, Sent) and event.content == {"value": (2,)} for event in events)
 
 
+class Large(Message, frozen=True):
+    """A message of any size, which receivers may share."""
+
+    part: bytes
+
+    shareable = True
+
+
 def test_of_large_messages_only_the_last_ones_are_kept_to_be_shared() -> None:
-    under_way, message = MessageCache(), Ok((1,))
-    contents = [bytes([number]) * 1_000_000 for number in range(8)]
-    for content in contents:
-        under_way.keep(content, message)
-    assert [content[0] for content in contents if under_way.get(content) is message] == [4, 5, 6, 7]
-    under_way.keep(b"0" * 9_000_000, message)
-    assert under_way.get(b"0" * 9_000_000) is message
+    under_way = MessageCache()
+    messages = [Large(bytes([number]) * 1_000_000) for number in range(8)]
+    contents = [under_way.content(message) for message in messages]
+    kept = [number for number, content in enumerate(contents) if under_way.get(content) is messages[number]]
+    assert kept == [4, 5, 6, 7]
+    largest = Large(b"0" * 9_000_000)
+    assert under_way.get(under_way.content(largest)) is largest
     assert under_way.get(contents[-1]) is None
+
+
+def test_a_message_that_is_sent_on_is_encoded_once() -> None:
+    under_way, message = MessageCache(), Large(b"1")
+    content = under_way.content(message)
+    assert content == encode(message)
+    assert under_way.content(message) is content
+    equal = under_way.content(Large(b"1"))
+    assert equal == content
+    assert under_way.get(equal) is message
