@@ -2,18 +2,18 @@
 
 Names:
     load: Reads a team's files, and returns a `Problem`.
-    Problem: A problem, which `solve()` solves on this machine.
-    Model: A problem that is made in Python, with operators.
-    ArrayProblem: A problem of very many robots, made from numpy arrays.
+    Problem: A problem; its method `solve()` solves it on this machine.
+    Model: A problem written in Python, with operators.
+    ArrayProblem: A problem with very many robots, built from NumPy arrays.
     all_different, allowed, forbidden, costs, function, element, cumulative, minimum, maximum, if_then_else, all_of,
-        any_of: Constraints and costs of a model that no operator makes.
-    from_cpmpy: Splits a CPMpy model over robots (the extra `cpmpy`).
+        any_of: Constraints and costs of a model for which there is no operator.
+    from_cpmpy: Distributes a CPMpy model over robots (the extra `cpmpy`).
     Outcome: The result of a run; `solve()` returns its subclass `Solution`.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
-    register: Makes a protocol of this program known under a name.
+    register: Registers a protocol of this program under a name.
     read_result: Reads a JSON result of `robochoc solve --json` as an `Outcome`.
-    AgentsContainer: The master or robots on one of several machines.
-    journal: Journals of runs; `journal.rows(path)` are for pandas or polars.
+    AgentsContainer: The master or robots on one machine of a network.
+    journal: Journals of runs; `journal.rows(path)` returns rows for pandas or polars.
     RobochocError: The base class of all exceptions: InvalidInputError, ModelError, OptionError, UnsupportedError,
         UnknownProtocolError, CompileError, RobotsLostError, RefutedError and others.
 
@@ -128,7 +128,7 @@ _PLACES = {
 
 
 def __getattr__(name: str) -> object:
-    """Import what is asked for: the command line starts faster without it."""
+    """Import a name on first use, so that the command line starts quickly."""
     import importlib  # noqa: PLC0415 - start-up
 
     if name in _PLACES:
@@ -143,5 +143,5 @@ def __getattr__(name: str) -> object:
 
 
 def __dir__() -> list[str]:
-    """Return the names of the library."""
+    """Return the public names."""
     return list(__all__)

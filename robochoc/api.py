@@ -92,15 +92,16 @@ def load(
         path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time; or a file
             of FRODO, DisChoco, pyDCOP, XCSP3 or toulbar2.
         *more: Further files of the same problem, such as pyDCOP's distribution and scenario.
-        format: For files of other tools: the name of the format, as `robochoc import --help` lists it. None: it is
-            recognised.
-        infinity: For files of other tools: costs of this value or more forbid. None: no cost forbids.
+        format: For files of other tools: the name of the format, as `robochoc import --help` lists it. None: the format
+            is recognised from the files.
+        infinity: For files of other tools: a combination of values with this cost or more is forbidden. None: no cost
+            means that a combination is forbidden.
         owner: For files of other tools: a regular expression. Variables whose names have the same match (or the same
             first group) belong to one robot. None: each variable has its own robot.
-        allow_code: For pyDCOP's files: whether Python files that they name may be executed.
+        allow_code: True if Python files to which pyDCOP's files refer may be executed.
 
     Raises:
-        InvalidInputError: if the files are invalid. It lists every mistake with its file and line.
+        InvalidInputError: if the files are invalid. The error lists every mistake with its file and line.
 
     Example:
         >>> import robochoc
@@ -116,7 +117,7 @@ def load(
 
 @dataclass
 class AgentsContainer:
-    """The agents on one of several machines: the master, or robots (Figures 3 and 4 of the paper, in Python).
+    """The agents on one machine of a network: the master, or robots (Figures 3 and 4 of the paper, in Python).
 
     The master's machine (Figure 3):
 
@@ -184,7 +185,7 @@ class AgentsContainer:
         self._main = Address.parse(place)
 
     def set_listen(self, place: str) -> None:
-        """Set the address at which the master listens. By default only this machine can connect (loopback).
+        """Set the address at which the master listens. By default, only this machine can connect (loopback).
 
         Args:
             place: `HOST` or `HOST:PORT`.
@@ -197,7 +198,7 @@ class AgentsContainer:
         self._listen = Address.parse(place)
 
     def set_authority(self, folder: Path | str) -> None:
-        """Set the folder of the Authority, for the master. The default is in the user's data folder."""
+        """Set the Authority's folder, on the master's machine. By default, it is in the user's data folder."""
         self._authority = Path(folder)
 
     def set_identity(self, name: str, folder: Path | str | None = None, token: str | None = None) -> None:
@@ -205,7 +206,7 @@ class AgentsContainer:
 
         Args:
             name: The robot's name.
-            folder: The folder with the robot's key and certificate. The default is in the user's data folder.
+            folder: The folder with the robot's key and certificate. By default, it is in the user's data folder.
             token: The token with which the robot enrols if it has no certificate yet.
         """
         self._identities[name] = (None if folder is None else Path(folder), token)
@@ -218,10 +219,10 @@ class AgentsContainer:
             **plan: Other fields of `robochoc.run.networked.master_run.Plan`, for the master.
 
         Returns:
-            On the master's machine, the outcome; on a machine of robots, how each robot ended, by name.
+            On the master's machine, the outcome; on a robots' machine, the end of the run for each robot, by name.
 
         Raises:
-            ValueError: if the container has no type, or a robot has no file or no master.
+            ValueError: if the container has no type, a robot has no file, or the address of the master is missing.
             UnsupportedError: on Windows.
         """
         if not IS_POSIX:

@@ -1,4 +1,4 @@
-"""Tools for tests of protocols: objects of a protocol without a runtime, schedules of messages, and checks.
+"""Tools for tests of protocols: protocol objects without a runtime, schedules of messages, and checks.
 
 >>> import robochoc
 >>> from robochoc.protocols.satisfaction.abt import ABT
@@ -43,7 +43,7 @@ _Kind = TypeVar("_Kind", bound=Protocol)
 
 
 def protocol_objects(team: Team, protocol: type[_Kind]) -> dict[str, _Kind]:
-    """Return an object of a protocol for each robot, by name. None is started.
+    """Return a protocol object for each robot, by name. The protocols are not started yet.
 
     Args:
         team: The team, in priority order.
@@ -61,7 +61,7 @@ def start(robots: Mapping[str, Protocol]) -> None:
 
 
 def deliver(robots: Mapping[str, Protocol]) -> list[tuple[str, str, Message]]:
-    """Deliver all messages in the outboxes; the answers stay in the outboxes.
+    """Deliver all messages in the outboxes once. The robots' answers stay in the outboxes.
 
     Returns:
         The delivered messages, each with its sender and receiver.

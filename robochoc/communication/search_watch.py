@@ -73,6 +73,6 @@ class SnapshotRound:
 def snapshot_of(
     assignments: Mapping[str, dict[str, int]], findings: Mapping[str, Findings], lost_messages: int = 0
 ) -> SearchResult:
-    """Return the robots' values and findings at one moment as the result of a search without a verdict."""
+    """Return a snapshot of the robots' values and findings, as a search result without a verdict."""
     metrics = Metrics(lost_messages=lost_messages)
     return SearchResult(Verdict.UNKNOWN, None, dict(assignments), metrics, findings=dict(findings))

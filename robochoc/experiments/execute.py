@@ -60,7 +60,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         self._stack.__exit__(kind, error, trace)
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return self."""
         return self
 
     def run(self, task: Task) -> Row:

@@ -62,7 +62,7 @@ class Store:
             raise
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return self."""
         return self
 
     def __exit__(

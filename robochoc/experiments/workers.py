@@ -41,7 +41,7 @@ class LocalWorkers:
         self._workers: list[_Worker] = []
 
     def __enter__(self) -> Self:
-        """Return itself."""
+        """Return self."""
         return self
 
     def __exit__(

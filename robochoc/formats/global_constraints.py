@@ -29,11 +29,11 @@ _SPLIT = "split it into several"
 
 
 def read_global(reference: str, parameters: etree._Element | None, scope: Sequence[Term]) -> GlobalPredicate:
-    """Return the global constraint in a file, with formal parameters. Raises `MistakeError`.
+    """Read a global constraint, and return it with formal parameters. Raises `MistakeError`.
 
     Args:
-        reference: The name of the constraint, with `global:`.
-        parameters: The element with its parameters. None: the terms in `scope`, which only allDifferent allows.
+        reference: The name of the constraint, including the prefix `global:`.
+        parameters: The element with the parameters. None: the terms in `scope` are used (allDifferent only).
         scope: The terms of the constraint's scope.
     """
     text = "" if parameters is None else parameters.text or ""
@@ -83,7 +83,7 @@ def read_form(reference: str, form: str) -> GlobalPredicate:
     """Return a global constraint with formal parameters `X0`, `X1`, ... from its `form`: `[ X0 X1 X2 ]`.
 
     Args:
-        reference: The name of the constraint, with `global:`.
+        reference: The name of the constraint, including the prefix `global:`.
         form: Its parameters in the syntax of XCSP 2.1, with formal parameters instead of variables, in the order of
             their numbers.
 
@@ -282,7 +282,7 @@ def _cumulative(words: _WordReader) -> Expression:
 
 def _given(part: Expression | None) -> Expression:
     if part is None:
-        raise ValueError("a task has two of origin, duration and end")
+        raise ValueError("a task must have exactly two of origin, duration and end")
     return part
 
 

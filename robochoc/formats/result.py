@@ -60,7 +60,7 @@ def result_json(
     Args:
         outcome: The outcome.
         names: The original names of robots and variables, by their names in `outcome`.
-        places: The positions, in metres on a map, that the values of variables mean.
+        places: The positions that the values of variables represent, in metres on a map.
         values: The user's values of variables, if they differ from the integers in the assignment.
     """
     added = {"names": names, "places": places, "values": values}

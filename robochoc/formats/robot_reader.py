@@ -74,10 +74,10 @@ class RobotFile(TeamMember):
         return replace(self, robot=with_table(self.robot, names)) if names else self
 
     def in_places(self, places: int) -> RobotFile:
-        """Return the file with costs in the unit of `places` decimal places, which must be at least as many as now.
+        """Return the file with costs in units of `places` decimal places, at least as many places as now.
 
         Raises:
-            InvalidInputError: if a cost then has too many digits.
+            InvalidInputError: if a cost in the new unit has too many digits.
         """
         factor = 10 ** (places - self.robot.costs.places)
         if factor == 1:

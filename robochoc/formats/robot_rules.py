@@ -121,7 +121,7 @@ def check_shared(constraint: Constraint, own: Collection[str]) -> None:
 
 
 def _check_application(definition: Definition, scope: tuple[Term, ...], parameters: tuple[Term, ...]) -> None:
-    """Raise `MistakeError` unless the number of parameters is right, and scope and parameters have equal terms."""
+    """Raise `MistakeError` if the number of parameters is wrong, or scope and parameters differ in their terms."""
     if isinstance(definition, Relation) and parameters != scope:
         raise MistakeError(
             f"parameters '{terms_text(parameters)}' differ from the scope '{terms_text(scope)}'",

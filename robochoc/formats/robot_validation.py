@@ -95,7 +95,7 @@ class RobotValidator:
         return True
 
     def _check_parts(self, robot: Robot, places: ObjectLocations) -> Iterator[None]:
-        """Check one part after the other. It yields after each part, so that the caller can stop."""
+        """Check the parts one by one. Yield after each part, so that the caller can stop."""
         own = dict.fromkeys(variable.name for variable in robot.variables)
         with self._at(places.robot):
             check_robot_name(robot.name)

@@ -1,4 +1,4 @@
-"""The robots of a team, from files or built in Python, with data used by several checks of the team."""
+"""The robots of a team, read from files or built in Python, with data shared by several checks of the team."""
 
 from __future__ import annotations
 

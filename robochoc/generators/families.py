@@ -194,7 +194,7 @@ def patrol(
     seed: int = 0,
     **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
 ) -> Team:
-    """Return a problem of planning the next visits of a patrol: see `generators/maps/patrol.py`."""
+    """Return the problem of planning a patrol's next visits: see `generators/maps/patrol.py`."""
     team, _ = patrols.patrol(
         MapChoice(**of_map), seed, points=points, visit=visit, idle=idle, rounds=rounds, apart=apart
     )

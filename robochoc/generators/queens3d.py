@@ -33,14 +33,14 @@ Cell = tuple[int, int]
 
 
 class QueensModel(StrEnum):
-    """The attacks of a queen: as in Figure 2, or of Allison's queen."""
+    """The directions in which a queen attacks: as in Figure 2, or as Allison's queen."""
 
     PLANAR = "planar"
     FULL = "full"
 
 
 class QueensRobots(StrEnum):
-    """The drones of a robot: one for a cell, or all in a row."""
+    """The distribution of drones over robots: one robot for each cell, or one for each row."""
 
     CELLS = "cells"
     ROWS = "rows"
@@ -61,8 +61,9 @@ def queens3d(
 
     Args:
         n: The size of the cube, at most `MAX_N`.
-        model: The attacks of a queen: as in Figure 2 (`planar`), or also along space diagonals (`full`).
-        robots: The drones of a robot: one for a cell (`cells`), or all in a row (`rows`).
+        model: The directions in which a queen attacks: as in Figure 2 (`planar`), or also along space diagonals
+            (`full`).
+        robots: The distribution of drones over robots: one robot for each cell (`cells`), or one for each row (`rows`).
 
     Raises:
         ValueError: `n` is not from 1 to `MAX_N`, or `model` or `robots` is unknown.

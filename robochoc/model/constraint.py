@@ -174,7 +174,7 @@ class GlobalPredicate(Predicate):
 
 @dataclass(frozen=True)
 class Function:
-    """The definition of a constraint in intension whose value is its cost: an integer expression over `parameters`.
+    """The definition of a cost function in intension: an integer expression over `parameters`, whose value is the cost.
 
     The value is in whole units of the user, not scaled by `CostUnits.places`. As in predicates, parameters in
     `symbolic` are symbols.
@@ -206,7 +206,7 @@ class Constraint:
         definition: The relation, predicate or function.
         scope: The variables and constants.
         parameters: The actual parameters of a predicate. For a relation they equal `scope`.
-        model: The robots' knowledge of a shared constraint. None: the constraint is private.
+        model: The distribution of knowledge about a shared constraint. None: the constraint is private.
         cost: The cost of violating a predicate, in a DisWCSP. `INFINITE`: a hard constraint.
         line: The line in the file from which the constraint was read.
         offset: The number subtracted from each cost of the constraint, so that no cost is negative (`model/costs.py`).

@@ -67,7 +67,8 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
     Args:
         robot: The robot.
         units: The units of the robot's team.
-        domains: The known domains of variables. The expression of a function over other variables must imply bounds.
+        domains: The known domains of variables. A cost function over a variable without a known domain must have bounds
+            that follow from its expression.
 
     Raises:
         UnboundedCostError: if the cost of a function has no bounds.

@@ -35,9 +35,11 @@ class Metrics:
         ncccs: Non-concurrent constraint checks.
         checks: The constraint checks of all robots together.
         wall_s: The wall-clock time, in seconds.
-        compile_s: The time before that for compiling local domains, in seconds.
-        memory: The private memory of the largest robot process at its end, in bytes. 0: robots had no processes.
-        simulated_s: The simulated time by a channel model, in seconds. 0: time was not simulated.
+        compile_s: The time spent on compiling local domains before the search, in seconds. `wall_s` does not include
+            it.
+        memory: The private memory of the largest robot process at its end, in bytes. 0: robots did not run as
+            processes.
+        simulated_s: The time simulated with a channel model, in seconds. 0: time was not simulated.
         largest: The size of the largest message's content, in bytes.
         cycles: The number of cycles in the simulator's schedule `cycles`. 0: cycles were not counted.
         lost_messages: The number of messages that were permanently lost.
@@ -162,7 +164,7 @@ class Answer:
         withdrawn: The names of the withdrawn robots; in an `Outcome` including lost robots.
         metrics: The messages, checks and time spent.
         verified: True if the checker has compared the assignment with every constraint of a team that was validated
-            before. For `no-solution`: whether the central solver has also found `no-solution`.
+            before. For `no-solution`: true if the central solver has also found `no-solution`.
         witness: The robot that ended the search. For `no-solution`: the robot that has `RULED_OUT`.
         reason: The reason for the verdict, if it is not obvious: a robot without a local solution, or a limit.
         count: The number of solutions, if it was requested.
@@ -174,11 +176,12 @@ class Answer:
         checked: The number of checked constraints in a run across machines, by the robots that checked them.
         preprocessing: The result of preprocessing, if it was requested.
         optima: The optima, or the solutions, if the protocol lists them.
-        deadline: The seconds after which an answer was due, if time ended the search and the answer is the best one
-            known at that moment.
+        deadline: The deadline in seconds, if it ended the search. The answer is then the best assignment known at that
+            time.
         improvements: The answers published during the search; the first was published at the deadline.
         dropped_constraints: The constraints between robots that were dropped because robots are absent, if there is an
-            assignment (`model/absence.py`). In runs across machines no robot knows all of them, and none is listed.
+            assignment (`model/absence.py`). In runs across machines the list is empty, since no robot knows all these
+            constraints.
     """
 
     verdict: Verdict
@@ -238,13 +241,13 @@ class Outcome(Answer):
         protocol: The protocol that was specified or chosen.
         runtime: The runtime.
         seed: The seed of the run.
-        lost: The names of the withdrawn robots whose processes died and that did not return.
+        lost: The names of the withdrawn robots whose processes died and did not return.
         order: The name of the priority order that was specified or chosen; `listed` for a list of names.
         epochs: The epochs, if there were several.
         channel: The name of the channel model, if time was simulated by a channel model.
         placed_by: The protocol that decided the withdrawal, if it differs from `protocol`.
-        claimed_by: In runs across machines: the robot whose claim is the basis of the verdict, since the claim cannot
-            be checked; or `ALL_ROBOTS`.
+        claimed_by: In runs across machines: the robot on whose claim the verdict relies, or `ALL_ROBOTS`. Such claims
+            cannot be checked.
         symbols: The names of the team's symbols, if any: the value 2 means the symbol at index 2.
         symbolic: The variables whose values are symbols.
         chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.

@@ -87,7 +87,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True)
 class Topic:
-    """A topic to which a robot's decision is published (ROS Layer unit).
+    """A topic on which a robot's decision is published (ROS Layer unit).
 
     `x`, `y`, `z` are the waypoint's position.
     """
@@ -130,7 +130,7 @@ class Child:
 
 @dataclass(frozen=True)
 class Robot:
-    """One agent: the contents of its file, which is all it knows.
+    """One agent, with the contents of its file. The agent has no other knowledge.
 
     Attributes:
         name: The robot's name, unique in the team.

@@ -79,9 +79,9 @@ class ArrayProblem:
         robots: The number of robots.
         values: The number of values of each variable.
         edges: The pairs of robots that share a table of costs, one row for each pair.
-        tables: The costs for pairs of values: the row is the value of an edge's first robot, the column that of its
-            second. One table for all edges, one for each edge, or several from which `which` chooses. Costs are
-            integers of 0 or more, and `inf` for forbidden pairs.
+        tables: The costs for pairs of values: the row is the value of the edge's first robot, the column is the value
+            of the second robot. One table for all edges, one for each edge, or several from which `which` chooses.
+            Costs are integers of 0 or more, or `inf` for forbidden pairs.
         which: The index of each edge's table.
         charges: The unary costs of the values, one row for each robot.
         names: The names of the robots, which determine their random numbers. None: R0, R1, ...
@@ -275,7 +275,7 @@ class ArrayProblem:
 
 @contextmanager
 def _without_runtimes() -> Iterator[None]:
-    """Name `robochoc.Model` instead of another runtime, which an array problem does not have."""
+    """Recommend `robochoc.Model` instead of another runtime, since array problems have no other runtime."""
     try:
         yield
     except UnsupportedError as error:

@@ -33,7 +33,7 @@ Step = RemoveAgent | RemoveValue | AddValue | ModelRobot | ModelConstraint | Rem
 
 
 class ModelEvent:
-    """Simultaneous changes, created by `Model.after_solution` and `Model.after_messages`."""
+    """An event: changes that happen at the same time. Created by `Model.after_solution` and `Model.after_messages`."""
 
     def __init__(self, model: Model, after: int | None, place: SourceLine) -> None:
         self.after, self.place = after, place
@@ -49,14 +49,14 @@ class ModelEvent:
         return f"<event with {len(self.steps)} change{'s' * (len(self.steps) != 1)}>"
 
     def remove_robot(self, robot: ModelRobot | str) -> None:
-        """Remove a robot with its variables. The constraints that it shares are restated or dropped."""
+        """Remove a robot with its variables. The robot's shared constraints are restated or dropped."""
         name = robot.name if isinstance(robot, ModelRobot) else robot
         if name not in self._model.robots:
             raise UnknownNameError(f"there is no robot {name!r}", did_you_mean(name, self._model.robots))
         self._add(RemoveAgent(name))
 
     def robot(self, name: str, *, weight: int = 1) -> ModelRobot:
-        """Add a robot with the lowest priority. Constraints for it are added by this event's `add`."""
+        """Add a robot with the lowest priority. Add the robot's constraints with `add` of this event."""
         made = self._model.add_robot(check_robot(name, self._model.robots, weight), 0, weight, calling_line())
         made.joins = self
         self._add(made)

@@ -23,7 +23,7 @@ from robochoc.modelling.terms import (
 
 
 def all_different(*terms: object) -> Term:
-    """Return the condition that all `terms` differ pairwise. They are given one by one, or as one list.
+    """Return the condition that all `terms` differ pairwise. They are separate arguments or one list.
 
     As a hard constraint, it is split into a constraint for each pair, which all protocols support.
 
@@ -39,12 +39,12 @@ def all_different(*terms: object) -> Term:
 
 
 def minimum(*terms: object) -> Term:
-    """Return the minimum of numbers, given one by one or as one list."""
+    """Return the minimum of numbers, which are separate arguments or one list."""
     return _extreme("min", terms)
 
 
 def maximum(*terms: object) -> Term:
-    """Return the maximum of numbers, given one by one or as one list."""
+    """Return the maximum of numbers, which are separate arguments or one list."""
     return _extreme("max", terms)
 
 
@@ -56,7 +56,7 @@ def if_then_else(test: object, then: object, otherwise: object) -> Term:
 def element(array: Iterable[object], index: object) -> Term:
     """Return the element at `index` (from 0) of `array`, whose elements are numbers or terms.
 
-    A constraint is violated if the index is outside the array. Negative indices are outside.
+    If the index is outside the array, the constraint is violated. Negative indices count as outside.
     """
     found = [number(one) for one in array]
     if not found:
@@ -106,13 +106,14 @@ def forbidden(terms: object, rows: Iterable[object]) -> Term:
 
 
 def costs(terms: object, table: Mapping[Any, object] | Iterable[Any], default: object = 0) -> Term:
-    """Return the entry of a table for the values of `terms`.
+    """Return a number that depends on the values of `terms` and is looked up in a table.
 
     Args:
         terms: The terms, or a single term.
-        table: A mapping from tuples of values to numbers; for a single term, from values. `math.inf` forbids.
-            Or a list of numbers, one for each value of a variable in the order of its domain; for two variables a
-            matrix with a row for each value of the first variable, and so on. Arrays of numpy are also allowed.
+        table: A mapping from tuples of values to numbers (for a single term, from values to numbers). `math.inf`
+            forbids a tuple. For one variable, the table may also be a list of numbers in the order of the domain; for
+            two variables, a matrix with a row for each value of the first variable; and so on. NumPy arrays are also
+            allowed.
         default: The number for all other values; `math.inf` forbids them.
     """
     scope = _scope(terms)
@@ -131,8 +132,8 @@ def function(function: Callable[..., object], *terms: object) -> Term:
     """Return a term whose value a Python function computes from the values of `terms`.
 
     A function that returns truth values is a condition; a function that returns numbers can be minimised, and
-    `math.inf` forbids the values. The function is called with all combinations of values when the problem is solved or
-    saved, and robots receive the resulting table.
+    `math.inf` forbids the values. When the problem is solved or saved, the function is called with all combinations of
+    values, and robots receive the resulting table.
 
     Args:
         function: The function. It receives the values in the order of `terms`, and must be deterministic.

@@ -131,7 +131,8 @@ class Model(Solvable):
 
         Args:
             name: The robot's name.
-            priority: Robots with a higher priority come first; robots with the same priority, in the order of creation.
+            priority: Robots with a higher priority come first. Robots with the same priority follow the order of
+                creation.
             weight: The weight of the robot's withdrawal: a robot of weight 3 counts as much as three of weight 1.
 
         Raises:
@@ -151,7 +152,7 @@ class Model(Solvable):
         self.changed()
 
     def __getitem__(self, name: str) -> ModelVariable:
-        """Return the variable named `name` in the team, such as `drone3.slot`; also for a variable of CPMpy."""
+        """Return the variable named `name` in the team, such as `drone3.slot`. `name` may also be a CPMpy variable."""
         name = team_name(name, self.imported)
         if name not in self.variables:
             raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
@@ -171,15 +172,15 @@ class Model(Solvable):
 
         Args:
             *constraints: Conditions, or lists of them.
-            cost: The cost if the constraints do not all hold. It is subtracted from a sum that is maximised. None, or
-                `math.inf`: the constraints are hard.
+            cost: The cost of violating the constraints; it is due once, if at least one of them does not hold. If a sum
+                is maximised, the cost is subtracted from it. None, or `math.inf`: the constraints are hard.
             name: A name by which an event can remove the constraints.
             when_absent: The meaning of the constraints when a robot in their scopes withdraws, is lost or leaves:
                 `restate` them for the other robots, `drop` them, or `fail`. None: the default for their form
                 (documentation, page When a robot is absent).
 
         Returns:
-            One constraint that stands for all of them.
+            A single constraint: the conjunction of all `constraints`.
 
         Raises:
             ModelError: if a constraint is not a condition over variables of this model, or cannot be restated.
@@ -193,7 +194,7 @@ class Model(Solvable):
         """Remove a constraint that `add` or a robot's `knows` returned. Other constraints with the same name remain.
 
         Raises:
-            ModelError: if the model does not contain the constraint, for instance because an event adds it.
+            ModelError: if the model does not contain the constraint, or if an event adds the constraint.
         """
         if any(one is constraint for one in self._constraints):
             self._constraints.remove(constraint)
@@ -227,7 +228,7 @@ class Model(Solvable):
         self._optimize(costs, places, maximize=False)
 
     def maximize(self, utilities: object, *, places: int | None = None) -> None:
-        """Maximise a sum of terms, as `minimize`; the costs of violated soft constraints are subtracted."""
+        """Maximise a sum of terms; see `minimize`. The costs of violated soft constraints are subtracted."""
         self._optimize(utilities, places, maximize=True)
 
     def _optimize(self, given: object, places: int | None, *, maximize: bool) -> None:
@@ -284,11 +285,11 @@ class Model(Solvable):
         return f"C{self._named}"
 
     def after_solution(self) -> ModelEvent:
-        """Add an event whose changes happen when the problem before it is solved."""
+        """Add an event whose changes happen as soon as the current problem is solved."""
         return self._event(None)
 
     def after_messages(self, count: int) -> ModelEvent:
-        """Add an event whose changes happen after `count` messages, or earlier if the problem before it is solved."""
+        """Add an event whose changes happen after `count` messages, or earlier if the current problem is solved."""
         whole = whole_number(count)
         if whole is None or whole < 0:
             raise ModelTypeError(f"{count!r} is not a number of messages", "expected an integer, 0 or more")
@@ -340,9 +341,10 @@ class Model(Solvable):
         return solutions_of(self, protocol, limit, options)
 
     def conflict(self, *, timeout: float | None = None) -> tuple[ModelConstraint, ...] | None:
-        """Return a minimal set of constraints that cannot hold together: without any one of them, the others could.
+        """Return a minimal set of constraints that cannot hold together: if any one of them is removed, the others can.
 
-        The set is empty if a robot has a variable without values. None: all hard constraints can hold together.
+        The set is empty if a robot has a variable without values. The result is None if all hard constraints can hold
+        together.
 
         Args:
             timeout: A time limit, in seconds. None: no limit.
@@ -356,7 +358,7 @@ class Model(Solvable):
         return conflict_of(self, timeout)
 
     def _given_sense(self) -> bool | None:
-        """Return whether the costs of the given team are maximised; None: it has no costs."""
+        """Return whether the costs of the given team are maximised; None if the team has no costs."""
         units = self.given.units if self.given else PLAIN_COSTS
         return units.maximize if units != PLAIN_COSTS else None
 

@@ -44,7 +44,7 @@ class ModelRobot:
 
     @property
     def priority(self) -> float:
-        """The priority: robots with a higher priority come first, then those created earlier."""
+        """The priority. Robots with a higher priority come first; ties are broken by the order of creation."""
         return self._priority
 
     @property
@@ -59,7 +59,7 @@ class ModelRobot:
 
     @property
     def parts(self) -> tuple[ModelConstraint, ...]:
-        """The robot's parts of shared constraints, which `knows` returned."""
+        """The robot's parts of shared constraints, as returned by `knows`."""
         return tuple(self._parts)
 
     @property
@@ -164,7 +164,7 @@ class ModelRobot:
 
         Args:
             name: The topic's name.
-            x: The waypoint's x-coordinate: a number, or a term over this robot's variables. None: not published.
+            x: The waypoint's x-coordinate: a number, or a term over this robot's variables. None: x is not published.
             y: The y-coordinate, likewise.
             z: The z-coordinate, likewise.
             type: The type of the topic's messages.

@@ -94,44 +94,46 @@ class Solvable(ABC):
     ) -> Solution:
         """Let the robots solve the problem together.
 
-        The simulator runs all robots in the calling thread. With `runtime="processes"` each robot has a process, as on
-        the command line. With `runtime="network"`, each process imports the main program, which must therefore call
-        this method below `if __name__ == "__main__":`.
+        The simulator runs all robots in the calling thread. With `runtime="processes"` each robot runs in its own
+        process, as on the command line. With `runtime="network"`, each process imports the main program, which must
+        therefore call this method below `if __name__ == "__main__":`.
 
         Args:
             protocol: The name of the protocol, in upper or lower case, or its class. None, or `auto`: a protocol that
-                suits the problem.
+                suits the problem is chosen.
             runtime: `simulator`, `processes`, `network` or `arrays`.
             order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
-                first. None: the order that suits an automatically chosen protocol; otherwise the team's order, or
-                `max-degree` if the team has none. `given`: the team's order.
-            withdraw: Which robots may withdraw if there is no solution for all: `minimum` (or True) or `maximal`. None,
-                or False: no robot.
+                first. `given`: the team's order. None: if the protocol is chosen automatically, an order that suits the
+                protocol; otherwise the team's order, or `max-degree` if the team has none.
+            withdraw: The rule by which robots withdraw if the whole team has no solution: `minimum` (or True) or
+                `maximal`. None, or False: no robot withdraws.
             settings: Settings of the protocol, by name.
             observer: Called with every event of the run.
-            environment: Receives each answer, and returns the next changes.
+            environment: A function that is called with each answer, and returns the next changes of the problem.
             seed: The seed of the simulator, of the order `random`, and of randomised protocols.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
             deadline: A time limit in seconds, at which the best assignment known so far becomes the answer.
-            improve: The number of seconds after the deadline in which robots search for better assignments. None: none.
+            improve: The number of seconds after the deadline in which robots search for better assignments. None: they
+                stop at the deadline.
             messages: A limit on the number of messages. None: no limit.
             ncccs: A limit on non-concurrent constraint checks, for the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
             verify: True if the central solver checks a `no-solution` or a minimum cost found by the robots.
-            count: True if the central solver counts all solutions, or `count-dpop` all optima.
+            count: True to count: the protocol `central` counts all solutions, and `count-dpop` counts all optima.
             central_with: The solver of the protocol `central`: `ace` or `ortools`.
             cache: True if solutions of local problems are stored in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The maximum delay of a message in the simulator, in constraint checks.
-            channel: A channel model, with which the simulator counts seconds of computing and radio.
-            message_loss: The probability that a message is lost without being sent again.
+            channel: A channel model, with which the simulator measures time as the seconds spent on computation and
+                radio.
+            message_loss: The probability that a message is lost for good, without a retransmission.
             on_loss: The reaction to the loss of a robot: `fail` or `withdraw`. None: the run fails, unless there are
                 `spares`.
             spares: The number of lost robots that are replaced.
             patience: A robot whose process is suspended for this many seconds counts as lost. None: never.
-            kill: The robots whose processes are killed, and when.
-            filters: The names of the channel filters of messages on a network, in the order of application.
+            kill: The robots whose processes are killed, with the times.
+            filters: The names of the channel filters for messages on a network, in the order of application.
             bounds: True if events report the proven lower bound of the cost (with processes and in the simulator).
             preprocess: The preprocessing before the protocol: `ac` makes domains arc consistent. None: no
                 preprocessing.
@@ -173,7 +175,7 @@ class Solvable(ABC):
         return solution
 
     async def solve_async(self, *arguments: Any, **options: Any) -> Solution:  # noqa: ANN401 - those of `solve`
-        """Solve the problem in a thread while other tasks run. If the task is cancelled, the search ends.
+        """Solve the problem in a thread while other asyncio tasks run. If this task is cancelled, the search ends.
 
         Args:
             *arguments: The arguments of `solve`.
@@ -261,7 +263,7 @@ def _refuse(unknown: Iterable[str]) -> None:
 
 
 def _refuse_types(stop: object, progress: object, observer: object) -> None:
-    """Raise `OptionTypeError` for arguments that are called during the run, but cannot be called."""
+    """Raise `OptionTypeError` for callbacks that are not callable."""
     if stop is not None and not callable(getattr(stop, "is_set", None)):
         raise OptionTypeError(f"stop={stop!r} is not allowed; expected a threading.Event, which another thread sets")
     for name, given in (("progress", progress), ("observer", observer)):

@@ -26,7 +26,7 @@ Values = Mapping["ModelVariable", object]
 
 
 class TermSize(NamedTuple):
-    """The depth of a term, and the number of its subterms, where repeated subterms count repeatedly."""
+    """The depth of a term, and the number of its subterms. A subterm is counted each time that it occurs."""
 
     depth: int
     terms: int
@@ -39,8 +39,8 @@ _ALONE = TermSize(0, 1)
 class Term:
     """A number, a truth value or a symbol that depends on variables.
 
-    Numbers have `+ - * // % ** abs()` and comparisons; `==` and `!=` compare any two terms of the same kind. Conditions
-    have `& | ~ ^` and `implies`; where a number is expected they count as 0 or 1.
+    Numbers support `+ - * // % ** abs()` and comparisons; `==` and `!=` compare any two terms of the same kind.
+    Conditions support `& | ~ ^` and `implies`; where a number is expected, a condition counts as 0 or 1.
     """
 
     __array_priority__ = -1.0
@@ -52,7 +52,7 @@ class Term:
 
     @cached_property
     def variables(self) -> tuple[ModelVariable, ...]:
-        """The distinct variables, in the order in which they appear."""
+        """The distinct variables, in order of appearance."""
         return tuple(dict.fromkeys(_leaves(self)))
 
     @cached_property
@@ -310,7 +310,7 @@ class Operation(Term):
 
 
 class FunctionCall(Term):
-    """A call of a Python function of terms: a condition or a number, depending on the function's results."""
+    """A call of a Python function with terms as arguments: a condition or a number, depending on the results."""
 
     kind = None
     is_partial = True
@@ -356,12 +356,12 @@ _OPPOSITES = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": 
 
 
 def any_of(*conditions: object) -> Term:
-    """Return the condition that at least one of `conditions`, given one by one or as one list, holds."""
+    """Return the condition that at least one of `conditions` holds. They are separate arguments or one list."""
     return _flat("or", listed) if (listed := in_one_list(conditions)) else ConstantTerm(given=False)
 
 
 def all_of(*conditions: object) -> Term:
-    """Return the condition that all of `conditions`, given one by one or as one list, hold."""
+    """Return the condition that all `conditions` hold. They are separate arguments or one list."""
     return _flat("and", listed) if (listed := in_one_list(conditions)) else ConstantTerm(given=True)
 
 

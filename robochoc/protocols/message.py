@@ -40,7 +40,10 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     """True if its receivers learn nothing about other robots' problems from the message."""
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for overrides
-        """Return the message as a sentence of the sender: `V1.1 = 1 from now on`. If empty, the fields are shown."""
+        """Return the message as a sentence spoken by the sender: `V1.1 = 1 from now on`.
+
+        If the sentence is empty, the fields of the message are shown instead.
+        """
         return ""
 
     def proves(self, reception: Reception) -> Sequence[Proof] | None:  # noqa: ARG002 - for overrides

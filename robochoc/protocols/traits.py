@@ -30,8 +30,8 @@ class Traits:
             minimised.
         shared_scopes: Every robot in a constraint's scope knows the constraint, because the order of the robots changes
             during the search. Otherwise only the lowest robot in the scope knows it.
-        writes_to_non_neighbours: Its robots also send messages to robots with which they share no constraint.
-            Otherwise access control across machines prevents it.
+        writes_to_non_neighbours: Its robots also send messages to robots with which they share no constraint. If it is
+            false, access control across machines blocks such messages.
         tree: It works on a pseudo-tree.
         dynamic: It continues when the problem changes (then it is a `DynamicProtocol`).
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
@@ -41,9 +41,9 @@ class Traits:
             refused for memory, so are the others.
         encrypted_tables: Its tables have a ciphertext for each cell and each cost. It is for small problems only, and
             is not suggested as an alternative to other protocols.
-        secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
-        needs: A required module of an extra, and the command to install it. A run without it is refused.
-        counts: Its robots also count the optima, or without costs the solutions (`--count`).
+        secret_keys: Its robots draw secret keys (`Protocol.secret`), so a run across machines cannot be replayed.
+        needs: A required module of an extra, and the command to install it. A run is refused if the module is missing.
+        counts: Its robots also count the optima, or the solutions if there are no costs (`--count`).
         arrays: It has an array implementation that runs a whole team at once (`communication/arrays`).
         bears_loss: It continues when messages are lost in transit (`Protocol.miss`, `Protocol.go_on`).
         allocates: It accepts only task allocations: teams whose only shared constraints are that a task is done by at

@@ -99,7 +99,7 @@ class RunReplay:
                     del waiting[name]
 
     def play(self, step: RecordedStep, number: int, listener: Listener = lambda *_: None) -> StepDifference | None:
-        """Play a step, and return the first difference; None if it equals the record.
+        """Replay a step, and return its first difference from the recording; None if there is no difference.
 
         Args:
             step: The step.

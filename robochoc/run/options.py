@@ -123,7 +123,7 @@ class Options:
         spares: The number of lost robots that are restarted.
         patience: The seconds after which a stopped process (on a network: an unreachable robot) counts as lost (None:
             no limit; on a network 10 seconds).
-        channel: A channel model: the simulator counts seconds of computing and radio.
+        channel: A channel model, with which the simulator measures time as the seconds spent on computation and radio.
         message_loss: The probability that a message is permanently lost (0: the probability in `channel`). See `loss`.
         settings: The protocol's settings, as text.
         kill: The robots whose processes are killed, with the times.
@@ -182,7 +182,7 @@ class Options:
 
     @property
     def dropped(self) -> float:
-        """Return the probability with which robots drop received messages; 0 in the simulator, which loses them."""
+        """Return the probability with which robots drop received messages; 0 in the simulator, which drops them."""
         return 0.0 if self.runtime == Runtime.SIMULATOR else self.message_loss
 
     @property

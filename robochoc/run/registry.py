@@ -32,7 +32,7 @@ _STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
 
 
 class UnknownProtocolError(RobochocError, LookupError):
-    """Raised if no installed package offers a protocol of that name, or the protocol cannot be used."""
+    """Raised if no installed package offers a protocol with that name, or the protocol cannot be used."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ _REGISTERED: dict[str, _Registered] = {}
 def register(name: str, protocol: type[Protocol]) -> None:
     """Register a protocol of this program under a name, as if an installed package offered it.
 
-    The runtimes `simulator` and `processes` can use it; programs started by the runtime `network` cannot.
-    Registering another class under the same name replaces the first class, which notebooks need.
+    The runtimes `simulator` and `processes` can use it; programs started by the runtime `network` cannot. Registering
+    another class under the same name replaces the first class, so a notebook cell can be run again.
 
     Args:
         name: The protocol's name in `solve`: letters, digits and hyphens.

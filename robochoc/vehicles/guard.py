@@ -246,12 +246,12 @@ def _guard_of(fleet: Fleet, send: Send) -> VehicleGuard:
 
 
 def serve_orders(guard: VehicleGuard, orders: Orders, terminated: threading.Event) -> None:
-    """Obey orders until all flights have ended, or end them if the parent is gone.
+    """Execute orders until all flights have ended. If the parent process has died, end all flights.
 
-    If the parent has died, there is no wait for landings.
+    In that case, do not wait for landings.
 
     Raises:
-        TimeoutError: A pilot hangs.
+        TimeoutError: if a pilot does not respond.
     """
     until = math.inf
     while not guard.ended:

@@ -93,13 +93,13 @@ class RoutePlanner:
             raise RouteError(self._too_close(error, names_in_order)) from None
 
     def descents(self, rests: Mapping[str, Point], grounds: Mapping[str, float]) -> list[PlannedLeg]:
-        """Return the legs for landing all vehicles in place, the lowest first. Raises `RouteError`.
+        """Return the legs that land all vehicles at their current positions, the lowest first. Raises `RouteError`.
 
-        A vehicle above the landing place of another vehicle lands beside this place.
+        A vehicle above the landing place of another vehicle lands next to that place.
 
         Args:
-            rests: The places of the vehicles, by name.
-            grounds: The heights of the ground below the vehicles, by name.
+            rests: The positions of the vehicles, by name.
+            grounds: The height of the ground below each vehicle, by name.
         """
         taken, goals = [*self._standing.values()], dict[str, Point]()
         rests = dict(sorted(rests.items(), key=lambda one: one[1][2]))

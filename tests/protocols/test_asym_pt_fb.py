@@ -84,12 +84,12 @@ def test_a_leaf_asks_before_it_returns_its_cost_and_answers_its_parent_with_it_a
 
 def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
     robot = middle()
-    with pytest.raises(ValueError, match="has not asked"):
+    with pytest.raises(ValueError, match="did not request"):
         replies(robot, ("RA", Row([1, 2])))
     replies(robot, ("RA", CPA(INFINITE, {})))
     for sender, message, why in (
         ("RA", CPA(INFINITE, {}), "is already asking for sides"),
-        ("RA", Row([1]), "has not asked"),
+        ("RA", Row([1]), "did not request"),
         ("RA", RowRequest([(1,)]), "is not known to be below"),
         ("RC", RowRequest([(1,)]), "which has no open request"),
     ):

@@ -118,4 +118,4 @@ def test_a_robot_that_shares_nothing_above_sends_the_cpa_on_at_once() -> None:
 
 
 def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
-    assert_refused(holder, [("RD", Side(1, 3)), ("RD", SideRequest((1,), 1, 1))], r"has not asked|is not below")
+    assert_refused(holder, [("RD", Side(1, 3)), ("RD", SideRequest((1,), 1, 1))], r"did not request|is not below")

@@ -87,7 +87,7 @@ def _name(project: Project) -> None:
 
 
 def _project_error(project: Project) -> None:
-    """Show whether the team was removed in another window, or cannot be saved."""
+    """Show an error if the team was removed in another window or cannot be saved."""
     label = ui.label().classes("error").props("role=alert")
 
     def follow() -> None:

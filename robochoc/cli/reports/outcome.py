@@ -150,7 +150,7 @@ def _is_unfinished(outcome: Outcome) -> bool:
 
 
 def _counted(count: int, outcome: Outcome) -> str:
-    """Return the number of solutions or optima, which may have any number of digits."""
+    """Return the number of solutions or optima as text. The number may be arbitrarily large."""
     if outcome.verdict == Verdict.SOLUTION:
         return f"{Decimal(count):,} solution{'s' * (count != 1)}"
     return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"

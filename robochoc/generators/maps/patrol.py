@@ -64,7 +64,7 @@ def patrol(
     rounds: int = 1,
     apart: float = 2.0,
 ) -> tuple[Team, GroundMap]:
-    """Return the problem of planning the next visits of a patrol, and the map in the form for flights.
+    """Return the problem of planning a patrol's next visits, and the map in the form for flights.
 
     `Robot3` owns `V3`, the cell of the point that it visits; with several rounds `V3.1`, `V3.2` and so on, of which the
     first determines its waypoint. Costs are in seconds.

@@ -180,7 +180,7 @@ class AsymPTFB(PTFB):
     def _add_row(self, sender: str, costs: list[Number]) -> None:
         """Add the side of a robot above."""
         if not self.asking or sender not in self.asking or len(costs) != len(self.problem.values):
-            raise ValueError(f"{sender} sends costs for which {self.problem.agent} has not asked")
+            raise ValueError(f"{sender} sent costs that {self.problem.agent} did not request")
         self.asking.remove(sender)
         self.above.add_side(sender, costs)
         self._search_if_all_is_known()

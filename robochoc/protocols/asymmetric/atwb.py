@@ -199,7 +199,7 @@ class ATWB(AFB):
         if self.value is None or side.counter != self.counter:
             return
         if self.asked is None or sender not in self.asked:
-            raise ValueError(f"{sender} sends a cost for which {self.problem.agent} has not asked")
+            raise ValueError(f"{sender} sent a cost that {self.problem.agent} did not request")
         self.asked.remove(sender)
         self.costs.add_side(sender, self.value, side.cost)
         self.cost += side.cost

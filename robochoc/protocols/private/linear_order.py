@@ -50,7 +50,10 @@ class P2DPOPSettings(Settings, frozen=True):
 
 
 class CostSum(Message, frozen=True):
-    """Sums over the robots before the receiver in the circle, plus random numbers: `least` and `range` of costs."""
+    """Sums over the robots that precede the receiver in the circle, masked by random numbers.
+
+    `least` is the sum of the lowest costs, `range` the sum of the cost ranges.
+    """
 
     least: int
     range: int

@@ -171,7 +171,7 @@ class P32DPOP(RerootingProtocol, PDPOP):
             self.enter(None)
 
     def send_table(self, parent: str, cells: bytes) -> None:
-        """Send this robot's table to the parent; no value will be returned."""
+        """Send this robot's table to the parent, which will not reply with a value."""
         self.send(parent, Table(self.axes, cells, self.turn))
         self._done = True
 

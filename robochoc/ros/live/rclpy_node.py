@@ -277,7 +277,7 @@ class RclpySource(LiveSource):
 
 
 def _advice() -> str:
-    """Return a hint for users on whose machine rclpy cannot be imported."""
+    """Return a hint for users whose machine cannot import rclpy."""
     ours = f"{sys.version_info.major}.{sys.version_info.minor}"
     for entry in sys.path:
         found = _PYTHON.search(entry)

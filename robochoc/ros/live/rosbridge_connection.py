@@ -176,7 +176,7 @@ class Connection:
         try:
             return size.result(LOOP_S)
         except TimeoutError:
-            raise self._failed(f"the connection to the rosbridge at {self.url} does not respond; start again") from None
+            raise self._failed(f"the rosbridge at {self.url} does not respond: restart robochoc") from None
 
     def confirm(self) -> bool:
         """Wait until the server has handled all messages. Return whether the server confirms this.

@@ -259,7 +259,7 @@ def decompress(packed: bytes, packing: str, size: int, packings: Mapping[str, Un
         raise RecordingDamagedError(f"a chunk decompresses to {size:,} bytes: at most {BLOCK_BYTES_MAX:,} are read")
     if packing not in packings:
         raise RecordingDamagedError(
-            f"a chunk has the unknown compression {packing[:40]!r}; known: {', '.join(filter(None, packings))}"
+            f"a chunk has an unknown compression, {packing[:40]!r}; supported: {', '.join(filter(None, packings))}"
         )
     try:
         body = packings[packing](packed, size + 1)

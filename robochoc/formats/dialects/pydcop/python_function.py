@@ -65,8 +65,8 @@ class PythonFunction:
     """A function of a problem's variables.
 
     Attributes:
-        scope: The variables in it, in the order in which they appear.
-        body: Its statements. For an expression, the only statement.
+        scope: The variables in the function, in order of appearance.
+        body: The statements of the function; for an expression, a single statement.
     """
 
     def __init__(

@@ -74,7 +74,7 @@ class Element:
         return (self.view.required(child) if child else self.view).attribute(name)
 
     def start_index(self, name: str = "startIndex", child: str = "list") -> int:
-        """Return the number of the first member of a list. Raises `MistakeError`."""
+        """Return the index of the first element of a list. Raises `MistakeError`."""
         return first_index(self.view.required(child), name) if self.has(child) else 0
 
     def is_true(self, name: str, child: str = "", *, default: bool = False) -> bool:
@@ -117,7 +117,7 @@ class Element:
 
 
 def first_index(view: ElementView, name: str = "startIndex") -> int:
-    """Return the number of the first member of a list. Raises `MistakeError`."""
+    """Return the index of the first element of a list. Raises `MistakeError`."""
     return integer(view.attribute(name) or "0")
 
 
