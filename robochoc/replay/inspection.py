@@ -93,6 +93,11 @@ class Inspector:
         more = len(pairs) - len(shown)
         return [*shown, ("", f"and {more:,} more")] if more else shown
 
+    def has_forgotten(self, protocol: Protocol, robot: str) -> bool:
+        """Return whether the protocol stores others' values by name, but none of `robot`."""
+        view = attributes_of(protocol).get(self._view_in(protocol))
+        return isinstance(view, Mapping) and robot not in view
+
     def _rank(self, robot: str) -> tuple[int, object]:
         """Return a sort key: robots in priority order, then other names."""
         rank = self._ranks.get(robot)

@@ -52,11 +52,15 @@ class Reasons:
         self._value = protocol.value
         self._text = safely(lambda: self._value_text(protocol.value), None)
         self._dead_ends: list[_DeadEnd] = []
+        self._answered: set[str] = set()
+        """The robots to which the robot sends its value."""
 
     def record_sent(self, receiver: str, message: Message) -> None:
         """Record a message that the robot sends; at a dead end, also the reasons that exclude the values."""
         kind = type(message).__name__
         if not message.backtracks:
+            if self._value is not None and as_value(getattr(message, "value", None)) is not None:
+                self._answered.add(receiver)
             return
         if self._store() is not None and self._protocol.value is not None:
             return  # the message excludes a value of another robot
@@ -71,7 +75,7 @@ class Reasons:
         """Return the reasons for a changed value, a backtrack, or a conclusion of the search; otherwise empty."""
         concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
         if self._protocol.value == self._value and not concluded and not self._dead_ends:
-            return []
+            return self._repeated_value_lines(received)
         lines = [line for dead_end in self._dead_ends[:MOST_BACKTRACKS] for line in dead_end.lines()]
         if len(self._dead_ends) > MOST_BACKTRACKS:
             lines.append("and so on, until a value was left")
@@ -126,19 +130,43 @@ class Reasons:
         said = self._inspector.message_text(sent.sender, message)
         return f"{sent.sender} said {sent.type}{f': {said}' if said else ''}"
 
+    def _repeated_value_lines(self, received: Sequence[tuple[Sent, Message]]) -> list[str]:
+        """Return why the robot sends its unchanged value: as answers to outdated nogoods and to requests of values."""
+        lines = []
+        for sent, message in received:
+            if sent.sender not in self._answered:
+                continue
+            if hasattr(message, "lhs") and self._store() is not None and not (self._text or "").startswith("withdraws"):
+                lines.append(
+                    f"{self._message_line(sent, message)}; this nogood is outdated, and {sent.sender} forgot "
+                    f"{self._text} when it sent the nogood, so this robot sends {self._text} again"
+                )
+            elif not message.__struct_fields__:
+                lines.append(f"{sent.sender} asked for this robot's value ({sent.type})")
+        return lines[:MOST_REASONS]
+
     # The result
 
     def _value_line(self) -> str:
-        """Return a sentence on the value after the step."""
+        """Return a sentence on the value after the step, and on the values that the robot expects to change."""
+        words = self._value_words()
+        robots = [robot for dead_end in self._dead_ends for robot in dead_end.receivers]
+        left = [robot for robot in dict.fromkeys(robots) if self._inspector.has_forgotten(self._protocol, robot)]
+        if self._protocol.value is None or not left:
+            return f"it {words}"
+        change = "will change its value" if len(left) == 1 else "will change their values"
+        return f"it assumes that {_listed(left)} {change}, and {words}"
+
+    def _value_words(self) -> str:
         index = self._protocol.value
         if index is None:
-            return "it has no value now"
+            return "has no value now"
         first = safely(lambda: self._is_first(index), False)
         text = self._value_text(index) or ""
         if text.startswith("withdraws"):
-            return f"it {text}"
+            return text
         verb = "keeps" if index == self._value else "takes"
-        return f"it {verb} {text}{', the first value that nothing rules out' if first else ''}"
+        return f"{verb} {text}{', the first value that nothing rules out' if first else ''}"
 
     def _is_first(self, index: int) -> bool:
         """Return whether all earlier values are ruled out; False if values have costs."""
@@ -179,11 +207,15 @@ def _last(received: Sequence[tuple[Sent, Message]]) -> list[tuple[Sent, Message]
 
 def _together(values: Sequence[str]) -> str:
     """Return values as text, joined, with `was` or `were`."""
+    return f"{_listed(values)} {'was' if len(values) == 1 else 'were'}"
+
+
+def _listed(values: Sequence[str]) -> str:
     if len(values) == 1:
-        return f"{values[0]} was"
+        return values[0]
     more = len(values) - MOST_TOGETHER
     shown = [*values[:MOST_TOGETHER], *([f"{more:,} more"] if more > 0 else [])]
-    return f"{', '.join(shown[:-1])} and {shown[-1]} were"
+    return f"{', '.join(shown[:-1])} and {shown[-1]}"
 
 
 def _is_about(message: Message, sender: str, robots: Collection[str], own: Sequence[int | None]) -> bool:

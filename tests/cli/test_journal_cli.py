@@ -256,7 +256,7 @@ RC receives 3
     C = 1 was ruled out by: A = 1
     C = 2 was ruled out by: B = 2
     no value was left, and it said Nogood to RB: while A = 1: B != 2
-    it keeps C = 2, the first value that nothing rules out
+    it assumes that RB will change its value, and keeps C = 2, the first value that nothing rules out
   4 to RB: as long as A = 1, B cannot be 2
 """
         in words

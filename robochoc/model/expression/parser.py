@@ -81,7 +81,34 @@ class _Parsed(NamedTuple):
     operands: tuple[_Parsed, ...] = ()
 
 
-_TOKEN = re.compile(r"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|[0-9]+|[-+*(),]|'[^'\s]+')|(\S))")
+_SIGNS = {
+    "==": "eq",
+    "=": "eq",
+    "!=": "ne",
+    "<>": "ne",
+    "<=": "le",
+    ">=": "ge",
+    "<": "lt",
+    ">": "gt",
+    "&&": "and",
+    "&": "and",
+    "||": "or",
+    "|": "or",
+    "!": "not",
+    "~": "not",
+    "->": "imp",
+    "=>": "imp",
+    "<->": "iff",
+    "<=>": "iff",
+    "**": "pow",
+    "^": "pow",
+    "//": "div",
+    "/": "div",
+    "%": "mod",
+}
+"""The operators that other languages write with these signs."""
+_SIGN = re.compile("|".join(re.escape(sign) for sign in sorted(_SIGNS, key=len, reverse=True)))
+_TOKEN = re.compile(r"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|[0-9]+|\*(?!\*)|-(?!>)|[+(),]|'[^'\s]+')|(\S))")
 _INFIX = {operator.infix: name for name, operator in OPERATORS.items() if operator.infix and name != "dist"}
 
 
@@ -104,7 +131,7 @@ class _Parser:
             raise ExpressionError(
                 f"unexpected '{_shortened(self._peek().text)}' after the end of the expression",
                 self._peek().position,
-                "put an operator between the terms, or delete the rest",
+                _call_hint(self._peek().text) or "put an operator between the terms, or delete the rest",
             )
         _check_type(parsed, wanted, "the expression")
         return parsed.expression
@@ -149,9 +176,8 @@ class _Parser:
             return self._symbol(token, self._symbols)
         if token.text not in self._names:
             known = f"known names: {_listed(self._names)}" if self._names else "no names are known here"
-            raise ExpressionError(
-                f"unknown name '{_shortened(token.text)}'", token.position, _nearest(token.text, self._names) or known
-            )
+            hint = _call_hint(token.text) or _nearest(token.text, self._names) or known
+            raise ExpressionError(f"unknown name '{_shortened(token.text)}'", token.position, hint)
         self._count(token.position)
         is_symbol = self._symbols is not None and token.text in self._symbols.names
         return _Parsed(Name(token.text), Type.SYMBOL if is_symbol else Type.INTEGER, token.position)
@@ -183,7 +209,8 @@ class _Parser:
                 "extra parentheses are allowed only around all arguments of a function: and((a, b))",
             )
         if closing.text != ")":
-            raise ExpressionError(f"expected ')', found '{_shortened(closing.text)}'", closing.position, "add ')'")
+            hint = _call_hint(closing.text) or "add ')'"
+            raise ExpressionError(f"expected ')', found '{_shortened(closing.text)}'", closing.position, hint)
         return parsed
 
     def _negative(self, sign: _Token) -> _Parsed:
@@ -250,7 +277,7 @@ class _Parser:
                 raise ExpressionError(
                     f"expected ',' or ')', found '{_shortened(token.text)}'",
                     token.position,
-                    "separate arguments by ','",
+                    _call_hint(token.text) or "separate arguments by ','",
                 )
         return tuple(arguments)
 
@@ -286,9 +313,13 @@ def _tokens(text: str) -> list[_Token]:
     tokens = []
     for match in _TOKEN.finditer(text):
         if match[2]:
+            position = match.start(2)
+            sign = _SIGN.match(text, position)
+            if sign:
+                raise ExpressionError(f"unknown sign '{sign[0]}'", position, _call_hint(_SIGNS[sign[0]]))
             raise ExpressionError(
                 f"unexpected character {match[2]!r}",
-                match.start(2),
+                position,
                 "expressions are made of names, integers and ( ) , + - *",
             )
         tokens.append(_Token(match[1], match.start(1)))
@@ -357,6 +388,18 @@ _TYPE_HINTS = {
 def _too_deep(position: int) -> ExpressionError:
     hint = f"use at most {MAX_DEPTH} levels; write a long sum as add(a, b, ...)"
     return ExpressionError("the expression is nested too deeply", position, hint)
+
+
+def _call_hint(name: str) -> str:
+    """Return how to write a call of the operator `name`: "write ne(X, Y)"; empty if there is no such operator."""
+    operator = OPERATORS.get(ALIASES.get(name, name))
+    if operator is None:
+        return ""
+    if name == "in":
+        return "write in(X, set(1, 2))"
+    letters = ("AB" if type_ == Type.BOOLEAN else "XY" for type_ in operator.takes[:2])
+    arguments = ", ".join(pair[place] for place, pair in enumerate(letters))
+    return f"write {name}({arguments}{', ...' * (len(operator.takes) > 2)})"  # noqa: PLR2004 - letters
 
 
 def _nearest(word: str, known: Collection[str]) -> str:

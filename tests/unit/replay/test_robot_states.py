@@ -80,9 +80,19 @@ def test_a_nogood_from_below_and_a_domain_without_a_value() -> None:
     assert lower.why == [
         "B = 1 was ruled out by: A = 1",
         "no value was left, and it said Nogood to RA: A != 1, whatever the others take",
-        "it keeps B = 1, the first value that nothing rules out",
+        "it assumes that RA will change its value, and keeps B = 1, the first value that nothing rules out",
     ]
     assert lower.view == []  # forgotten, as another value is sure to come
+
+
+def test_a_robot_sends_an_unchanged_value_again() -> None:
+    why = [line for state in states(queens3d(4), "Robot1.2") for line in state.why]
+    assert "Robot3.1 asked for this robot's value (AddLink)" in why
+    (outdated,) = [line for line in why if "again" in line]
+    assert outdated == (
+        "Robot2.1 said Nogood: while V1.1 = 3: V1.2 != 1; this nogood is outdated, and Robot2.1 forgot V1.2 = 1 "
+        "when it sent the nogood, so this robot sends V1.2 = 1 again"
+    )
 
 
 def test_a_robot_without_a_value_left_says_what_had_ruled_out_each() -> None:
