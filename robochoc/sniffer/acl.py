@@ -31,7 +31,7 @@ from robochoc.services.symbolic import (
 from robochoc.system.errors import RobochocError
 
 CAPS = Caps(characters=1 << 25, expressions=10_000, depth=16)
-"""The limits on a message. The largest message of a protocol, a part of a `dpop` table, has 16 MiB (22 MiB as text)."""
+"""The limits on a message. The largest message of a protocol, a part of a `dpop` table, has 4 MiB (6 MiB as text)."""
 
 _DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
 _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")

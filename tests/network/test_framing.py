@@ -48,6 +48,9 @@ from robochoc.journal.events import Received
 from robochoc.model.outcome import Metrics, PseudoTreeNode
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.findings import Findings, Incumbent, Trail
+from robochoc.protocols.inference.dpop import UTIL
+from robochoc.protocols.inference.dpop_tables import PIECE
+from robochoc.protocols.message import encode
 from tests.support.cases import looped
 from tests.support.examples import examples
 
@@ -245,6 +248,11 @@ def test_a_frame_that_is_too_large_is_not_written_and_uses_no_number() -> None:
     with pytest.raises(MessageTooLargeError, match=r"R1 to R2 has 8,\d\d\d,\d\d\d bytes, more than 8,388,608"):
         writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_FRAME)))
     assert reader.read("R1", writer.write("R2", said(1))).number == 1
+
+
+def test_a_piece_of_a_table_fits_into_a_frame() -> None:
+    content = encode(UTIL(1, bytes(PIECE)))
+    assert len(pair()[0].write("R2", ProtocolMessage(1, 0, content))) <= LARGEST_FRAME
 
 
 def test_a_frame_that_is_too_large_is_not_read() -> None:

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import math
+import os
 import re
 import tracemalloc
+from pathlib import Path
 
 import msgspec
 import pytest
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.generators.random_csp import random_csp
+from robochoc.journal.events import AnyEvent, Given, Sent
 from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.protocols.inference import dpop_tables
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.protocols.inference.dpop_tables import Extent, bytes_of
 from robochoc.protocols.message import Message, encode
@@ -28,10 +34,76 @@ from tests.support.problems import ON_ONE_MACHINE, team_of
 
 def test_over_the_limit_the_root_says_who_needs_how_much_before_any_table_is_made() -> None:
     robot = begun(products("ABC", "AB BC AC"), "RA", below="B", further="C")
-    says = "RC needs 5,000,000,000 bytes for its tables, more than 1,073,741,824: the robots' pseudo-tree has induced"
-    with pytest.raises(TooLargeError, match=re.escape(f"{says} width 7 (--set memory=BYTES raises the limit)")):
-        replies(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(5_000_000_000, "RC"))))
+    says = (
+        "RC needs 50,000,000,000 bytes for its tables, more than 1,073,741,824 in memory and 4,294,967,296 on the disk:"
+        " the robots' pseudo-tree has induced width 7 (--set memory=BYTES and --set disk=BYTES raise the limits)"
+    )
+    with pytest.raises(TooLargeError, match=re.escape(says)):
+        replies(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(50_000_000_000, "RC"))))
     assert robot.problem.checks == 0
+
+
+def test_a_need_above_the_free_space_of_the_disk_is_refused_before_any_table_is_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("robochoc.protocols.inference.dpop.free_disk_bytes", lambda: 1_999_999_999)
+    robot = begun(products("ABC", "AB BC AC"), "RA", below="B", further="C")
+    with pytest.raises(TooLargeError, match=r"RC needs 2,000,000,000 bytes .* only 1,999,999,999 bytes left .*TMPDIR"):
+        replies(robot, ("RB", dimensions({"RA": 3}, width=7, most=Need(2_000_000_000, "RC"))))
+    assert robot.problem.checks == 0
+
+
+@looped("protocol", ["dpop", "s-dpop"])
+@pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 100), marks=pytest.mark.more)], ids=str)
+def test_tables_on_the_disk_make_no_difference(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, protocol: str, seeds: range
+) -> None:
+    """Neither to messages nor to answers, and the folder stays empty."""
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    monkeypatch.setattr(dpop_tables, "BLOCK", 40)
+    monkeypatch.setattr(dpop_tables, "SMALL", 9)
+    monkeypatch.setattr(dpop_tables, "RESIDENT", 100)
+    monkeypatch.setattr(dpop_tables, "PIECE", 50)
+    for seed in seeds:
+        team = random_csp(8, 3, 0.7, 0.1, seed, max_cost=99)
+        found = []
+        for memory in ("1", str(2**30)):
+            events: list[AnyEvent] = []
+            settings = {"memory": memory, "disk": str(2**30)}
+            outcome = solve(
+                team,
+                Options(protocol=protocol, runtime=Runtime.SIMULATOR, settings=settings),
+                observer=events.append,
+            )
+            metrics = outcome.metrics
+            said = [event for event in events if not isinstance(event, Given)]  # it contains the settings
+            found.append((outcome.cost, outcome.verdict, metrics.messages, metrics.bytes, said))
+            assert not [*tmp_path.iterdir()]
+        assert found[0] == found[1]
+
+
+def test_a_table_on_the_disk_is_sent_between_processes() -> None:
+    team = random_csp(8, 3, 0.7, 0.1, 0, max_cost=99)
+    found = []
+    for memory in ("1", str(2**30)):
+        events: list[AnyEvent] = []
+        outcome = solve(team, Options(protocol="dpop", settings={"memory": memory}), observer=events.append)
+        assert any(isinstance(event, Sent) and event.type == "UTIL" for event in events)
+        found.append(outcome.cost)
+    assert found[0] == found[1]
+
+
+@pytest.mark.skipif(not hasattr(os, "posix_fallocate"), reason="the space of a file cannot be reserved")
+def test_a_full_disk_ends_the_run_with_the_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr("os.posix_fallocate", full)
+    with pytest.raises(UnsupportedError, match=r"a table of \d+ bytes cannot be stored .*No space left.*TMPDIR"):
+        solve(
+            products("ABCD", "AB BC CD AC BD"),
+            Options(protocol="dpop", runtime=Runtime.SIMULATOR, settings={"memory": "1"}),
+        )
 
 
 def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
@@ -103,12 +175,15 @@ def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawa
     team = products("ABCDE", "AB BC AC AD BD CD AE")
     said = []
     for runtime in ON_ONE_MACHINE:
-        options = Options(protocol="dpop", runtime=runtime, settings={"memory": "100"}, withdraw=withdraw)
+        options = Options(protocol="dpop", runtime=runtime, settings={"memory": "100", "disk": "0"}, withdraw=withdraw)
         with pytest.raises(UnsupportedError) as refused:
             solve(team, options)
         said.append(str(refused.value))
     assert said[0] == said[1]
-    assert re.match(r"R[CD] needs [\d,]+ bytes for its tables, more than 100: .* induced width 3 ", said[0])
+    assert re.match(
+        r"R[CD] needs [\d,]+ bytes for its tables, more than 100 in memory and 0 on the disk: .* induced width 3 ",
+        said[0],
+    )
     assert "dpop" not in re.split(r"[ ,]+", said[0])
 
 
@@ -193,5 +268,8 @@ def test_the_limit_is_the_robots_too() -> None:
     """As the run's settings reach them."""
     with pytest.raises(TooLargeError):
         Simulation(
-            products("AB", "AB"), DPOP, RandomChannels(0), parameters=RunParameters(settings={"memory": "9"})
+            products("AB", "AB"),
+            DPOP,
+            RandomChannels(0),
+            parameters=RunParameters(settings={"memory": "9", "disk": "0"}),
         ).run()

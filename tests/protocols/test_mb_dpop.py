@@ -274,13 +274,13 @@ def test_the_least_cost_is_found_in_processes_with_one_dimension(protocol: str) 
 def test_it_works_where_dpop_has_no_room_and_is_named_then(protocol: str) -> None:
     team = random_csp(9, 3, 0.9, 0, 4, max_cost=9)
     with pytest.raises(UnsupportedError, match=rf"induced width .*these do: .*\b{protocol}\b"):
-        solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR, settings={"memory": "5000"}))
+        solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR, settings={"memory": "5000", "disk": "0"}))
     options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, settings={"memory": "5000", "k": "2"})
     assert solve(team, options).cost == solve(team, replace(options, protocol="dpop", settings={})).cost
 
 
 @looped(("refused", "settings"), [
-    ("dpop", {"memory": "5000"}), ("count-dpop", {"memory": "5000"}), ("p-dpop", {"cells": "500"}),
+    ("dpop", {"memory": "5000", "disk": "0"}), ("count-dpop", {"memory": "5000"}), ("p-dpop", {"cells": "500"}),
 ])  # fmt: skip
 def test_whose_tables_are_as_wide_is_not_named_then(refused: str, settings: dict[str, str]) -> None:
     team = random_csp(9, 3, 0.9, 0, 4, max_cost=9)

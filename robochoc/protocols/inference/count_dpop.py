@@ -40,7 +40,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Annotated, Any, assert_never, cast
+from typing import Annotated, Any, ClassVar, assert_never, cast
 
 import msgspec
 import numpy as np
@@ -48,7 +48,7 @@ from numpy.typing import NDArray
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, TableSettings
 from robochoc.protocols.inference.dpop_tables import PIECE, Codes, Extent, Table, costs_for
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -219,6 +219,7 @@ class CountDPOP(DPOP):
         privacy="constraints of others, but for sums",
         use_when="counting solutions or optima (--count), small induced width",
     )
+    settings: ClassVar[TableSettings] = TableSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -9,7 +9,8 @@ each robot chooses the cheapest value (VALUE).
   has one dimension for each robot in the separator.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. A run that needs
   more memory than allowed ends before any table is made.
-- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables in memory (default 1 GiB);
+  `disk`, the number of further bytes, on the disk, if the memory is too small (default 4 GiB; 0: none).
 - **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005, Algorithm 1.
 
 The methods have the names of the paper's procedures:
@@ -20,10 +21,10 @@ The methods have the names of the paper's procedures:
 
 Memory needs are known before tables are made; in the paper, tables are made at once. Each robot sends its domain to
 robots below (`Domain`). It sends its parent its separator, an upper bound on its costs, and the largest memory need
-below (`Dimensions`). The root ends the run if that need is more than `memory`. Otherwise it lets all robots continue,
-and each robot sends its children the order of their tables' axes (`Proceed`): the nearest robot first, so no table is
-ever transposed. This adds two messages for each robot except the roots, and one for each edge. A robot with one value
-has no axis.
+below (`Dimensions`). The root ends the run if that need is more than `memory` and `disk`. Otherwise it lets all robots
+continue, and each robot sends its children the order of their tables' axes (`Proceed`): the nearest robot first, so no
+table is ever transposed. This adds two messages for each robot except the roots, and one for each edge. A robot with
+one value has no axis.
 
 Choices that the paper leaves open, and differences:
 
@@ -32,12 +33,13 @@ Choices that the paper leaves open, and differences:
 - The join is made block by block and is never in memory as a whole. Besides the table, this robot's cheapest value for
   each cell is stored (one or two bytes), so the children's tables, larger by an axis, can be freed.
 - VALUE contains the indices of the values in the child's separator, in the order of the separator.
-- A table has as few bytes per cost as it needs, and is sent in pieces of up to 16 MiB. Ties go to the first value.
+- A table has as few bytes per cost as it needs, and is sent in pieces of up to 4 MiB. Ties go to the first value.
 - A constraint is checked by the lowest robot in its scope, once for each distinguishable combination, when its table is
   made. Additions and minimisations do not count as constraint checks.
 - Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
-- The memory limit applies to each robot's arrays. It does not include messages in transit, nor costs cached by a local
-  problem.
+- The limits apply to each robot's arrays. They do not include messages in transit, nor costs cached by a local problem.
+- A robot that needs more than `memory` keeps its table, its choices and its children's tables in unnamed files in the
+  folder for temporary files (`TMPDIR`). Nothing remains of them, whatever ends the run.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -87,11 +89,12 @@ from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted, listed
+from robochoc.system.stored_arrays import free_disk_bytes
 
 GIB = 1 << 30
 
 
-class DPOPSettings(Settings, frozen=True):
+class TableSettings(Settings, frozen=True):
     """`memory`: the maximum number of bytes in a robot's tables. A run that needs more ends before it makes any."""
 
     memory: int = GIB
@@ -99,6 +102,44 @@ class DPOPSettings(Settings, frozen=True):
     def __post_init__(self) -> None:
         if self.memory < 1:
             raise ValueError(f"memory is {self.memory}; it must be a number of bytes, 1 or more")
+
+    @property
+    def most(self) -> int:
+        """The maximum number of bytes in a robot's tables, wherever they are."""
+        return self.memory
+
+    @property
+    def limit_in_words(self) -> str:
+        """The maximum in an error message."""
+        return f"{self.memory:,}"
+
+    @property
+    def remedy(self) -> str:
+        """The way to raise the maximum."""
+        return "--set memory=BYTES raises the limit"
+
+
+class DPOPSettings(TableSettings, frozen=True):
+    """`memory` as in `TableSettings`; `disk`: the maximum number of further bytes, on the disk."""
+
+    disk: int = 4 * GIB
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.disk < 0:
+            raise ValueError(f"disk is {self.disk}; it must be a number of bytes, 0 or more")
+
+    @property
+    def most(self) -> int:
+        return self.memory + self.disk
+
+    @property
+    def limit_in_words(self) -> str:
+        return f"{self.memory:,} in memory and {self.disk:,} on the disk"
+
+    @property
+    def remedy(self) -> str:
+        return "--set memory=BYTES and --set disk=BYTES raise the limits"
 
 
 Size = Annotated[int, msgspec.Meta(ge=2)]
@@ -260,7 +301,7 @@ class DPOP(TreeProtocol):
         privacy="constraints of others, but for sums",
         use_when="costs, small induced width: number of messages is linear",
     )
-    settings: ClassVar[DPOPSettings] = DPOPSettings()
+    settings: ClassVar[TableSettings] = DPOPSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -360,13 +401,28 @@ class DPOP(TreeProtocol):
             )
 
     def _check_limits(self, most: Need, width: int) -> None:
-        """Raise `TooLargeError` if the largest memory need of the whole tree is above the limit."""
+        """Raise `TooLargeError` if the largest memory need of the whole tree is above the limit.
+
+        If tables have to be on the disk, the free space of this robot's computer is a limit, too.
+        """
         check_exact(self._dearest)
-        if most.bytes > self.settings.memory:
+        settings = self.settings
+        needs = f"{most.robot} needs {_bytes_text(most.bytes)} for its tables"
+        if most.bytes > settings.most:
             raise TooLargeError(
-                f"{most.robot} needs {_bytes_text(most.bytes)} for its tables, more than {self.settings.memory:,}: the"
-                f" robots' pseudo-tree has induced width {width} (--set memory=BYTES raises the limit)"
+                f"{needs}, more than {settings.limit_in_words}: the robots' pseudo-tree has induced width {width}"
+                f" ({settings.remedy})"
             )
+        if most.bytes > settings.memory and most.bytes > free_disk_bytes():
+            raise TooLargeError(
+                f"{needs}, and the folder for temporary files has only {free_disk_bytes():,} bytes left (free space"
+                " there, or choose another folder by the environment variable TMPDIR)"
+            )
+
+    @property
+    def _on_disk(self) -> bool:
+        """True if this robot's tables have to be on the disk."""
+        return self._need.bytes > self.settings.memory
 
     def _separator_sizes(self, checked: Sequence[Scope]) -> dict[str, int]:
         """Return the separator, with each robot's domain size.
@@ -424,7 +480,7 @@ class DPOP(TreeProtocol):
         if sorted(separator) != sorted(self._sizes) or not expected:
             own = ", ".join(self._sizes)
             raise ValueError(f"{self.problem.agent} received unexpected axes {list(separator)}; its separator is {own}")
-        if self._need.bytes > self.settings.memory:
+        if self._need.bytes > self.settings.most:
             raise ValueError(f"{self.problem.agent} must proceed, but its tables exceed the limit of memory")
 
     def _let_proceed(self, child: str) -> None:
@@ -449,9 +505,8 @@ class DPOP(TreeProtocol):
             raise ValueError(f"{child} sent a table without a request")
         if child not in self.utils:
             dimensions = self.dimensions[child]
-            self.utils[child] = IncomingTable(
-                [dimensions.separator[name] for name in self._table_axes(child)], dimensions.dearest
-            )
+            shape = [dimensions.separator[name] for name in self._table_axes(child)]
+            self.utils[child] = IncomingTable(shape, dimensions.dearest, on_disk=self._on_disk)
         self.utils[child].add(width, costs)
         if self._all_arrived:
             self._compute_utils_of_all()
@@ -478,7 +533,7 @@ class DPOP(TreeProtocol):
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree for each combination of values in the separator."""
         shape = [self._sizes[name] for name in self.separator or ()]
-        costs, self.choices = project(shape, self.problem.charges, self._joined, self._dearest)
+        costs, self.choices = project(shape, self.problem.charges, self._joined, self._dearest, on_disk=self._on_disk)
         self._process_joined(costs)
         self._joined.clear()
         self._send_or_choose(costs)

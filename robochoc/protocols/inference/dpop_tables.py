@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from robochoc.protocols.wording import cost_text
+from robochoc.solver.errors import TooLargeError
 from robochoc.system.plain_text import counted
+from robochoc.system.stored_arrays import empty_array, is_on_disk, release_pages
 
 Array = NDArray[np.float64]
 Codes = NDArray[np.unsignedinteger[Any]]
@@ -32,8 +34,10 @@ SMALL = 1 << 12
 """The maximum number of cells of a table that is converted once, not again for each block; and of a join of floats."""
 LONGEST = 16
 """The number of blocks that may form one block if a single axis needs it."""
-PIECE = 1 << 24
-"""The maximum number of bytes of a table in one message, 16 MiB: a quarter of the capacity of a queue."""
+PIECE = 1 << 22
+"""The maximum number of bytes of a table in one message, 4 MiB: half a frame on the network."""
+RESIDENT = 1 << 25
+"""The number of bytes of a table on the disk after which its pages in memory are released."""
 _WIDTHS: tuple[Width, ...] = (1, 2, 4, 8)
 
 
@@ -83,15 +87,28 @@ def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
     return table[tuple([slice(None) if name in kept else np.newaxis for name in onto])]
 
 
-def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Table], dearest: int) -> Projection:
+def project(
+    shape: Sequence[int],
+    charges: Sequence[float],
+    tables: Sequence[Table],
+    dearest: int,
+    *,
+    on_disk: bool = False,
+) -> Projection:
     """Add up `charges`, the costs of this robot's values, and `tables`; then minimise over its values.
 
     `tables` have this robot's axis first, then the axes of `shape` (see `aligned`); no finite sum is above `dearest`.
     The join is larger than the result by this robot's axis. It is never in memory as a whole, but is made block by
-    block: a block has one index on each leading axis of `shape`, and all indices on the others.
+    block: a block has one index on each leading axis of `shape`, and all indices on the others. The result is on the
+    disk if `on_disk`.
+
+    Raises:
+        TooLargeError: if there is no space on the disk.
     """
     width = width_of(dearest)
-    result = Projection(np.empty(shape, f"<u{width}"), np.empty(shape, _choice(len(charges))))
+    result = Projection(
+        _empty(shape, f"<u{width}", on_disk=on_disk), _empty(shape, _choice(len(charges)), on_disk=on_disk)
+    )
     split = _stepped(shape, len(charges))
     steps: list[list[Table]] = [[] for _ in shape[:split]]
     fixed: Array = np.array(charges, np.float64).reshape(-1, *(1 for _ in shape[split:]))
@@ -190,6 +207,9 @@ class _Join:
         self._joined = np.empty((codes.many, *result.costs.shape[len(steps) :]), codes.kind)
         self._small = [[codes.further(table) for table in tables if table.size <= SMALL] for tables in steps]
         self._large = [[table for table in tables if table.size > SMALL] for tables in steps]
+        tables: list[NDArray[Any]] = [*result, *(table for some in self._large for table in some)]
+        self._on_disk = [table for table in tables if is_on_disk(table)]
+        self._resident = 0
 
     def fill(self, place: tuple[int, ...], added: Any) -> None:  # noqa: ANN401 - integers or floats, or None
         """Compute all blocks with the indices `place` on the first axes; `added` is the sum of their tables so far."""
@@ -200,6 +220,11 @@ class _Join:
             rows = self._joined.reshape(self._codes.many, -1)
             here: tuple[Any, ...] = (*place, ...)
             self._codes.store(rows, costs[here].reshape(-1), choices[here].reshape(-1))
+            self._resident += rows.size
+            if self._resident >= RESIDENT:
+                self._resident = 0
+                for table in self._on_disk:
+                    release_pages(table)
             return
         after = [0] * (len(self._small) - depth - 1)
         for index in range(costs.shape[depth]):
@@ -219,7 +244,7 @@ def place_type(sizes: Iterable[int]) -> np.dtype[np.unsignedinteger[Any]]:
 
 def are_all_infinite(costs: Codes) -> bool:
     """Return whether all costs are `inf`."""
-    return bool(costs.min() == _top(costs.itemsize))
+    return all(part.min() == _top(costs.itemsize) for part in _parts(costs))
 
 
 def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
@@ -229,17 +254,20 @@ def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
     step = PIECE // width
     for start in range(0, flat.size, step):
         # The code of `inf` is all ones, and so are its lowest bytes.
-        yield width, flat[start : start + step].astype(f"<u{width}", copy=False).tobytes()
+        piece = flat[start : start + step].astype(f"<u{width}", copy=False)
+        # A piece of a table on the disk is encoded from there.
+        yield width, cast("bytes", piece.data.cast("B")) if is_on_disk(piece) else piece.tobytes()
 
 
 class IncomingTable:
     """A table of this `shape` that arrives in pieces; `dearest` is an upper bound on its finite costs.
 
-    Memory is allocated when the first piece arrives; check `bytes_of` before that.
+    Memory, or space `on_disk`, is allocated when the first piece arrives; check `bytes_of` before that.
     """
 
-    def __init__(self, shape: Sequence[int], dearest: int) -> None:
+    def __init__(self, shape: Sequence[int], dearest: int, *, on_disk: bool = False) -> None:
         self._shape = shape
+        self._on_disk = on_disk
         self._dearest = dearest
         self._left = math.prod(shape)
         self._costs: Codes | None = None
@@ -257,7 +285,7 @@ class IncomingTable:
         return self._costs
 
     def add(self, width: Width, piece: bytes) -> None:
-        """Append the next piece. Raises `ValueError` if the bytes do not fit."""
+        """Append the next piece. Raises `ValueError` if the bytes do not fit, `TooLargeError` if the disk is full."""
         if width > width_of(self._dearest) or (self._costs is not None and width != self._costs.itemsize):
             raise ValueError(f"a piece of the table has {width} bytes a cost, not as many as the other pieces")
         if len(piece) % width or not 0 < len(piece) // width <= self._left:
@@ -267,9 +295,10 @@ class IncomingTable:
         if _max_finite(codes) > self._dearest:
             raise ValueError(f"a cost is {_max_finite(codes):,}, above the announced maximum of {self._dearest:,}")
         if self._costs is None:
-            self._costs = np.empty(self._shape, codes.dtype)
+            self._costs = _empty(self._shape, codes.dtype, on_disk=self._on_disk)
         start = self._costs.size - self._left
         self._costs.reshape(-1)[start : start + codes.size] = codes
+        release_pages(self._costs)
         self._left -= codes.size
 
 
@@ -305,11 +334,30 @@ def cost_at(table: Table, at: tuple[int, ...]) -> float:
 
 def _max_finite(costs: Codes) -> int:
     """Return the largest finite cost; 0 if there is none."""
-    flat = costs.reshape(-1)
     one = costs.dtype.type(1)
     # The code of `inf` plus one is 0.
-    blocks = (flat[start : start + BLOCK] + one for start in range(0, flat.size, BLOCK))
-    return max(0, max((int(block.max()) for block in blocks), default=0) - 1)
+    return max(0, max((int((part + one).max()) for part in _parts(costs)), default=0) - 1)
+
+
+def _parts(costs: Codes) -> Iterator[Codes]:
+    """Yield all of `costs` in parts of a block."""
+    flat = costs.reshape(-1)
+    for start in range(0, flat.size, BLOCK):
+        yield flat[start : start + BLOCK]
+        if start % RESIDENT < BLOCK:
+            release_pages(costs)
+
+
+def _empty(shape: Sequence[int], kind: DTypeLike, *, on_disk: bool) -> NDArray[Any]:
+    """Return a new array whose content is undefined. Raises `TooLargeError` if there is no space on the disk."""
+    try:
+        return empty_array(shape, kind, on_disk=on_disk)
+    except OSError as error:
+        size = math.prod(shape) * np.dtype(kind).itemsize
+        raise TooLargeError(
+            f"a table of {size:,} bytes cannot be stored in the folder for temporary files: {error.strerror} (free"
+            " space there, or choose another folder by the environment variable TMPDIR)"
+        ) from None
 
 
 def _stepped(shape: Sequence[int], own: int) -> int:

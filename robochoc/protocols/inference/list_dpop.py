@@ -57,7 +57,7 @@ from robochoc.protocols.inference.count_dpop import (
     bytes_of_numbers,
     numbers_of,
 )
-from robochoc.protocols.inference.dpop import UTIL, Domain, DPOPSettings, Proceed
+from robochoc.protocols.inference.dpop import UTIL, Domain, Proceed, TableSettings
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, cost_at, place_at, width_of
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -70,7 +70,7 @@ from robochoc.system.plain_text import counted
 MOST_LISTED = 10_000
 
 
-class ListDPOPSettings(DPOPSettings, frozen=True):
+class ListDPOPSettings(TableSettings, frozen=True):
     """`limit`: the maximum number of optima listed. `memory`: the maximum number of bytes in a robot's tables."""
 
     limit: int = 100

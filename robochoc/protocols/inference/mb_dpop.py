@@ -8,7 +8,8 @@ receives a table for it. So memory is bounded, but more messages are needed.
   DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
   sent has more than `k` dimensions. The number of messages is exponential in the cycle-cut robots of a cluster.
-- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` as in DPOP.
+- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory`, the
+  maximum number of bytes in a robot's tables (default 1 GiB).
 - **Reference**: Petcu, Faltings: "MB-DPOP: a new memory-bounded algorithm for distributed optimization", IJCAI 2007,
   Algorithms 1 (labeling) and 2 (memory-bounded inference).
 
@@ -63,10 +64,10 @@ from robochoc.protocols.inference.dpop import (
     VALUE,
     Cost,
     Dimensions,
-    DPOPSettings,
     Need,
     Proceed,
     Size,
+    TableSettings,
     store_once,
 )
 from robochoc.protocols.inference.dpop_tables import (
@@ -89,7 +90,7 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted, listed
 
 
-class MBDPOPSettings(DPOPSettings, frozen=True):
+class MBDPOPSettings(TableSettings, frozen=True):
     """`k`: the maximum number of dimensions of a table. `memory`: the maximum number of bytes in a robot's tables."""
 
     k: int = 4

@@ -36,14 +36,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import assert_never, cast
+from typing import ClassVar, assert_never, cast
 
 import numpy as np
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, Proof, Reception, table_proves
-from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, axes_of
+from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, TableSettings, axes_of
 from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -118,6 +118,7 @@ class ODPOP(DPOP):
         privacy="constraints of others, but for sums",
         use_when="costs, few good combinations: short messages",
     )
+    settings: ClassVar[TableSettings] = TableSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

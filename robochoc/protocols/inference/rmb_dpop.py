@@ -10,7 +10,8 @@ each receives only the values that it needs.
   is the same as DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
   sent has more than `k` dimensions. The number of messages is exponential in the cut robots of a branch.
-- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` as in DPOP.
+- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` as in
+  MB-DPOP.
 - **Reference**: Chen, Zhang, Deng, Chen, Li: "RMB-DPOP: refining MB-DPOP by reducing redundant inferences", AAMAS 2020.
 
 The messages and mechanisms of the paper are these methods:

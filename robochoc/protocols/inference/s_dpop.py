@@ -7,7 +7,7 @@ empty message (`Reuse`) instead of a table.
 - **When to use**: costs, a pseudo-tree with a small induced width, and a problem that changes during the run.
 - **Guarantees**: complete; each epoch terminates with an optimum, or with a proof that there is no solution. Reused
   results depend on nothing that a change has invalidated.
-- **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `memory` and `disk` as in DPOP.
 - **Reference**: Petcu, Faltings: "S-DPOP: superstabilizing, fault-containing multiagent combinatorial optimization",
   AAAI 2005.
 
@@ -350,7 +350,7 @@ class SDPOP(DPOP, DynamicProtocol):
         if child not in self._incoming:
             dimensions = self.dimensions[child]
             shape = [dimensions.separator[name] for name in self._axes[child]]
-            self._incoming[child] = IncomingTable(shape, dimensions.dearest)
+            self._incoming[child] = IncomingTable(shape, dimensions.dearest, on_disk=self._on_disk)
         table = self._incoming[child]
         table.add(width, costs)
         if table.complete:
@@ -373,7 +373,7 @@ class SDPOP(DPOP, DynamicProtocol):
         joined = [self._aligned(table, axes) for table, axes in self._own_tables]
         joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
         shape = [self._sizes[name] for name in self.separator or ()]
-        costs, self.choices = project(shape, self.problem.charges, joined, self._dearest)
+        costs, self.choices = project(shape, self.problem.charges, joined, self._dearest, on_disk=self._on_disk)
         self.basis = self._inputs
         self._send_or_choose(costs)
         self._last_optimum = self.optimum
