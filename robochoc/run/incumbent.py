@@ -39,12 +39,13 @@ def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: fl
         The assignment, or None if all violate hard constraints.
     """
     best: BestKnown | None = None
+    objective = Objective(compiled.team, withdrawal_cost)
     for own in (
         result.assignments,
         *_received_assignments(compiled, result.findings),
-        *_best_cycle(compiled, result, withdrawal_cost),
+        *_best_cycle(compiled, result, objective),
     ):
-        objective = Objective(compiled.team, withdrawal_cost)
+        objective.reset()
         objective.change(own)
         if objective.cost < (best.cost if best else INFINITE):
             best = BestKnown(merged_values(own), objective.cost)
@@ -55,7 +56,11 @@ def costs_by_cycle(
     compiled: CompiledTeam, trails: Mapping[str, Trail], withdrawal_cost: float | None = None
 ) -> Iterator[float]:
     """Yield the cost of the robots' values in cycle 0, 1, ..., up to the last cycle that all robots have completed."""
-    objective = Objective(compiled.team, withdrawal_cost)
+    yield from _costs_by_cycle(compiled, trails, Objective(compiled.team, withdrawal_cost))
+
+
+def _costs_by_cycle(compiled: CompiledTeam, trails: Mapping[str, Trail], objective: Objective) -> Iterator[float]:
+    objective.reset()
     for changed in _changes(compiled, trails):
         objective.change(changed)
         yield objective.cost
@@ -95,12 +100,12 @@ def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Finding
         yield {name: compiled[name].behind(value) for name, value in best.values.items()}
 
 
-def _best_cycle(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: float | None) -> Iterator[_Own]:
+def _best_cycle(compiled: CompiledTeam, result: SearchResult, objective: Objective) -> Iterator[_Own]:
     """Yield the robots' values in the first of the cheapest cycles."""
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return
-    costs = list(costs_by_cycle(compiled, trails, withdrawal_cost))
+    costs = list(_costs_by_cycle(compiled, trails, objective))
     if costs:
         own: _Own = {}
         for changed in itertools.islice(_changes(compiled, trails), costs.index(min(costs)) + 1):

@@ -12,6 +12,7 @@ from typing import NamedTuple
 from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
 from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
+from robochoc.solver.evaluations import SharedEvaluations
 from robochoc.solver.explanation import KeyedConstraint, constraints_above
 
 Interfaces = Mapping[str, tuple[str, ...]]
@@ -56,6 +57,7 @@ class TeamKnowledge:
         links: The parents of each robot, for protocols on a pseudo-tree.
         rank: The position of each robot in the order. Other processes recompute it.
         owners: The robot of each interface variable. Other processes recompute it.
+        evaluations: The computed costs of equal constraints (`solver/evaluations.py`). Empty in other processes.
     """
 
     order: tuple[str, ...]
@@ -64,6 +66,7 @@ class TeamKnowledge:
     links: Links | None = None
     rank: Mapping[str, int] = field(init=False, compare=False, repr=False)
     owners: Mapping[str, str] = field(init=False, compare=False, repr=False)
+    evaluations: SharedEvaluations = field(default_factory=SharedEvaluations, init=False, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         """Compute `rank` and `owners` once for all robots: computing them for each robot would take quadratic time."""

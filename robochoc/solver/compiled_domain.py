@@ -9,16 +9,20 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Container, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 
-from robochoc.model.problem import Constraint, Robot, Value
+from robochoc.model.problem import Constraint, Domain, Robot, Value, Variable
 from robochoc.solver.encoding import Codes, Component, Cost, Network, components, cost_function, is_soft
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import RobochocError
 
 MAX_SOLUTIONS = 100_000
 """The default maximum number of local solutions of a robot."""
+
+MAX_SHARED_VALUES = 256
+"""The maximum number of local solutions of a robot that shares its compiled domain with equal robots."""
 
 SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
 """Returns all solutions of a network with several variables, as codes; for example `AceProcess` in `solver/ace.py`."""
@@ -97,29 +101,53 @@ def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int =
         TooManySolutionsError: if there are more local solutions.
         UnsupportedError: if a network must be solved, and `solve` is missing.
     """
-    soft = [constraint for constraint in robot.private if is_soft(constraint)]
-    parts = components(robot.variables, robot.private, [constraint.variables for constraint in soft])
+    if not robot.private and math.prod([len(one.domain) for one in robot.variables]) <= min(limit, MAX_SHARED_VALUES):
+        names = tuple([variable.name for variable in robot.variables])
+        shown = set(robot.interface)
+        ranges = tuple([variable.domain.ranges for variable in robot.variables])
+        return replace(_unconstrained_domain(ranges, tuple([name in shown for name in names])), variables=names)
+    return _compiled(robot.name, robot.variables, robot.private, robot.interface, solve, limit)
+
+
+@lru_cache(maxsize=64)
+def _unconstrained_domain(domains: tuple[tuple[range, ...], ...], shown: tuple[bool, ...]) -> CompiledDomain:
+    """Return the compiled domain of a robot without private constraints. In large teams, many robots share it."""
+    variables = [Variable(str(number), Domain("", ranges)) for number, ranges in enumerate(domains)]
+    interface = [variable.name for variable, is_shown in zip(variables, shown, strict=True) if is_shown]
+    return _compiled("", variables, (), interface, None, MAX_SHARED_VALUES)
+
+
+def _compiled(
+    name: str,
+    variables: Sequence[Variable],
+    private: Sequence[Constraint],
+    interface: Sequence[str],
+    solve: SolveNetwork | None,
+    limit: int,
+) -> CompiledDomain:
+    soft = [constraint for constraint in private if is_soft(constraint)]
+    parts = components(variables, private, [constraint.variables for constraint in soft])
     if any(part.network.impossible for part in parts):
-        return CompiledDomain(tuple(variable.name for variable in robot.variables), (), (), (), (), ())
-    seen = set(robot.interface)
+        return CompiledDomain(tuple(variable.name for variable in variables), (), (), (), (), ())
+    seen = set(interface)
     paid = [[one for one in soft if _is_paid_in(one, part, parts[0])] for part in parts]
     grouped = [
-        _grouped(part, seen, charged, _solutions(robot, part, solve, limit))
+        _grouped(part, seen, charged, _solutions(name, part, solve, limit))
         for part, charged in zip(parts, paid, strict=True)
     ]
     if math.prod(len(groups) for groups in grouped) > limit:
-        raise TooManySolutionsError(robot.name, limit)
-    return _joined(robot, [part.names for part in parts], grouped)
+        raise TooManySolutionsError(name, limit)
+    return _joined([one.name for one in variables], seen, [part.names for part in parts], grouped)
 
 
-def _solutions(robot: Robot, part: Component, solve: SolveNetwork | None, limit: int) -> Iterable[Sequence[int]]:
+def _solutions(robot: str, part: Component, solve: SolveNetwork | None, limit: int) -> Iterable[Sequence[int]]:
     if not part.network.tables:
         if math.prod(map(len, part.network.domains)) > limit:
-            raise TooManySolutionsError(robot.name, limit)
+            raise TooManySolutionsError(robot, limit)
         return itertools.product(*part.network.domains)
     if solve is None:
         raise UnsupportedError(
-            f"{robot.name} has private constraints among its variables, which require a solver to compile them"
+            f"{robot} has private constraints among its variables, which require a solver to compile them"
         )
     return solve(part.network)
 
@@ -144,12 +172,13 @@ def _grouped(
     return list(groups.values())
 
 
-def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequence[_Group]]) -> CompiledDomain:
+def _joined(
+    variables: Sequence[str], seen: Container[str], names: Sequence[Sequence[str]], grouped: Sequence[Sequence[_Group]]
+) -> CompiledDomain:
     """Return the compiled domain with all combinations of the components' groups."""
-    variables = tuple(variable.name for variable in robot.variables)
     place = {name: index for index, name in enumerate(itertools.chain.from_iterable(names))}
     order = [place[name] for name in variables]
-    shown = [index for index, name in enumerate(variables) if name in robot.interface]
+    shown = [index for index, name in enumerate(variables) if name in seen]
     found = []
     for combination in itertools.product(*grouped):
         flat = tuple(itertools.chain.from_iterable(group.solution for group in combination))
@@ -159,7 +188,7 @@ def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequ
         found.append((solution, count, sum(group.cost for group in combination), cheapest))
     found.sort()
     return CompiledDomain(
-        variables=variables,
+        variables=tuple(variables),
         values=tuple(tuple([solution[index] for index in shown]) for solution, *_ in found),
         solutions=tuple(solution for solution, *_ in found),
         counts=tuple(count for _, count, _, _ in found),

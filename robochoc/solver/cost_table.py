@@ -21,7 +21,8 @@ Array = NDArray[np.float64]
 class CostTable(NamedTuple):
     """The costs of the constraint called `key`: one axis for each robot in `agents`, the last axis for this robot.
 
-    The indices on an axis follow the order of the robot's values.
+    The indices on an axis follow the order of the robot's values. Equal constraints share one array, which must not be
+    modified.
     """
 
     key: str
@@ -37,10 +38,16 @@ def cost_table(
     Raises:
         UnsupportedError: if the table is too large.
     """
-    combinations = [*constraint.combinations(domains, size)]
-    charges = np.zeros([*(len(domains[agent]) for agent in constraint.agents), size], np.float64)
-    seen: set[OtherValues] = set()
-    for place, others in combinations:
-        seen.add(others)
-        charges[place] = constraint.costs(others)
-    return len(seen) * size, CostTable(constraint.key, constraint.agents, charges)
+    equal = constraint.seen, tuple([tuple(domains[agent]) for agent in constraint.agents])
+    found = constraint.evaluations.tables.get(equal)
+    if found is None:
+        combinations = [*constraint.combinations(domains, size)]
+        charges = np.zeros([*(len(domains[agent]) for agent in constraint.agents), size], np.float64)
+        seen: set[OtherValues] = set()
+        for place, others in combinations:
+            seen.add(others)
+            charges[place] = constraint.costs(others)
+        charges.flags.writeable = False
+        found = constraint.evaluations.tables[equal] = len(seen) * size, charges
+    checks, charges = found
+    return checks, CostTable(constraint.key, constraint.agents, charges)

@@ -12,6 +12,7 @@ from robochoc.model.problem import INFINITE, Constraint, Domain, Value
 from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import MAX_TUPLES, Cost, allows_function, cost_function, is_soft, max_cost
 from robochoc.solver.errors import TooLargeError
+from robochoc.solver.evaluations import Evaluations, SharedEvaluations
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that exclude a value of this robot: the left side of a nogood."""
@@ -41,6 +42,7 @@ class OwnValues:
         self._names = names
         self._values = values
         self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
+        self._numbers: dict[tuple[int, ...], int] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
         """Return the indices and names of this robot's variables in `scope`."""
@@ -54,6 +56,13 @@ class OwnValues:
             coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
             self._coded[places] = coded, list(codes)
         return self._coded[places]
+
+    def number(self, places: tuple[int, ...], shared: SharedEvaluations) -> int:
+        """Return a number in `shared` that determines the `codes` for `places`."""
+        if places not in self._numbers:
+            coded, distinct = self.codes(places)
+            self._numbers[places] = shared.number((tuple(coded), tuple(distinct)))
+        return self._numbers[places]
 
     def shown(self, index: int, places: Container[int]) -> Value:
         """Return the value at `index`, with None outside `places`."""
@@ -70,7 +79,7 @@ class SharedConstraint:
 
     After `compile` it returns the values of this robot that are consistent with values of the others. Answers are
     computed on first use and cached: one for each combination of the others' variables in the constraint, however many
-    values their robots have.
+    values their robots have. Equal constraints of the robots in this process share the cache (`evaluations`).
 
     Args:
         key: The constraint's name in explanations.
@@ -87,6 +96,7 @@ class SharedConstraint:
         interfaces = known.interfaces
         self._constraint = constraint
         self._scope = scope
+        self._known = known
         self._seen = [
             (agent, place) for agent in self.agents for place, name in enumerate(interfaces[agent]) if name in scope
         ]
@@ -98,26 +108,40 @@ class SharedConstraint:
         self._masks_by: dict[int, int] = {}
         """If the others have one variable: the cache of `mask`, by the variable's value."""
         self._masks: dict[OtherValues, int] = {}
-        self._costs: dict[OtherValues, list[Cost]] = {}
         self._costs_by: dict[int, list[Cost]] = {}
         """If the others have one variable: the cache of `costs`, by the variable's value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
         self._counts_when_absent = False
+        self._test: Callable[[Sequence[int]], bool] | None = None
+        self._price: Callable[[Sequence[int]], Cost] | None = None
         self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
         """The costs of the constraint if the owners of these variables are absent. None: the constraint is dropped."""
 
     def allow_absence(self) -> None:
         """Accept None as the value of withdrawn robots from now on (`model/absence.py`)."""
         self._counts_when_absent = may_count_when_absent(self._constraint)
+        self._stop_sharing()
 
     def compile(self, own: OwnValues) -> None:
         """Compile the constraint for this robot's domain."""
         self._own = own
         self._places, names = own.seen(self._scope)
-        self._test = allows_function(self._constraint, [*self._names, *names])
-        self._price = cost_function(self._constraint, [*self._names, *names])
         self._all_names = [*self._names, *names]
         self.codes, self._distinct = own.codes(self._places)
+        shared = self._known.evaluations
+        domains = tuple([self._known.domains[name].ranges for name in self._names])
+        self.evaluations = shared.of(self._constraint, self._all_names, (domains, own.number(self._places, shared)))
+        self._costs = self.evaluations.costs
+
+    def _stop_sharing(self) -> None:
+        """Evaluate this constraint alone from now on: it may accept other values than equal constraints."""
+        self.evaluations = Evaluations(self._constraint.definition)
+        self._costs = dict(self._costs)
+
+    @property
+    def seen(self) -> tuple[tuple[int, int], ...]:
+        """The other robots' variables in the scope: the index of each robot in `agents`, and of its variable."""
+        return tuple([(self.agents.index(agent), place) for agent, place in self._seen])
 
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
         """Return the values of the scope in `view`. None: a value is unknown, or the constraint is dropped."""
@@ -145,6 +169,7 @@ class SharedConstraint:
     def allow_undeclared(self) -> None:
         """Evaluate undeclared values of others from now on."""
         self._domains = None
+        self._stop_sharing()
 
     def _refuse_undeclared(self, others: OtherValues) -> None:
         """Raise `ValueError` if a value, which a message may contain, is not in the declared domain of its robot.
@@ -169,11 +194,19 @@ class SharedConstraint:
 
     def _holds(self, values: Sequence[int | None]) -> bool:
         """Return whether the constraint holds on `values`, which are None for withdrawn robots."""
-        return self._cost_for_some(values) < INFINITE if None in values else self._test(values)  # type: ignore[arg-type]
+        if None in values:
+            return self._cost_for_some(values) < INFINITE
+        if self._test is None:
+            self._test = allows_function(self._constraint, self._all_names)
+        return self._test(values)  # type: ignore[arg-type]
 
     def _cost(self, values: Sequence[int | None]) -> Cost:
         """Return the cost of the constraint on `values`, which are None for withdrawn robots."""
-        return self._cost_for_some(values) if None in values else self._price(values)  # type: ignore[arg-type]
+        if None in values:
+            return self._cost_for_some(values)
+        if self._price is None:
+            self._price = cost_function(self._constraint, self._all_names)
+        return self._price(values)  # type: ignore[arg-type]
 
     def _cost_for_some(self, values: Sequence[int | None]) -> Cost:
         """Return the cost of the constraint with withdrawn robots; 0 if it is dropped."""
@@ -284,8 +317,11 @@ class SharedConstraint:
         """Return this robot's values that are consistent with `others`: bit i for the i-th value."""
         mask = self._masks.get(others)
         if mask is None:
-            holds = self.holds(others)
-            mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
+            mask = self.evaluations.masks.get(others)
+            if mask is None:
+                holds = self.holds(others)
+                mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
+                self.evaluations.masks[others] = mask
             self._masks[others] = mask
         return mask
 

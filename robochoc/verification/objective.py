@@ -35,16 +35,22 @@ class Objective:
         self._constraints = list(team.constraints())
         self._prices: list[Price] = [cost_function(one, one.variables) for one in self._constraints]
         self._restated: dict[tuple[int, tuple[str, ...]], Constraint | None] = {}
-        self._costs: list[float] = [0] * len(self._constraints)
-        self._sum: float = 0
-        self._broken = 0
+        self._scopes = [one.variables for one in self._constraints]
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
         self.interfaces = {robot.name: robot.interface for robot in team.robots}
         self._variables = {robot.name: [variable.name for variable in robot.variables] for robot in team.robots}
-        for number, constraint in enumerate(self._constraints):
-            for name in constraint.variables:
+        for number, names in enumerate(self._scopes):
+            for name in names:
                 self._on[name].append(number)
-            if not constraint.variables:
+        self.reset()
+
+    def reset(self) -> None:
+        """Return to the initial state, in which no robot has values and only constraints on constants are priced."""
+        self._costs: list[float] = [0] * len(self._constraints)
+        self._sum: float = 0
+        self._broken = 0
+        for number, names in enumerate(self._scopes):
+            if not names:
                 self._set_cost(number, self._prices[number](()))
         self._values: dict[str, int] = {}
         self._absent = set(self._weights)
@@ -52,22 +58,23 @@ class Objective:
 
     def change(self, own: Mapping[str, Mapping[str, int]]) -> None:
         """Set the values of some robots to the values in `own`."""
-        touched: dict[int, None] = {}
+        touched: set[int] = set()
         for robot, values in own.items():
             for name in self._variables[robot]:
                 self._values.pop(name, None)
-                touched.update(dict.fromkeys(self._on[name]))
+                touched.update(self._on[name])
             self._values.update(values)
             if bool(values) is (robot in self._absent):
                 self._weight += -self._weights[robot] if values else self._weights[robot]
                 self._absent ^= {robot}
+        known, costs = self._values, self._costs
         for number in touched:
-            names = self._constraints[number].variables
-            known = all(name in self._values for name in names)
-            if known:
-                self._set_cost(number, self._prices[number]([self._values[name] for name in names]))
-            else:
-                self._set_cost(number, self._cost_with_absent(number) if self._withdrawal_cost is not None else 0)
+            try:
+                cost = self._prices[number]([known[name] for name in self._scopes[number]])
+            except KeyError:
+                cost = self._cost_with_absent(number) if self._withdrawal_cost is not None else 0
+            if cost != costs[number]:
+                self._set_cost(number, cost)
 
     def _cost_with_absent(self, number: int) -> float:
         """Return the cost of a constraint when robots in its scope are absent."""
