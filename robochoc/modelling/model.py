@@ -318,7 +318,9 @@ class Model(Solvable):
     def solutions(self, protocol: str = CENTRAL, *, limit: int | None = None, **options: Any) -> Iterator[Solution]:  # noqa: ANN401 - those of `solve`
         """Yield all solutions one by one, the cheapest first if costs are minimised.
 
-        Each search starts when the next solution is requested. Solutions differ in at least one value.
+        Searches start when their solutions are requested. Solutions differ in at least one value. `central` lists many
+        solutions in one search, and sorts up to 100,000 solutions with costs; for more, and for other protocols,
+        `central_with="ortools"` or a `journal`, each solution is a search. `timeout` limits each search.
 
         Args:
             protocol: The protocol, or `central`: a single solver that knows the constraints of all robots.

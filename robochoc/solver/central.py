@@ -10,19 +10,20 @@ from __future__ import annotations
 import math
 import select
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Protocol
 
 from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
-from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.problem import Assignment, ProblemKind, Team
 from robochoc.solver.ace import AceProcess, SolvedBy, SolverAnswer
 from robochoc.solver.ace_messages import Strategy
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.cliques import with_cliques
 from robochoc.solver.encoding import Codes, Component, Network, components
 from robochoc.solver.errors import SolverTimeoutError
+from robochoc.solver.listing import Replayable, combinations, listed_solutions
 from robochoc.solver.symmetry import break_symmetries, orbits, symmetries
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.time_limit import TimeLimitError, computed_by
@@ -132,6 +133,42 @@ class CentralSolver:
             return self._all_components(team, count=count)
         except (SolverTimeoutError, TimeLimitError):
             return CentralAnswer(Verdict.UNKNOWN)
+
+    def solutions(self, team: Team, limit: int | None = None, timeout_s: float | None = None) -> Iterator[Assignment]:
+        """Yield each assignment without violated hard constraints once. Costs are ignored.
+
+        Args:
+            team: The team.
+            limit: The number of solutions that are needed. None: all. More than `limit` solutions may be found.
+            timeout_s: A time limit for each search, in seconds. A search finds many solutions.
+
+        Raises:
+            SolverTimeoutError: if a time limit is reached.
+            TimeLimitError: if a time limit is reached before a search.
+        """
+        with ExitStack() as processes:
+            ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
+            spare = processes.enter_context(AceProcess(always=True))
+
+            def search(network: Network, size: int) -> SolverAnswer:
+                self._deadline = None if timeout_s is None else time.monotonic() + timeout_s
+                return self._search(network, ace, spare, _SearchRequest(limit=size, in_order=True))
+
+            self._deadline = None if timeout_s is None else time.monotonic() + timeout_s
+            variables, constraints = team.variables.values(), list(team.constraints())
+            parts = computed_by(self._deadline, components, variables, constraints, may_split=True)
+            if any(part.network.impossible for part in parts):
+                return
+            parts.sort(key=lambda part: -math.prod(len(domain) for domain in part.network.domains))
+            first, *others = (listed_solutions(part.network, search, limit) for part in parts)
+            replayable = [*map(Replayable, others)]
+            if not all(any(True for _ in one) for one in replayable):
+                return
+            for found in combinations([first, *replayable]):
+                assignment: dict[str, int] = {}
+                for part, codes in zip(parts, found, strict=True):
+                    assignment.update(zip(part.names, part.decoded(codes), strict=True))
+                yield {name: assignment[name] for name in team.variables}
 
     def _all_components(self, team: Team, *, count: bool) -> CentralAnswer:
         """Solve the components of a problem without costs, the smallest first, or multiply their counts."""

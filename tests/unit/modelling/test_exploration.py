@@ -10,8 +10,11 @@ import pytest
 
 import robochoc
 from robochoc.modelling.exploration import ExplorationError
+from robochoc.solver import listing
 from robochoc.solver.ace import AceProcess
+from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import CompileLimits
+from robochoc.verification.checker import RefutedError
 from tests.support.cases import looped
 
 DIFFERENCES = (-1, 0, 1)
@@ -58,6 +61,49 @@ def test_the_cheapest_solutions_come_first() -> None:
     costs = [solution.cost for solution in model.solutions(limit=4)]
     assert costs == sorted(a + 2 * b for a, b, _ in itertools.permutations(range(3)))[:4]
     assert [one.cost for one in model.solutions("sfb", limit=2, seed=3)] == costs[:2]
+
+
+@looped("seed", range(20))
+def test_listing_divides_large_parts(seed: int) -> None:
+    chance = Random(seed)
+    model = robochoc.Model()
+    domains = [range(chance.randrange(1, 4)) for _ in range(5)]
+    x = [model.robot(f"r{i}").variable("x", domain) for i, domain in enumerate(domains)]
+    pairs = [(*chance.sample(range(5), 2), chance.choice(DIFFERENCES)) for _ in range(chance.randrange(5))]
+    for i, j, number in pairs:
+        model.add(x[i] - x[j] != number)
+    every = itertools.product(*domains)
+    expected = [row for row in every if all(row[i] - row[j] != number for i, j, number in pairs)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(listing, "BATCHES", (1, 2, 3))
+        found = [tuple(solution[one] for one in x) for solution in model.solutions()]
+        assert sorted(map(str, found)) == sorted(map(str, expected))
+        weights = [chance.randrange(4) for _ in x]
+        model.minimize(sum(weight * one for weight, one in zip(weights, x, strict=True)))
+        costs = [solution.cost for solution in model.solutions()]
+    prices = (sum(weight * value for weight, value in zip(weights, row, strict=True)) for row in expected)
+    assert costs == sorted(prices)
+
+
+def test_ace_lists_many_solutions_and_early_stops_end_it() -> None:
+    model = robochoc.Model()
+    x = [model.robot(f"r{i}").variable("x", range(6)) for i in range(6)]
+    model.add(robochoc.all_different(x))
+    solutions = model.solutions(local=CompileLimits(always_ace=True))
+    first = [next(solutions) for _ in range(12)]
+    solutions.close()  # type: ignore[attr-defined] # a generator
+    assert len({tuple(one.values.values()) for one in first}) == 12
+    every = [tuple(one[name] for name in x) for one in model.solutions(local=CompileLimits(always_ace=True))]
+    assert sorted(every) == [*itertools.permutations(range(6))]
+
+
+def test_wrong_answers_of_the_listing_solver_are_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
+    model, rules = random_model(3)
+    wrong = next(row for row in itertools.product(range(2), repeat=4) if row not in solved_by(rules))
+    answers = iter([dict(zip(model.variables, wrong, strict=True))])
+    monkeypatch.setattr(CentralSolver, "solutions", lambda *_: answers)
+    with pytest.raises(RefutedError, match="the checker refutes"):
+        list(model.solutions())
 
 
 def test_costs_and_parts_of_robots_in_conflicts() -> None:
