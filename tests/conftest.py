@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import tempfile
 import threading
 from collections.abc import Iterator
@@ -93,6 +94,17 @@ def nothing_left_behind(leftovers_of_file: LeftoversOfFile) -> Iterator[None]:
     """No test leaves a thread, a process, a descriptor, a port or a file behind."""
     with leftovers_of_file.of_test():
         yield
+
+
+@pytest.fixture(autouse=True)
+def no_protocol_left_registered() -> Iterator[None]:
+    """The protocols that a test registers end with it: other tests expect those of installed packages alone."""
+    registry = sys.modules.get("robochoc.run.registry")
+    before = {**registry.REGISTERED} if registry else {}
+    yield
+    if registry := sys.modules.get("robochoc.run.registry"):
+        registry.REGISTERED.clear()
+        registry.REGISTERED.update(before)
 
 
 @pytest.fixture

@@ -78,7 +78,8 @@ class _Registered(NamedTuple):
         return self.protocol
 
 
-_REGISTERED: dict[str, _Registered] = {}
+REGISTERED: dict[str, _Registered] = {}
+"""The protocols that the running program has registered."""
 
 
 def register(name: str, protocol: type[Protocol]) -> None:
@@ -100,7 +101,7 @@ def register(name: str, protocol: type[Protocol]) -> None:
         raise OptionError(f"{name!r} is not a valid name of a protocol; use letters, digits and hyphens")
     if name in {CENTRAL, AUTO, *_STAGES} or entry_points_named(GROUP, name):
         raise OptionError(f"an installed protocol is called {name!r}: register this one under another name")
-    _REGISTERED[name] = _Registered(name, protocol)
+    REGISTERED[name] = _Registered(name, protocol)
 
 
 def name_of_class(protocol: type[Protocol]) -> str:
@@ -110,7 +111,7 @@ def name_of_class(protocol: type[Protocol]) -> str:
         OptionError: for the same reasons as in `register`.
     """
     installed = [entry.name for entry, _ in all_entry_points(GROUP) if entry.value == _place(protocol)]
-    registered = [one.name for one in _REGISTERED.values() if one.protocol is protocol]
+    registered = [one.name for one in REGISTERED.values() if one.protocol is protocol]
     if names := installed + registered:
         return names[0]
     name = protocol.__name__.lower().replace("_", "-")
@@ -120,7 +121,7 @@ def name_of_class(protocol: type[Protocol]) -> str:
 
 def is_registered(name: str) -> bool:
     """Return whether the running program has registered a protocol called `name`."""
-    return name in _REGISTERED
+    return name in REGISTERED
 
 
 def _place(protocol: type[Protocol]) -> str:
@@ -128,12 +129,12 @@ def _place(protocol: type[Protocol]) -> str:
 
 
 def _entries(name: str) -> Sequence[EntryPoint]:
-    return [_REGISTERED[name]] if name in _REGISTERED else entry_points_named(GROUP, name)
+    return [REGISTERED[name]] if name in REGISTERED else entry_points_named(GROUP, name)
 
 
 def protocol_names() -> tuple[str, ...]:
     """Return the sorted names of all protocols: ours, those of other packages, and registered ones."""
-    return tuple(sorted({*entry_point_names(GROUP), *_REGISTERED}))
+    return tuple(sorted({*entry_point_names(GROUP), *REGISTERED}))
 
 
 _SPELLINGS = {CENTRAL, AUTO}
@@ -152,7 +153,7 @@ def installed_spelling(name: str) -> str:
 def installed_protocols() -> tuple[InstalledProtocol, ...]:
     """Return all protocols offered by packages, sorted by name. Unusable ones are included, with the reason."""
     installed = [_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP)]
-    registered = [_offer(entry, [entry]) for entry in _REGISTERED.values()]
+    registered = [_offer(entry, [entry]) for entry in REGISTERED.values()]
     return tuple(sorted(installed + registered, key=lambda one: one.name))
 
 

@@ -22,7 +22,7 @@ from tests.support.limits import HANG_S
 
 @pytest.fixture(autouse=True)
 def _no_protocols_registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robochoc.run.registry._REGISTERED", {})
+    monkeypatch.setattr("robochoc.run.registry.REGISTERED", {})
 
 
 class SlowMGM(MGM):
