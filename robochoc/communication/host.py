@@ -182,9 +182,9 @@ class Host:
         self._bounded = 0
 
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
-        """Receive all waiting messages, let the protocol settle, and return its messages.
+        """Pass all waiting messages to the protocol, let it process them, and return its outgoing messages.
 
-        Raises `BadMessageError` if the protocol cannot decode or use the content in an envelope.
+        Raises `BadMessageError` if the protocol cannot decode or use the content of an envelope.
         """
         for envelope in packet:
             self.receive(envelope)

@@ -17,7 +17,7 @@ _MOST_NAMED = 5
 
 
 class RobotsLostError(RobochocError):
-    """Raised if robots were lost whose loss ends the run. `robots` maps their names to the reasons."""
+    """Raised if the loss of robots ends the run. `robots` maps the names of the lost robots to the reasons."""
 
     def __init__(self, robots: Mapping[str, str]) -> None:
         losses = [f"{name} was lost: {why}" for name, why in itertools.islice(robots.items(), _MOST_NAMED)]
@@ -30,7 +30,7 @@ class RobotsLostError(RobochocError):
 class Progress(NamedTuple):
     """The progress of a run: the number of messages sent so far, and the seconds since the start.
 
-    `stage` names the current work if it is not a search.
+    `stage` names the current stage of the run if it is not a search.
     """
 
     messages: int
@@ -63,7 +63,7 @@ class SearchResult:
         parts: Iterable[Metrics],
         wall_s: float,
     ) -> Self:
-        """Combine the metrics of the robots: the sums, but for NCCCs the maximum of the robots' clocks."""
+        """Combine the metrics of the robots: sums, except that NCCCs are the maximum of the robots' clocks."""
         parts = list(parts)
         total = reduce(add, parts, Metrics())
         ncccs = max((part.ncccs for part in parts), default=0)

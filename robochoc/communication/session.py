@@ -24,7 +24,7 @@ class Epoch(NamedTuple):
         compiled: The team, with compiled domains.
         invalidated: The results from the previous epoch that no longer hold.
         restarted: Robots that start without knowledge, even if robots with the same names existed before.
-        parameters: The robots' parameters besides the problem.
+        parameters: The robots' parameters, apart from the problem.
     """
 
     compiled: CompiledTeam
@@ -45,7 +45,7 @@ class Epoch(NamedTuple):
 
 @mypyc_attr(allow_interpreted_subclasses=True)
 class Session(ABC):
-    """One team and one protocol in one runtime. A context manager.
+    """One team with one protocol in one runtime. A session is a context manager.
 
     `compiled` is the team that the robots use: first the given `team` (compiled without a solver unless it is already
     compiled), and after each `change` the team of that epoch. `starts_fresh`: robots keep no knowledge of the previous
@@ -72,13 +72,13 @@ class Session(ABC):
         """Search until there is a verdict, for at most `timeout` seconds or about `messages` messages.
 
         If a limit is reached first, the verdict is `unknown`. The metrics cover this search only. Robots start only
-        when all robots are ready, like in the paper, where the master orders the start. Raises `RobotsLostError` if the
+        when all robots are ready, as in the paper, where the master orders the start. Raises `RobotsLostError` if the
         runtime can lose robots.
         """
 
     @abstractmethod
     def change(self, epoch: Epoch) -> None:
-        """Pass to every robot its part of the changed problem, for the next `search`. Raises the errors of `search`."""
+        """Send every robot its part of the changed problem, for the next `search`. Raises the errors of `search`."""
 
     @abstractmethod
     def close(self) -> None:

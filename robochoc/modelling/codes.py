@@ -62,7 +62,7 @@ class DomainCodes:
         ranges: The codes.
         scale: For numbers: code = value * scale.
         user_values: The user's values by code. None: the codes are the values.
-        later: The codes of values that events add.
+        later: The codes of the values that events add.
     """
 
     kind: ValueKind

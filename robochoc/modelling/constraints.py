@@ -70,7 +70,7 @@ def conditions_in(given: object, place: SourceLine) -> list[Term]:
 
 
 def check_owned(term: Term, known: Mapping[str, ModelVariable], place: SourceLine, event: object = None) -> None:
-    """Raise `ModelError` unless the model contains the variables of `term`, and already does when `event` happens."""
+    """Raise `ModelError` unless the model contains the variables of `term`, already at the time of `event`."""
     for variable in term.variables:
         if known.get(variable.name) is not variable:
             message = f"{variable!r}, created at {variable.place}, is not a variable of this model"

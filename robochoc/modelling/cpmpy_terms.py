@@ -2,8 +2,8 @@
 
 A partial function (a quotient, an element of an array) has CPMpy's relational semantics: where it is undefined, the
 nearest enclosing Boolean expression is false. `Translation.boolean` adds that condition. No CPMpy expression is
-rewritten before: negations stay where the user wrote them, and a global constraint without a counterpart is decomposed
-at its own node.
+rewritten before the translation: negations stay where the user wrote them, and a global constraint without a
+counterpart is decomposed in place.
 """
 
 from __future__ import annotations

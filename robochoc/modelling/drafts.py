@@ -46,8 +46,8 @@ class Draft:
         is_cost: True if the value of `body` is a cost.
         cost: The cost of violating a condition. None: the condition is hard.
         default: The cost of rows that are not listed in a soft table.
-        is_penalty: True if the costs in a soft table are costs of violating a condition, which are subtracted from a
-            sum that is maximised.
+        is_penalty: True if the costs in a soft table are costs of violating a condition. If a sum is maximised, they
+            are subtracted from it.
         when_absent: The constraint's meaning when a robot is absent. None: the default for its form.
     """
 

@@ -1,4 +1,4 @@
-"""Finds all solutions of a model one by one, or the reason why a model has no solution."""
+"""Finds the solutions of a model one by one, or the reason why a model has no solution."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def _refuse_events(model: Model, function: str) -> None:
 
 
 def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, ...] | None:
-    """Return a minimal set of hard constraints that cannot hold together, or None if all can.
+    """Return a minimal set of hard constraints that cannot hold together, or None if all constraints can hold together.
 
     The algorithm is QuickXplain (Junker, AAAI 2004); the central solver tests whether sets can hold together.
 

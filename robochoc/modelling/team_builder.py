@@ -46,7 +46,7 @@ def build_team(model: Model, order: Sequence[str] | None = None) -> Team:
 
     Raises:
         ModelError: if the model is invalid.
-        InvalidInputError: if the model is invalid, but no single line of the program is the cause.
+        InvalidInputError: if the model is invalid, but not because of a single line in the program.
     """
     try:
         builder = _Builder(model, order)

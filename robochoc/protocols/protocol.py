@@ -70,9 +70,9 @@ class Protocol(ABC):
         """Record that a message from `sender` was lost; the next message from `sender` follows the lost one."""
 
     def go_on(self) -> bool:
-        """Continue without the awaited messages, because no more will arrive. Return False if that is impossible.
+        """Continue without the awaited messages, because none will arrive. Return False if that is impossible.
 
-        It must return False after finitely many calls.
+        After finitely many calls, the method must return False.
         """
         return False
 
@@ -106,7 +106,7 @@ class Protocol(ABC):
 
     @property
     def findings(self) -> Findings:
-        """This robot's knowledge about the whole search besides its own value. May be read at any time."""
+        """This robot's knowledge about the whole search, except its own value. It may be read at any time."""
         return NO_FINDINGS
 
     # Optional: the state that a replay shows (`replay/inspection.py`). The replay finds agent views, nogood stores,

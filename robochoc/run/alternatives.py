@@ -28,14 +28,14 @@ def alternatives(
 ) -> str:
     """Return the alternatives to the protocol of `options`, as the end of a sentence that rejects it.
 
-    The three most suitable ones are named. Protocols for small problems only are left out.
+    The text names the three most suitable alternatives, without protocols for small problems only.
 
     Args:
         team: The team with its scenario.
-        options: The refused options.
+        options: The options that were refused.
         complete: True if the protocol must be complete.
-        costs: True if it must minimise costs.
-        narrow: True if its tables must be narrower than those of DPOP, which was refused for their memory.
+        costs: True if the protocol must minimise costs.
+        narrow: True if its tables must be narrower than DPOP's, because DPOP's tables would need too much memory.
     """
     names = [
         offer.name
@@ -63,8 +63,8 @@ def alternatives(
 def _suited(names: Sequence[str], team: Team, options: Options) -> list[str]:
     """Return `names`, the most suitable first.
 
-    First comes the protocol that `auto` would choose; then those of the same family as the refused one, those that
-    `auto` chooses for some teams, and complete ones.
+    The protocol that `auto` would choose is first. It is followed by protocols in the family of the refused protocol,
+    protocols that `auto` chooses for some teams, and complete protocols.
     """
     try:
         facts = Facts(normalized(team), loss=options.message_loss)

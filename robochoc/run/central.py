@@ -1,4 +1,4 @@
-"""A run without robots: the central solver decides one merged model of all files, epoch by epoch."""
+"""A run without robots: the central solver solves a single model, merged from all files, epoch by epoch."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
 
 
 def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
-    """Return the solver's answer. If the options allow it and no solution exists, a minimum of robots withdraws."""
+    """Return the solver's answer. If no solution exists and the options allow it, a minimum of robots withdraw."""
     price = None
     found = None
     if options.withdraw != Withdrawal.MINIMUM or team.kind == ProblemKind.DISCSP:

@@ -1,8 +1,8 @@
-"""The choice of a protocol and an order for a team if the user names none (`--protocol auto`). No other module chooses.
+"""Chooses a protocol and an order for a team if the user names none (`--protocol auto`). No other module does this.
 
 `RULES` (`run/choice_rules.py`) are tried from the first to the last. The first rule whose conditions hold, and whose
-protocol accepts the team and the options (`run/compatibility`), decides. If no rule applies, any installed protocol
-that accepts the team and the options is chosen, complete protocols first.
+protocol accepts the team and the options (`run/compatibility`), determines the protocol. If no rule applies, any
+installed protocol that accepts the team and the options is chosen, complete protocols first.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
 
 
 def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
-    """Return the choice for a team whose robots do not disclose their constraints, since each robot checks its own."""
+    """Return the choice for a team whose robots do not disclose their constraints, but check them themselves."""
     if options.protocol != AUTO:
         return ProtocolChoice(options)
     if options.message_loss:
@@ -132,7 +132,7 @@ def _loss_tolerant(loss: float, *, costs: bool) -> tuple[str, str]:
 
 
 def _others(*, tolerating_loss: bool) -> list[str]:
-    """Return the installed protocols: on request, first those that tolerate loss; then complete ones first."""
+    """Return the installed protocols, sorted by completeness, and on request first by tolerance of losses."""
     found = [
         (tolerating_loss and not one.protocol.traits.bears_loss, not one.protocol.traits.complete, one.name)
         for one in installed_protocols()
@@ -185,7 +185,7 @@ STATIC = frozenset({"sbt", "abt", "afc", "afc-ng", "afc-tree", "disfc", "syncbb"
 
 
 def faster_order(team: Team, options: Options) -> Order | None:
-    """Return an order that is usually faster than that of the files; None if `options` name an order or none is known.
+    """Return an order that is usually faster than the files' order; None if none is known, or `options` name an order.
 
     Args:
         team: The team with its scenario.

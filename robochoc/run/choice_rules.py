@@ -37,7 +37,7 @@ FEW_LOSSES = 0.1
 
 
 class Condition(NamedTuple):
-    """A condition of a rule on a team: a predicate, and its wording for both results."""
+    """A condition of a rule on a team: a predicate, and a text for each of its two results."""
 
     holds: Callable[[Facts], bool]
     text: str

@@ -28,7 +28,7 @@ class RunContext:
         observer: Receives all events.
         progress: Receives the number of messages and the stage of the run from time to time.
         solver: A constraint solver that is already running. None: a solver is started when it is needed.
-        spent_s: The seconds that the run took before the context was created.
+        spent_s: The seconds that the run had already taken when the context was created.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class RunContext:
         self.deadline = None if limit_s is None else self.began + limit_s
 
     def left_s(self) -> float | None:
-        """Return the remaining seconds; None without a limit."""
+        """Return the remaining seconds; None if there is no limit."""
         return None if self.deadline is None else max(0.0, self.deadline - time.monotonic())
 
     def show_stage(self, stage: str) -> None:

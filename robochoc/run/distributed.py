@@ -1,7 +1,7 @@
-"""A distributed run, in one or two phases: handles lost robots, and explains a missing verdict.
+"""A distributed run in one or two phases. Handles lost robots, and explains a missing verdict.
 
-A `Deployment` is a team of robots that search on command. It has two subclasses: `run/this_machine.py` has the robots'
-files; in `run/networked/machines.py` the robots do not disclose their files.
+A `Deployment` is a team of robots that search on command. It has two subclasses: the one in `run/this_machine.py` has
+access to the robots' files; with the one in `run/networked/machines.py`, robots do not disclose their files.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Deployment(ABC):
         return ""
 
     def solve(self, phase: RunPhase) -> PhaseAnswer:
-        """Return the answer of `phase`: repeat the search until no robot is lost during a search, and check its result.
+        """Repeat the search until no robot is lost during it. Check the result, and return it as the answer of `phase`.
 
         Raises:
             RobotsLostError: if all robots were lost.

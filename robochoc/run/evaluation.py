@@ -44,20 +44,20 @@ class Search(NamedTuple):
 class PhaseAnswer(Answer):
     """The answer of a phase of a run. `withdrawn` contains the robots that withdrew, without lost robots.
 
-    `ended`: the protocol terminated by itself before any limit was reached.
+    `ended`: true if the protocol terminated by itself, before any limit was reached.
     """
 
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> PhaseAnswer:
-        """Return this answer, confirmed by the central `solvers`. No other check can verify `no-solution`."""
+        """Return this answer, confirmed by the central `solvers`. Only they can verify `no-solution`."""
         sure = bool(solvers)
         verified = sure if self.verdict == Verdict.NO_SOLUTION else self.verified
         return replace(self, verified=verified, confirmed=sure, confirmed_by=solvers)
 
     def then(self, second: PhaseAnswer) -> PhaseAnswer:
-        """Return the answer of two phases: the answer of the `second` phase, with the costs of both phases."""
+        """Return the answer of two phases: the answer of the `second` phase, with the metrics of both phases."""
         return replace(
             second,
             metrics=self.metrics + second.metrics,
@@ -83,10 +83,9 @@ def evaluate_search(
 ) -> PhaseAnswer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`. `told` converts a cost to user units.
 
-    A protocol that minimises costs always has an assignment. Whether the cost is proven to be minimal depends on the
-    protocol, and on whether the protocol terminated. A solution of a problem without costs needs no proof. If the
-    `deadline` (in seconds) has ended the search, the best known assignment is a solution, provided that it violates no
-    hard constraint.
+    A protocol that minimises costs always has an assignment. The cost is proven to be minimal if the protocol can prove
+    this and has terminated. A solution of a problem without costs needs no proof. If the `deadline` (in seconds) has
+    ended the search, the best known assignment is a solution, provided that it violates no hard constraint.
 
     Raises:
         RefutedError: when the check refutes a claim of the protocol.
@@ -123,7 +122,7 @@ def evaluate_search(
 
 
 def is_spoiled(phase: RunPhase, result: SearchResult) -> bool:
-    """Return whether messages were lost that the protocol does not tolerate. If so, none of its claims are valid."""
+    """Return whether messages were lost that the protocol does not tolerate. If so, none of its claims is valid."""
     return result.metrics.lost_messages > 0 and not phase.traits.bears_loss
 
 
@@ -179,7 +178,7 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
         constraints.
 
     Raises:
-        RefutedError: when the assignment violates a constraint, or a robot withdrew without need.
+        RefutedError: if the assignment violates a constraint, or a robot withdrew unnecessarily.
     """
     proven = is_proven(phase, result)
     if proven:
@@ -235,7 +234,7 @@ def check_assignment(
         team: the team in the form of its files.
         assignment: the values of all robots that have not withdrawn.
         withdrawn: the robots that have withdrawn.
-        maximal: whether the protocol claims that no withdrawn robot could be added.
+        maximal: true if the protocol claims that no withdrawn robot could be added.
 
     Raises:
         RefutedError: when the assignment violates a constraint, or the claim is wrong.

@@ -30,8 +30,8 @@ class Facts:
     Attributes:
         team: The team with its scenario.
         environment: True if an environment changes the problem.
-        compiled_sizes: Returns the sizes of the robots' compiled domains; None if only the declared sizes are known.
-            It is called only if these are large.
+        compiled_sizes: Returns the sizes of the robots' compiled domains; None if only the declared sizes are known. It
+            is called only if the declared sizes are large.
         loss: The probability that a message is lost.
     """
 
@@ -87,7 +87,7 @@ class Facts:
 
     @cached_property
     def sizes(self) -> Sizes:
-        """The number of values of each robot: as declared, or after compilation if the declared number is large."""
+        """The number of values of each robot: the declared number or, if it is large, the number after compilation."""
         if self._largest_table(self.declared_sizes) <= MAX_TUPLES:
             return self.declared_sizes
         return self.compiled_sizes() or self.declared_sizes
@@ -139,7 +139,7 @@ class Facts:
 
 
 def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> float:
-    """Return the share of value combinations that `constraint` allows; if the sample has none, half of one sample."""
+    """Return the share of value combinations that `constraint` allows. If none is allowed, count half a combination."""
     columns = [list(domains[name]) for name in constraint.variables]
     many = math.prod(map(len, columns))
     if not many:
@@ -174,7 +174,7 @@ def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: floa
         graph: The neighbours of each robot.
         order: The priority order, which breaks ties.
         sizes: The number of values of each robot.
-        enough: The analysis stops at a table with more entries.
+        enough: The analysis stops at the first table with more entries than this.
     """
     rank = {name: place for place, name in enumerate(order)}
 

@@ -1,7 +1,8 @@
-"""Answers during a search: at the deadline the best answer is published, then each better one until the time is over.
+"""Answers during a search: at the deadline the best answer is published, and then each better one until the time limit.
 
-The robots continue to search. At times they report snapshots (`communication/search_watch.py`), which are checked like
-any other answer. Each published answer is better than the previous one, and satisfies all hard constraints.
+After the deadline, the robots continue to search. From time to time they report snapshots
+(`communication/search_watch.py`), which are checked like any other answer. Each published answer is better than the
+previous one, and satisfies all hard constraints.
 """
 
 from __future__ import annotations
@@ -73,16 +74,16 @@ class Improvements(SearchWatch):
     """Publishes the answers of one search, from its deadline on.
 
     Args:
-        began: The start of the time that the deadline limits, on the monotonic clock.
+        began: The time from which the deadline counts, on the monotonic clock.
         deadline: The time at which the first answer is due, on the same clock.
         evaluate: Returns the checked answer of a snapshot.
         rank: The ranking of answers.
         has_costs: True if there are costs. Without them all solutions without withdrawals are equally good.
         bounded: True if the bounds refer to costs. (If robots may withdraw, the bounds refer to weights.)
         publish: Publishes an answer.
-        has_news: Returns whether the problem has changed.
+        has_news: Returns true if the problem has changed.
         earlier: The answers published by earlier searches in the epoch.
-        keep: Called with each best answer so far, whether it is published or not (None: not called).
+        keep: Called with each new best answer, even if the answer is not published (None: not called).
     """
 
     def __init__(  # noqa: PLR0913 - the parts that differ between runs, by name
@@ -176,7 +177,7 @@ class Improvements(SearchWatch):
             self._over = self._over or final
 
     def _publish_gain(self, best: PhaseAnswer, now: float) -> None:
-        """Publish the `best` answer if it is better than the published one: flying robots do not turn without need."""
+        """Publish the `best` answer if it is better than the published one, so that robots move only if needed."""
         before = self._published
         if self._outdated or (before is not None and not self._rank.of_answer(best) < self._rank.of_answer(before)):
             return
@@ -188,8 +189,8 @@ class Improvements(SearchWatch):
     def concluded(self, final: PhaseAnswer, *, lost: bool) -> PhaseAnswer:
         """Return the final answer of the search: `final`, or a better answer found earlier.
 
-        The answer is published unless an equally good one was published before or the problem has changed. If robots
-        were `lost`, the answers published before are invalid for the remaining robots.
+        The answer is published unless an equally good answer has already been published, or the problem has changed. If
+        robots were `lost`, earlier published answers are invalid for the remaining robots.
 
         Raises:
             RefutedError: if an answer refutes a claim of the protocol.
@@ -277,7 +278,7 @@ def improvements_of(  # noqa: PLR0913 - the parts that differ between deployment
 def _with_possible_loss(snapshot: SearchResult, phase: RunPhase, options: Options) -> SearchResult:
     """Return `snapshot`, marked as spoiled if messages may be lost. Then only its checked values are valid.
 
-    Robots report one after the other, so a message may be lost before any robot has noticed the loss.
+    Robots report one after the other, so a message may have been lost although no robot has noticed the loss yet.
     """
     if not options.loss or phase.traits.bears_loss:
         return snapshot

@@ -1,4 +1,4 @@
-"""The best known assignment of a minimising search that has terminated or was stopped by a limit.
+"""The best known assignment after a minimising search that has terminated or was stopped by a limit.
 
 Robots report findings (`protocols/findings.py`): the best assignment of the whole team that any robot has received,
 the values of each robot in every cycle, or only the current values. The cost of each of these assignments is computed
@@ -74,13 +74,13 @@ def lower_bound(findings: Mapping[str, Findings]) -> float | None:
 
 
 def optima(findings: Mapping[str, Findings]) -> int | None:
-    """Return the product of the roots' counts of optima, or None without counts."""
+    """Return the product of the numbers of optima that the roots have counted, or None if no root has counted them."""
     counts = [int(found.count, 16) for found in findings.values() if found.count is not None]
     return math.prod(counts) if counts else None
 
 
 def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
-    """Return the pseudo-tree that the robots have built, without the robots outside it."""
+    """Return the pseudo-tree that the robots have built, without robots that are not part of the tree."""
     return {name: found.place for name, found in findings.items() if found.place is not None}
 
 

@@ -14,8 +14,8 @@ class KnownCosts:
 
     The event `Began` starts a run without a known cost. Runs that do not minimise are ignored.
 
-    The bounds of two robots apply to disjoint parts of the team, and the costs within a part are 0 or more. So the sum
-    of the known bounds is a bound for the whole team at any time.
+    The bounds reported by different robots apply to disjoint parts of the team, and costs are never negative. So the
+    sum of the known bounds is always a bound for the whole team.
 
     Attributes:
         best: The cost of the cheapest assignment that the robots had together, or that a robot has received. None:

@@ -1,7 +1,8 @@
 """The optima of the team, combined from the optima that the robots of each tree have listed, and checked.
 
 See `protocols/inference/list_dpop`. Each root has numbered the optima of its tree, and each robot stores its value in
-each of the first optima. Different trees share no constraint, so the optima of the team are all combinations.
+each of the first optima. Different trees share no constraint, so the optima of the team are all combinations of the
+trees' optima.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class _Tree(NamedTuple):
 
 
 def combined_optima(compiled: CompiledTeam, result: SearchResult) -> tuple[int, list[dict[str, int]]] | None:
-    """Return the number of optima and the listed assignments; None if the robots have listed none.
+    """Return the number of optima and the listed assignments; None if the robots have not listed optima.
 
     Raises:
         RefutedError: if the robots of a tree have listed different numbers of optima, or two optima are equal.

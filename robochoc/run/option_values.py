@@ -1,4 +1,4 @@
-"""Converters for the values of options: from texts, numbers of other libraries, and lists. Other values are refused."""
+"""Converters for option values: they accept texts, lists and numbers of any library, and refuse all other values."""
 
 from __future__ import annotations
 

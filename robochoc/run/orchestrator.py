@@ -59,7 +59,7 @@ def solve(
         solver: a running constraint solver. A program that solves many teams saves time by passing the same one.
         environment: receives each epoch's answer, and returns the next change of the problem.
         audience: with `Options.improve`, receives each answer during the search.
-        ordered: whether the user chose the priority order of `team`. Otherwise an order is chosen too, for any
+        ordered: true if the user chose the priority order of `team`. Otherwise an order is chosen too, for any
             protocol.
 
     Returns:
@@ -145,7 +145,7 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
 
 
 def _check_costs(team: Team, outcome: Outcome) -> None:
-    """Check the costs of answers in the user's units, up to the first loss: after it the files differ from the team.
+    """Check the costs of answers in the user's units, up to the first loss, after which the files differ from the team.
 
     Raises:
         RefutedError: if a cost is wrong.

@@ -22,7 +22,7 @@ class RunPhase:
     """A phase of a run.
 
     `name` is the protocol's name, `parameters` are common to all robots. If `withdrawal` is set, robots may withdraw.
-    `takes_over`: this is the second phase, in which another protocol replaces the chosen one.
+    `takes_over` is true in the second phase, in which another protocol replaces the chosen one.
     """
 
     name: str

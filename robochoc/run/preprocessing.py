@@ -1,10 +1,11 @@
 """Make domains arc consistent before the chosen protocol starts (`--preprocess ac`).
 
-The preprocessing is a separate search, whose findings are the remaining values. The following search has the same team
-with only these values, so its journals and replays need no further data. The answer is checked with the files.
+The preprocessing is a separate search, whose findings are the remaining values. The main search uses the same team with
+only these values, so its journals and replays need no further data. The answer is checked against the files.
 
-If the problem changes, the preprocessing is repeated before each epoch, from the domains in the files. So values return
-when the reason for their removal is gone; a protocol that continues treats them as values that a change has added.
+If the problem changes, the preprocessing is repeated before each epoch, from the domains in the files. So a removed
+value returns when the reason for its removal no longer exists; a protocol that continues treats this value like one
+that a change has added.
 """
 
 from __future__ import annotations

@@ -121,7 +121,7 @@ def open_processes(request: SessionRequest) -> Session:
 
 
 def _import_tables(request: SessionRequest) -> None:
-    """Import the module for tables if robots need it. This saves an import in each robot's process."""
+    """Import the module for tables if robots need it, so that robots' processes need not import it."""
     costs = request.team.team.kind == ProblemKind.DISWCSP or request.parameters.withdrawal_cost is not None
     if costs and request.protocol.traits.tables:
         import_module("robochoc.solver.cost_table")
@@ -181,7 +181,7 @@ def _simulation(request: SessionRequest) -> Session:
 
 
 def _losses_of(options: Options) -> Losses | None:
-    """Return the object that draws lost messages, by the option or else the channel model; None without losses."""
+    """Return the object that determines lost messages, from the option or the channel model; None without losses."""
     from robochoc.communication.simulator.losses import Losses  # noqa: PLC0415 - one runtime is enough
 
     if options.message_loss or not options.loss or options.channel is None:

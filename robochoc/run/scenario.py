@@ -1,8 +1,8 @@
 """Solves a problem that changes over time, epoch by epoch (the paper's dynamic DisCSP, Section 3.1).
 
 An epoch ends when its problem is solved, when the scenario's next event happens, or when robots are lost. The next
-epoch starts with the changed problem. A `DynamicProtocol` keeps the knowledge that still holds; any other protocol
-restarts, so that the two kinds can be compared.
+epoch starts with the changed problem. A `DynamicProtocol` keeps the knowledge that is still valid. Any other protocol
+restarts, so both kinds can be compared.
 
 The changes are known from the beginning, as a scenario, or arrive epoch by epoch from an `Environment`.
 """
@@ -75,7 +75,7 @@ class FinishedEpoch(NamedTuple):
     """An epoch whose search has ended.
 
     `team` is the epoch's team in the form of the files, `epoch` contains the same team with compiled domains, in the
-    form used by the robots. If the time was over before the search, `epoch` is the previous one.
+    form used by the robots. If the time limit was reached before the search, `epoch` is the previous epoch.
     """
 
     team: Team
@@ -119,7 +119,7 @@ class ScenarioRun:
                 and they join at the end of the order.
             parameters: The parameters common to all robots.
             prepare: The preparation before each search (None: no preparation).
-            with_files: True if the constraints held by lost robots are lost too.
+            with_files: True if the constraints held by lost robots are lost with them.
         """
         self.team = self._full = team_after_events(team, events=0)
         self.lost_for_good: list[str] = []
@@ -212,7 +212,7 @@ class ScenarioRun:
 
     @property
     def is_over(self) -> bool:
-        """Return whether the time is over or the message limit is reached."""
+        """Return whether the time limit or the message limit is reached."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
     def add_event(self, event: ScenarioEvent) -> None:
@@ -249,7 +249,7 @@ class ScenarioRun:
         return [change.robot.name for change in changes if isinstance(change, AddAgent)]
 
     def _lose(self, lost: Mapping[str, str]) -> Collection[str]:
-        """Return the robots in `lost` that return; the others are permanently lost."""
+        """Return the robots in `lost` that return. The other robots are permanently lost."""
         self._after_losses = True
         back: list[str] = []
         for name in lost:
@@ -278,7 +278,8 @@ class ScenarioRun:
     def _remaining(self) -> Team:
         """Return the team without the robots that are permanently lost.
 
-        If the constraints that these robots hold are lost too, the initial order of the run determines which.
+        If the constraints held by these robots are lost with them, the initial order of the run determines which these
+        are.
         """
         order = self._held_in
         if order is None or not self.lost_for_good:

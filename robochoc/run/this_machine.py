@@ -209,7 +209,7 @@ class ThisMachine(Deployment):
         )
 
     def _absence_reason(self, answer: PhaseAnswer, *, withdrawal: bool) -> str | None:
-        """Return the reason why there is no solution: constraints that the remaining robots cannot satisfy."""
+        """Return the constraints that the remaining robots cannot satisfy, as the reason for `no-solution`."""
         if answer.verdict != Verdict.NO_SOLUTION:
             return None
         from robochoc.verification.absence_reason import absence_reason  # noqa: PLC0415 - start-up: rarely needed
@@ -217,7 +217,7 @@ class ThisMachine(Deployment):
         return absence_reason(self._scenario.team, withdrawal=withdrawal) or None
 
     def _missed_events(self, answer: PhaseAnswer) -> str:
-        """Return a note that a limit was reached before some events, if there is an answer; else empty."""
+        """Return a note that a limit was reached before some events; empty if there are none, or no answer."""
         left = self._scenario.events_left
         if not left or answer.verdict == Verdict.UNKNOWN:
             return ""

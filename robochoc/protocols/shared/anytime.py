@@ -11,16 +11,16 @@ itself does not change: cycles, values and random numbers are the same.
 - A robot adds the cost that it computes to the costs that its children have reported for the step, and reports the sum
   (`Paid`).
 - The root compares the costs of the steps and sends the best step so far (`Best`), once for each step.
-- A robot remembers its values in the best step, and in the steps for which no `Best` has arrived yet. It waits when
-  these would be more than twice the tree's height plus 2, so its memory is bounded.
+- A robot remembers its values in the best step, and in the steps for which no `Best` has arrived yet. Its memory is
+  bounded: it waits if it would have to remember more steps than twice the tree's height plus 2.
 
-The paper adds this information to the search's own messages. Here it travels in separate messages, so that it can be
-combined with any protocol: one message for each edge and two for each edge of the tree, in each cycle.
+In the paper, this information is part of the search's own messages. Here, it is sent in separate messages, so that it
+can be combined with any protocol: one message for each edge and two for each edge of the tree, in each cycle.
 
-How the tree is built: all robots go through rounds, in which they send their neighbours the best root that they know
-and their distance to this root. A robot is complete when its neighbours have the same root and its children are
-complete. Once a root is complete, it knows the height of the tree, which it then sends down. So the tree does not
-depend on delays, and its paths are shortest paths.
+The tree is built in rounds. In each round, robots send their neighbours the best root that they know, and their
+distance to this root. A robot is complete when its neighbours have the same root and its children are complete. Once a
+root is complete, it knows the height of the tree, which it then sends down. So the tree does not depend on delays, and
+its paths are shortest paths.
 """
 
 from __future__ import annotations
@@ -47,8 +47,8 @@ Natural = Annotated[int, msgspec.Meta(ge=0)]
 class Place(wire.Message, frozen=True):
     """The sender's position in the breadth-first tree, as far as the sender knows it.
 
-    `parent` is None for a root. `below` is the height of the sender's subtree once that is complete, `height` the
-    height of the tree.
+    `parent` is None for a root. `below` is the height of the sender's subtree, once the subtree is complete. `height`
+    is the height of the tree.
     """
 
     root: str
@@ -68,7 +68,7 @@ class Place(wire.Message, frozen=True):
 
 
 class Step(wire.Message, frozen=True):
-    """The sender's value in its next step (a cycle): the receiver may need it to compute a constraint's cost."""
+    """The sender's value in its next step (a cycle). The receiver may need the value to compute a constraint's cost."""
 
     value: wire.Value
 
@@ -94,7 +94,7 @@ class Paid(wire.Message, frozen=True):
 
 
 class Best(wire.Message, frozen=True):
-    """The best step so far, `step`, sent after every step (None: every step so far broke a hard constraint)."""
+    """The best step so far, `step`, sent after every step (None: every step so far violates a hard constraint)."""
 
     step: Natural | None
 
@@ -241,7 +241,7 @@ class Anytime:
         return self.tree.height is None or cycle - self.news > 2 * self.tree.height + 2
 
     def _report(self) -> Sent:
-        """Compute the costs of all steps for which the values from above and the children's reports have arrived."""
+        """Compute the costs of all steps for which the values and the children's reports have arrived."""
         sent: Sent = []
         while (
             self.tree.height is not None

@@ -1,14 +1,14 @@
 """The common base class of synchronous local search protocols.
 
-All robots go through cycles, and each cycle has phases. In each phase a robot sends one message to each robot that
-waits for one, then waits for a message from each robot that it listens to, and continues when all these messages have
-arrived. Messages need no number, because the messages from a robot arrive in the order of their phases. A message from
-a neighbour that is ahead is stored until its phase.
+All robots go through cycles, and each cycle has phases. In each phase, a robot sends one message to each robot that
+waits for one. Then it waits for a message from each robot that it listens to, and continues when all these messages
+have arrived. Messages are not numbered, because the messages from one robot arrive in the order of their phases. A
+message from a neighbour that is ahead is stored until its phase.
 
 If a message is lost, the next message from the same robot shows the gap; if no further message follows, a robot
 continues once no more messages arrive. In both cases it executes the phase with the messages that it has. If a message
-arrives after its phase, the robot only stores the new information. So phases stay in step, and the search continues
-after each silence.
+arrives after its phase, the robot only stores the new information. So the robots' phases stay synchronised, and the
+search continues each time that no more messages arrive.
 
 The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
 (`Trail`), and the cheapest cycle is computed from the collected trails. With the setting `anytime` the robots find it
@@ -48,7 +48,7 @@ class CycleCount(Settings, frozen=True):
 class CycleSettings(CycleCount, frozen=True):
     """`cycles`: the number of cycles after which all robots stop.
 
-    `anytime`: whether the robots find the best cycle themselves, by messages, and end with their values in that cycle.
+    `anytime`: true if the robots find the best cycle themselves, by messages, and end with their values in that cycle.
     """
 
     anytime: Literal["no", "yes"] = "no"
@@ -90,7 +90,7 @@ Then = Callable[[Mapping[str, wire.Message]], None]
 
 
 class CycleProtocol(Protocol):
-    """One agent in a synchronous local search. State: `cycle`, and this robot's value in it.
+    """One agent in a synchronous local search. Its state is the current `cycle`, and its value in this cycle.
 
     Subclasses choose a first value and send it in `start_cycles`; then they `choose` one value per cycle until the
     search is `finished`. They call `listen` with the robots whose messages they need, and a function that processes
@@ -122,7 +122,7 @@ class CycleProtocol(Protocol):
         """Choose and send a first value. Called for robots that have at least one value and one neighbour."""
 
     def start(self) -> None:
-        """Start; an empty domain ends the search; a robot without neighbours chooses its cheapest value."""
+        """Start. With an empty domain, end the search; without neighbours, choose the cheapest value."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -197,7 +197,7 @@ class CycleProtocol(Protocol):
             then(messages)
 
     def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
-        """Remove and return the next message from each robot that this one listens to; None to continue waiting."""
+        """Remove and return the next message from each awaited robot; None if messages are still missing."""
         return [(name, self._waiting[name].pop(0)) for name in self._names]
 
     def listen(self, names: Sequence[str], then: Then) -> None:
@@ -330,5 +330,5 @@ NO_GAIN: LexicographicCost = (0, 0)
 
 
 def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCost:
-    """Return the reduction from `before` to `after`; the pairs of differences compare lexicographically."""
+    """Return the reduction from `before` to `after`: a pair of differences, which compare lexicographically."""
     return before[0] - after[0], before[1] - after[1]

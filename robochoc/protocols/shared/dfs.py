@@ -4,16 +4,16 @@ Each connected component elects the robot with the most neighbours: waves of all
 strongest candidate's wave survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms",
 2nd edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques
 and the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983). In that paper the token bounces off
-visited robots, which takes two more messages for each edge outside the tree. Here the token lists visited robots and is
-never sent to any of them, which takes two messages for each robot except the root (as in Makki, Havas: "Distributed
-algorithms for depth-first search", IPL 60, 1996). It lists a robot only until all neighbours of that robot know of the
-visit; next to the name it has the number of neighbours that do not know yet. So on a path it lists one robot at a time,
-and on a tree the robots of one branch. A robot sends the token to its unvisited neighbour with the most neighbours.
-Ties go to the robot with higher priority.
+visited robots, which takes two more messages for each edge outside the tree. Here the token lists the visited robots
+and is never sent to a visited robot, which takes two messages for each robot except the root (as in Makki, Havas:
+"Distributed algorithms for depth-first search", IPL 60, 1996). The token lists a robot only until all neighbours of
+that robot know of the visit; with each name, it contains the number of neighbours that do not know yet. So on a path
+the token lists one robot at a time, and on a tree only the robots on one branch. A robot sends the token to its
+unvisited neighbour with the most neighbours. Ties go to the robot with higher priority.
 
-Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots in an n-ary
-constraint, because they are all neighbours. The cost is 2 messages for each robot for the token, and at least 2 for
-each edge for the election.
+Neighbours are then on the same branch, as in every depth-first search of an undirected graph. All robots in an n-ary
+constraint are on the same branch, too, because they are all neighbours of each other. The cost is 2 messages for each
+robot for the token, and at least 2 for each edge for the election.
 """
 
 from abc import abstractmethod
@@ -72,7 +72,7 @@ class TreeProtocol(Protocol):
         """Decide; called after all waiting messages have been processed."""
 
     def start(self) -> None:
-        """Start this robot's election wave; a robot with an empty domain ends the search."""
+        """Start this robot's election wave; if the domain is empty, end the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -171,8 +171,8 @@ class TreeProtocol(Protocol):
 class _Election:
     """One agent's part in the election: the strongest known `candidate`, and the neighbour from which its wave came.
 
-    `_arrived` are the neighbours from which that candidate's wave has arrived. After the last of them, the wave is
-    returned.
+    `_arrived` are the neighbours from which that candidate's wave has arrived. When it has arrived from all neighbours,
+    the wave is returned.
     """
 
     def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:

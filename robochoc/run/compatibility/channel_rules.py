@@ -1,4 +1,4 @@
-"""Refuses channel models that do not fit the team, since they name unknown robots or need unknown positions."""
+"""Refuses channel models that do not fit the team: they name unknown robots, or need unknown positions."""
 
 from __future__ import annotations
 

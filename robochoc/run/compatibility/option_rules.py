@@ -22,7 +22,7 @@ class OptionRule(NamedTuple):
 
 
 def _for_robots(option: str, given: Callable[[Options], object]) -> OptionRule:
-    """Return the rule that refuses an option together with the central solver."""
+    """Return the rule that refuses to combine an option with the central solver."""
     why = f"{option} is for robots that solve the problem together, not for --protocol central"
     return OptionRule(lambda o: o.protocol == CENTRAL and given(o), why)
 
@@ -38,7 +38,7 @@ def _is_delayed(options: Options) -> bool:
 
 
 def _starts_programs_without(options: Options) -> bool:
-    """Return whether robots are programs of their own, which do not know a protocol that this program registered."""
+    """Return whether robots run as separate programs, which do not know protocols registered by this program."""
     if options.runtime != Runtime.NETWORK:
         return False
     from robochoc.run.registry import is_registered  # noqa: PLC0415 - start-up: this runtime is rare
@@ -197,7 +197,7 @@ PRIVATE_RULES = (
 def refuse_options(options: Options, *, environment: bool = False, private: bool = False) -> None:
     """Raise `UnsupportedError` for options that cannot be combined.
 
-    `environment`: an environment changes the problem. `private`: robots do not disclose their values.
+    `environment`: true if an environment changes the problem. `private`: true if robots do not disclose their values.
     """
     for rule in (*ENVIRONMENT_RULES * environment, *PRIVATE_RULES * private, *OPTION_RULES):
         if rule.refuses(options):

@@ -26,7 +26,7 @@ CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 
 
 class UnfitProtocolError(UnsupportedError):
-    """The protocol does not fit, but another one may. `complete`: the other one must prove its answers."""
+    """The protocol does not fit, but another one may. `complete`: true if the other one must prove its answers."""
 
     def __init__(self, why: str, *, complete: bool = False) -> None:
         super().__init__(why)

@@ -75,7 +75,7 @@ def query_directory(place: Address, identity: Identity, words: str, patience_s: 
 
 
 def watch_directory(place: Address, identity: Identity, words: str, patience_s: float = 10.0) -> Iterator[str]:
-    """Subscribe to the search `words`; yield the directory's notices in SL0, first now and then at each change.
+    """Subscribe to the search `words`. Yield the directory's notices in SL0: one at once, then one at each change.
 
     Raises:
         CannotConnectError: if no master answers.

@@ -29,14 +29,14 @@ _TRY_AGAIN_S = 0.5
 def identity_of(
     name: str, place: Address, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
 ) -> Identity:
-    """Return the identity of a robot. With a token it is enrolled now. An identity past half its lifetime is renewed.
+    """Return the identity of a robot. With a token, enrol the robot. Renew an identity after half of its lifetime.
 
     Args:
         name: The robot's name.
         place: The address of the master.
         folder: The folder of the identity (None: the default).
         token: A token with which the robot enrols.
-        patience_s: The seconds to wait for a master that does not listen yet, if there is a token.
+        patience_s: With a token, the seconds to wait for a master that does not listen yet.
 
     Raises:
         InvalidNameError: if the name is not a valid robot's name.

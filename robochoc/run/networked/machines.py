@@ -1,7 +1,7 @@
 """A team whose robots run on several machines and do not disclose their files. The robots themselves check the answer.
 
-The master knows about each robot only what the robot's neighbours know. The outcome names the robots whose claims no
-other robot could check (`claimed`).
+About each robot, the master has only the information that the robot's neighbours have. The outcome names the robots
+whose claims no other robot could check (`claimed`).
 """
 
 from __future__ import annotations
@@ -257,7 +257,7 @@ class Machines(Deployment):
         return dict(assignments)
 
     def _refuse_contradictions(self) -> None:
-        """Raise `RefutedError` if robots contradict each other. It is unknown which of them lies."""
+        """Raise `RefutedError` if robots contradict each other. It is unknown which robot lies."""
         self._refuse(doubt.why for doubt in self._master.state.doubts_about_verdict)
 
     def _refuse(self, doubts: Iterable[str]) -> None:
@@ -293,5 +293,5 @@ def claimed(outcome: Outcome) -> Outcome:
 
 
 def first_names(names: Sequence[str]) -> str:
-    """Return the first few of `names`, and the number of remaining names."""
+    """Return the first few `names`, and the number of remaining names."""
     return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} others" * (len(names) > _NAMED)

@@ -53,10 +53,10 @@ class MasterPlan:
         place: The address at which the master listens.
         hosts: Further names and addresses of the master's machine that robots may use.
         name: The team's name.
-        names: The robots of the team. Without `names` and `number`, the team is complete when every neighbour that a
-            robot names has registered.
+        names: The robots of the team. If neither `names` nor `number` is given, the team is complete when every
+            neighbour named by a robot has registered.
         number: The number of robots of the team.
-        protocol: The protocol's name (None, or `auto`: chosen by the data that the robots declare).
+        protocol: The protocol's name (None, or `auto`: a protocol is chosen from the data that the robots declare).
         settings: The protocol's settings, as text.
         seed: The seed of protocols with random decisions.
         withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
