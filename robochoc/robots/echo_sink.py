@@ -12,9 +12,13 @@ ECHO = "echo"
 
 
 class EchoSink(Sink):
-    """Prints a line for each message on standard error: the topic, its ROS type, and the fields as JSON."""
+    """Prints a line for each message on standard error: the topic, its ROS type, and the fields as JSON.
+
+    Reports and poses are not printed, since there may be thousands of them for a few decisions.
+    """
 
     live = False
+    wants_reports = False
 
     def __init__(self, place: str) -> None:
         if place:

@@ -53,6 +53,9 @@ class Sink(ABC):
     live: bool = True
     """True if robots may receive the messages. False for a recording."""
 
+    wants_reports: bool = True
+    """True if the sink also receives the robots' reports and poses."""
+
     arms: bool = False
     """True if the sink commands robots, which it may arm only after `allow_arming`."""
     summary: str = ""

@@ -183,11 +183,15 @@ class SinkPublisher(MissionPublisher):
 
     def report(self, report: Report) -> None:
         """Publish a drone's report with the time in the report. Raises `SinkError`."""
+        if not self._sink.wants_reports:
+            return
         self._counts["report"] += 1
         self._publisher.report(report, nanoseconds(report.at_s))
 
     def poses(self, positions: npt.NDArray[np.float64], attitudes: npt.NDArray[np.float64], at_s: float) -> None:
         """Publish the poses of all drones; see `Publisher.poses`. Raises `SinkError`."""
+        if not self._sink.wants_reports:
+            return
         self._counts["pose"] += len(positions)
         self._publisher.poses(positions, attitudes, nanoseconds(at_s))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 
@@ -234,6 +235,15 @@ def test_echo_prints_each_message_with_its_topic_and_type(tmp_path: Path) -> Non
     assert json.loads(result.stdout)["verdict"] == "solution"
     refused = ran("solve", tmp_path / "warehouse", "--ros", "echo:file")
     assert (refused.exit_code, "echo prints messages, and has no place" in refused.stderr) == (1, True)
+
+
+def test_echo_prints_decisions_without_reports_and_poses() -> None:
+    words = ("--protocol", "abt", "--runtime", "simulator", "--situation", "flight", "--fail", "Nose@3", "--ros", "echo")
+    result = ran("solve", HANGAR, *words)
+    lines = [line for line in result.stderr.splitlines() if line.startswith("/")]
+    assert lines
+    assert not [line for line in lines if re.search(r"/(pose|battery|out_of_order) ", line)]
+    assert re.search(r"^echo: \d+ waypoints, \d landings?$", result.stderr, re.MULTILINE)
 
 
 def test_the_status_of_a_team_with_costs_has_the_cost() -> None:
