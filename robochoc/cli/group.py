@@ -47,7 +47,7 @@ COMMANDS = {
     "serve": ("serve", "Solve teams on request: a ROS 2 service."),
     "sniff": ("sniff", "Show and explain the messages of a run on a page."),
     "solve": ("solve", "Solve teams, each robot in its own process."),
-    "validate": ("validate", "Check teams and print all errors with file and line."),
+    "validate": ("validate", "Check teams and print errors with file and line."),
 }
 """Each command: the name of its function in the module with the same name, and its line in `robochoc --help`.
 

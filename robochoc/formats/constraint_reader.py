@@ -57,8 +57,9 @@ def read_private(element: etree._Element, context: ConstraintContext) -> Constra
     model = attribute(element, "model")
     refuse_private_part(ConstraintModel(model) if model else None)
     constraint = _read(element, context, ConstraintModel(model) if model else None)
-    if constraint:
-        check_private(constraint, context.own)
+    checked = constraint or _scope_only(element)
+    if checked.variables:
+        check_private(checked, context.own)
     return constraint
 
 
@@ -66,9 +67,16 @@ def read_shared(element: etree._Element, context: ConstraintContext) -> Constrai
     """Return a constraint over variables of this robot and its neighbours. For None and errors see `_read`."""
     model = attribute(element, "model")
     constraint = _read(element, context, ConstraintModel(model) if model else context.model)
-    if constraint:
-        check_shared(constraint, context.own)
+    checked = constraint or _scope_only(element)
+    if checked.variables:
+        check_shared(checked, context.own)
     return constraint
+
+
+def _scope_only(element: etree._Element) -> Constraint:
+    """Return a constraint for the checks of its scope, if its definition is invalid."""
+    scope = _terms(element.get("scope") or "")
+    return Constraint(attribute(element, "name"), PREDEFINED["eq"], scope, scope)
 
 
 def _read(element: etree._Element, context: ConstraintContext, model: ConstraintModel | None) -> Constraint | None:

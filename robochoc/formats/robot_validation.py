@@ -174,17 +174,19 @@ class RobotValidator:
     def _private(self, constraint: Constraint, own: Collection[str], robot: Robot, places: ObjectLocations) -> None:
         with self._at(places.constraint, constraint):
             refuse_private_part(constraint.model)
-            if self._check_constraint(constraint, robot, places):
+            self._check_constraint(constraint, robot, places)
+            if constraint.variables:
                 check_private(constraint, own)
 
     def _shared(self, constraint: Constraint, own: Collection[str], robot: Robot, places: ObjectLocations) -> None:
         with self._at(places.constraint, constraint):
             refuse_no_model(constraint.model)
-            if self._check_constraint(constraint, robot, places):
+            self._check_constraint(constraint, robot, places)
+            if constraint.variables:
                 check_shared(constraint, own)
 
-    def _check_constraint(self, constraint: Constraint, robot: Robot, places: ObjectLocations) -> bool:
-        """Check a constraint. Return whether its definition is valid. Raises `MistakeError`."""
+    def _check_constraint(self, constraint: Constraint, robot: Robot, places: ObjectLocations) -> None:
+        """Check a constraint; only the scope is checked further if its definition is invalid. Raises `MistakeError`."""
         definition = constraint.definition
         check_word(constraint.name)
         check_terms(constraint.scope)
@@ -197,7 +199,6 @@ class RobotValidator:
         if is_valid:
             check_constraint(constraint, robot.kind, robot.costs)
             check_argument_types(constraint, symbolic_by_variable([robot]))
-        return is_valid
 
     def _check_defined(self, thing: Defined, places: ObjectLocations) -> bool:
         """Return whether a domain or a definition is valid. Its error is reported for the first robot that uses it."""

@@ -238,8 +238,8 @@ def test_echo_prints_each_message_with_its_topic_and_type(tmp_path: Path) -> Non
 
 
 def test_echo_prints_decisions_without_reports_and_poses() -> None:
-    words = ("--protocol", "abt", "--runtime", "simulator", "--situation", "flight", "--fail", "Nose@3", "--ros", "echo")
-    result = ran("solve", HANGAR, *words)
+    words = ("--runtime", "simulator", "--situation", "flight", "--fail", "Nose@3", "--ros", "echo")
+    result = ran("solve", HANGAR, "--protocol", "abt", *words)
     lines = [line for line in result.stderr.splitlines() if line.startswith("/")]
     assert lines
     assert not [line for line in lines if re.search(r"/(pose|battery|out_of_order) ", line)]

@@ -1,4 +1,4 @@
-"""`robochoc validate`: checks teams, and prints all errors in all files."""
+"""`robochoc validate`: checks teams, and prints the errors in all files."""
 
 from __future__ import annotations
 
@@ -34,9 +34,10 @@ def validate(
 ) -> None:
     """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
-    The command checks the XML, the schema, the meaning of each file, and the team as a whole, and prints all errors of
-    all files, with file and line. The exit status is 1 if there are errors. Files of other tools are read as by
-    'robochoc import'.
+    The command checks the XML, the schema, the meaning of each file, and then the team as a whole, and prints the
+    errors of all files, with file and line. A file with errors is not compared with the other robots' files, so check
+    again after corrections. The exit status is 1 if there are errors. Files of other tools are read as by 'robochoc
+    import'.
     """
     from robochoc.formats import InvalidInputError, find_teams
 
