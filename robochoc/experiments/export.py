@@ -24,10 +24,16 @@ _LATEX = str.maketrans(
 )
 
 
-def export_results(results: Results, form: str) -> bytes:
+def export_results(results: Results, form: str, over: str | None = None) -> bytes:
     """Return the results of a study in the format `csv`, `json`, `latex`, `parquet` or `summary`.
 
+    Args:
+        results: The results.
+        form: The format.
+        over: The parameter of the tables `latex` and `summary`. None: the study's parameter, or the default.
+
     Raises:
+        NoSuchColumnError: if the results have no such parameter.
         UnsupportedError: if the package that writes the format is not installed.
     """
     rows = results.rows
@@ -38,29 +44,33 @@ def export_results(results: Results, form: str) -> bytes:
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
             wishes = report_settings(results.text)
-            over, shown = summary.prepare(rows, wishes.over, wishes.names)[:2] if rows else ("", rows)
-            return latex_table(shown, results.title, over, wishes.metrics).encode()
+            axis, shown = summary.prepare(rows, over or wishes.over, wishes.names)[:2] if rows else ("", rows)
+            return latex_table(shown, results.title, axis, wishes.metrics).encode()
         case "summary":
-            return _csv(summary_rows(results)).encode()
+            return _csv(summary_rows(results, over)).encode()
         case _:
             return _parquet(rows)
 
 
-def summary_rows(results: Results) -> list[dict[str, Any]]:
+def summary_rows(results: Results, over: str | None = None) -> list[dict[str, Any]]:
     """Return a row for each part, value of the parameter, metric and way to run.
 
-    A row has the number of runs with a value, of values that a limit ended, the median and the mean, each with its 95 %
-    confidence interval. Without a value these are None.
+    If the values are single problems, further rows with the value `all` summarise them. A row has the number of runs
+    with a value, of values that a limit ended, the median and the mean, each with its 95 % confidence interval. Without
+    a value these are None.
     """
     if not results.rows:
         return []
     wishes = report_settings(results.text)
-    over, rows, _ = summary.prepare(results.rows, wishes.over, wishes.names)
+    axis, rows, _ = summary.prepare(results.rows, over or wishes.over, wishes.names)
     found = []
     for part, of_part in summary.parts(rows, wishes.each):
-        for metric in summary.metrics_to_show(of_part, wishes.metrics, over):
-            for (value, way), sample in summary.samples(of_part, metric, over).items():
-                place = {over: value, **({"part": part} if part else {}), "metric": metric, "label": way}
+        for metric in summary.metrics_to_show(of_part, wishes.metrics, axis):
+            samples = summary.samples(of_part, metric, axis)
+            if axis in summary.SINGLE and len(summary.values_of(of_part, axis)) > 1:
+                samples |= {("all", way): sample for way, sample in summary.samples_of_all(of_part, metric).items()}
+            for (value, way), sample in samples.items():
+                place = {axis: value, **({"part": part} if part else {}), "metric": metric, "label": way}
                 found.append(place | _statistics_of(sample))
     return found
 

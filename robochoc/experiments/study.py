@@ -30,6 +30,7 @@ from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
 from robochoc.formats.diagnostics import MistakeError, invalid_input, shortened, suggestion
 from robochoc.formats.toml import convert, toml_tables
 from robochoc.run.options import Runtime
+from robochoc.system.suggestions import did_you_mean
 
 LARGEST_FILE = 2**20
 """The maximum size of a study's file, in bytes."""
@@ -199,12 +200,14 @@ def _check_report_settings(
     wishes: ReportSettings, problems: Sequence[ProblemSpec], setups: Sequence[Setup], place: Place
 ) -> None:
     """Raise `InvalidInputError` for a parameter or metric that the results will not have, before the runs start."""
-    of_problems = {name for one in problems for name in (*one.parameters, *(f"scenario_{n}" for n in one.scenario))}
-    of_problems |= {f"problem_{name}" for name in of_problems} | {"problems", "team"}
-    of_runs = {*OF_RUNS, *(name for one in setups for name in one.settings)}
-    for key, name, known in (("over", wishes.over, of_problems | of_runs), ("each", wishes.each, of_problems)):
-        if name is not None and name not in known:
-            raise place.mistake(key, f"there is no parameter {shortened(name)}", suggestion(name, known, "parameters"))
+    parameters = {name for one in problems for name in (*one.parameters, *(f"scenario_{n}" for n in one.scenario))}
+    same = {f"problem_{name}" for name in parameters}
+    of_problems = [*sorted(parameters), "problems", "team"]
+    of_runs = [*OF_RUNS, *sorted({name for one in setups for name in one.settings} - {*OF_RUNS})]
+    for key, name, known in (("over", wishes.over, [*of_problems, *of_runs]), ("each", wishes.each, of_problems)):
+        if name is not None and name not in known and name not in same:
+            hint = did_you_mean(name, known, f"the parameters are {', '.join(known)}")
+            raise place.mistake(key, f"there is no parameter {shortened(name)}", hint)
     for name in wishes.metrics:
         if name not in METRICS:
             raise place.mistake(

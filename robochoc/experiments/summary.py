@@ -97,7 +97,8 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
     Args:
         rows: The results.
         wanted: The requested name. None: the first parameter, except seeds, that all problems have and that has several
-            values; if there is none, the problems, or the kinds of problems if there are many problems.
+            values; if there is none, the problems, or the kinds of problems if there are many problems or only seeds
+            differ.
 
     Raises:
         NoSuchColumnError: if the results have no such parameter.
@@ -114,7 +115,11 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
         several = len({row.get(name) for row in rows})
         if name not in SEEDS and all(name in row for row in rows) and 1 < several <= _MOST.get(name, several):
             return name
-    if len({row["digest"] for row in rows}) == 1:
+    digests = len({row["digest"] for row in rows})
+    seeded = any(name in SEEDS for name in of_problems)
+    if digests > 1 and seeded and len({_setting(row, of_problems) for row in rows}) == 1:
+        return "problems"
+    if digests == 1:
         return next((name for name in OF_RUNS if _parts_labels(rows, name)), "team")
     return "team" if len({row["team"] for row in rows}) <= MOST_TEAMS else "problems"
 
@@ -269,6 +274,11 @@ def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]
     return {key: sample(group, metric) for key, group in groups.items()}
 
 
+def samples_of_all(rows: Rows, metric: str) -> dict[str, Sample]:
+    """Return the sample of all problems for each way to run."""
+    return {way: sample([row for row in rows if row["label"] == way], metric) for way in labels(rows)}
+
+
 def sample(rows: Rows, metric: str) -> Sample:
     """Return the sample of a metric's values in `rows`."""
     counted = [row for row in rows if _counts(row, metric)]
@@ -296,7 +306,7 @@ def medians(rows: Rows, metric: str, over: str) -> Table:
     ways = labels(rows)
     lines = [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in values_of(rows, over)]
     if over in SINGLE and len(lines) > 1:
-        lines.append(["all", *(cell(sample([row for row in rows if row["label"] == way], metric)) for way in ways)])
+        lines.append(["all", *map(cell, samples_of_all(rows, metric).values())])
     return [over, *ways], lines
 
 

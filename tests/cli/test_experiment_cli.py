@@ -110,6 +110,11 @@ def test_export(tmp_path: Path) -> None:
     assert latex.count(r"\midrule") == 2 * 4 - 1
     assert latex.rstrip().endswith(r"\end{tabular}")
     assert r"dsa variant=A & dsa variant=B \\" in latex
+    by_team = robochoc_within("experiment", "export", path, "--format", "summary", "--over", "team").stdout
+    of_all = [row for row in csv.DictReader(io.StringIO(by_team)) if (row["team"], row["metric"]) == ("all", "cost")]
+    assert [(row["label"], int(row["runs"])) for row in of_all] == [
+        (label, sum(row["label"] == label for row in rows)) for label in dict.fromkeys(row["label"] for row in rows)
+    ]
     refused = robochoc_within("experiment", "export", path, "--format", "parquet")
     assert (refused.returncode, "name a file with -o" in refused.stderr) == (2, True)
     parquet = pytest.importorskip("pyarrow.parquet")
@@ -234,6 +239,8 @@ def test_mistakes_are_told(tmp_path: Path) -> None:
         for words, status, said in [
             (["run", "nothing.toml"], 1, "nothing.toml: cannot be read"),
             (["show", "nothing.sqlite"], 1, "is not a file (give the file that 'robochoc experiment run' writes)"),
+            (["export", "{}", "--format", "summary", "--over", "tight"], 2, "there is no parameter 'tight'; there are"),
+            (["export", "{}", "--over", "team"], 2, "--over is for --format latex and summary, not for csv"),
             (["show", "{}", "--over", "tight"], 2, "there is no parameter 'tight'; there are agents,"),
             (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
             (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),

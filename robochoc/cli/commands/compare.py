@@ -27,6 +27,7 @@ DEFAULT_SEEDS = "1..10"
 )
 @click.option("--order", metavar="NAME", help="Priority order of the robots, or several, separated by commas.")
 @click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator, arrays, processes.")
+@click.option("--schedule", metavar="NAME", help="Schedule of the simulator: concurrent, one-by-one, cycles, random.")
 @click.option("--channel", metavar="NAME", help="Channel model of the simulator: wlan, wpan, wman, wwan.")
 @click.option(
     "--timeout", type=Number(0, min_open=True), default=30, show_default=True, metavar="SECONDS",

@@ -119,10 +119,16 @@ def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
 @click.option(
     "--format", "form", type=click.Choice([*FORMATS, SUMMARY, JOURNALS]),
     help="csv, json (one line per run), latex (medians), parquet; summary: CSV of medians and means with 95 %"
-    " confidence intervals; journals: a folder with the recorded journals.  [default: by the file's ending, else csv]",
+    " confidence intervals (percentile bootstrap); journals: a folder with the recorded journals.  [default: by the"
+    " file's ending, else csv]",
 )  # fmt: skip
+@click.option(
+    "--over",
+    metavar="PARAMETER",
+    help="Parameter whose values are the rows of latex and summary.  [default: as in show]",
+)
 @invalid_input_fails
-def export(results: Path, output: Path | None, form: str | None) -> None:
+def export(results: Path, output: Path | None, form: str | None, over: str | None) -> None:
     """Write the results as CSV, JSON lines or Parquet with one row per run, or as a table of medians.
 
     \b
@@ -134,17 +140,23 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
     from robochoc.cli.reports.failures import errors_as_failures
     from robochoc.experiments.export import export_results
     from robochoc.experiments.results import read_results
+    from robochoc.experiments.summary import NoSuchColumnError
     from robochoc.system.files import write_atomically
 
     endings = {".jsonl": "json", ".tex": "latex", ".pq": "parquet", **{f".{name}": name for name in FORMATS}}
     form = form or (endings.get(output.suffix) if output else None) or "csv"
     if form == "parquet" and output is None:
         raise click.UsageError("Parquet is a binary format: name a file with -o.")
+    if over is not None and form not in {"latex", SUMMARY}:
+        raise click.UsageError(f"--over is for --format latex and summary, not for {form}.")
     if form == JOURNALS:
         _write_journals(results, output)
         return
     with errors_as_failures(results):
-        content = export_results(read_results(results), form)
+        try:
+            content = export_results(read_results(results), form, over)
+        except NoSuchColumnError as error:
+            raise click.UsageError(f"{error}.") from None
     if output is None:
         click.echo(content, nl=False)
     else:

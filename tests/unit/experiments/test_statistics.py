@@ -56,7 +56,9 @@ def test_what_is_drawn_over() -> None:
     given = [row("a", case, 1, tightness=case / 10) for case in (1, 2)]
     assert summary.parameter_to_draw_over(given) == "tightness"
     assert summary.parameter_to_draw_over(given, "problem_seed") == "problem_seed"
-    assert summary.parameter_to_draw_over(rows(a=[1, 2])) == "team"
+    assert summary.parameter_to_draw_over(rows(a=[1, 2])) == "problems"  # only seeds differ
+    unseeded = [{name: value for name, value in one.items() if name != "problem_seed"} for one in rows(a=[1, 2])]
+    assert summary.parameter_to_draw_over(unseeded) == "team"
     assert summary.parameter_to_draw_over(rows(a=range(13))) == "problems"
     mixed = [{"n": 3, **row("a", 1, 1)}, {"n": 4, **row("a", 2, 1)}, row("a", 3, 1)]
     assert summary.parameter_to_draw_over(mixed) == "team"
