@@ -307,7 +307,8 @@ class Host:
         found = []
         last: Message | None = None
         content, kind = b"", ""
-        cache = self.message_cache
+        fields: dict[str, object] = {}
+        cache, observer = self.message_cache, self._observer
         for (receiver, message), clock, checks in zip(
             self.protocol.outbox, self._stamps, self.checks_at_send, strict=True
         ):
@@ -315,25 +316,26 @@ class Host:
                 last, kind = message, type(message).__name__
                 content = cache.content(message) if cache is not None and message.shareable else encode(message)
                 self.largest = max(self.largest, len(content))
+                if observer:
+                    fields = msgspec.structs.asdict(message)
             self.sent[kind] = self.sent.get(kind, 0) + 1
             self.bytes += len(content)
             envelope = Envelope(self.name, receiver, content, clock)
-            if self._observer:
-                self._observer(self._sent(envelope, message, checks))
+            if observer:
+                observer(
+                    Sent(
+                        t=self._time(checks),
+                        sender=self.name,
+                        receiver=receiver,
+                        type=kind,
+                        content=fields,
+                        bytes=len(content),
+                        clock=clock,
+                    )
+                )
             found.append(envelope)
         self._forget_said()
         return found
-
-    def _sent(self, envelope: Envelope, message: Message, checks: int) -> Sent:
-        return Sent(
-            t=self._time(checks),
-            sender=self.name,
-            receiver=envelope.receiver,
-            type=type(message).__name__,
-            content=msgspec.structs.asdict(message),
-            bytes=len(envelope.content),
-            clock=envelope.clock,
-        )
 
     def _tick(self) -> None:
         """Advance the clock by one for each new check, and stamp the messages written since the last call."""

@@ -105,13 +105,19 @@ class _Columns:
         partners, says, words, shapes = self.partners.append, self.says.append, self.words, self.shapes
         values, sizes = self.values.extend, self.sizes.append
         checked: dict[str, int] = {}
+        checks, totals = self.checks.append, self.checked.append
+        last: dict[str, Any] | None = None
+        kind, shape = "", 0
         for entry in entries:
             if type(entry) is Sent:
                 kinds(SENT)
                 actors(words[entry.sender])
                 partners(words[entry.receiver])
                 content = entry.content
-                says(shapes[entry.type, *content])
+                if content is not last or entry.type != kind:  # a message to several robots has one content
+                    last, kind = content, entry.type
+                    shape = shapes[kind, *content]
+                says(shape)
                 values(content.values())
                 sizes(entry.bytes)
             elif type(entry) is Received:
@@ -121,10 +127,11 @@ class _Columns:
                 says(shapes[entry.type,])
             elif type(entry) is Settled:
                 kinds(SETTLED)
-                actors(words[entry.robot])
-                self.checks.append(entry.checks - checked.get(entry.robot, 0))
-                checked[entry.robot] = entry.checks
-                self.checked.append(entry.checks)
+                robot, done = entry.robot, entry.checks
+                actors(words[robot])
+                checks(done - checked.get(robot, 0))
+                checked[robot] = done
+                totals(done)
             elif type(entry) is Decided:
                 kinds(DECIDED)
                 actors(words[entry.robot])
@@ -180,9 +187,9 @@ def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000
     return 0, doubles.tobytes()
 
 
-def _fit_in_steps(times: Iterable[float], scale: int) -> bool:
+def _fit_in_steps(times: Sequence[float], scale: int) -> bool:
     """Return whether the differences between `times`, in units of 1 / `scale`, fit into 64 bits."""
-    return all(abs(t) * scale < _LARGEST // 2 for t in times)
+    return max(map(abs, times), default=0) * scale < _LARGEST // 2
 
 
 def _steps(numbers: Iterable[int]) -> list[int]:

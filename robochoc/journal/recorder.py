@@ -30,6 +30,8 @@ ENTRIES_PER_BLOCK_MAX = 8192
 SPAN_S = 0.25
 """Seconds after which the next event closes a block. A killed run loses at most the events of this time."""
 
+_now = time.monotonic
+
 BlockSink = Callable[[bytes], object]
 """A function that receives complete blocks, the first with the beginning of the file. It may raise `OSError`."""
 
@@ -65,10 +67,10 @@ class JournalRecorder:
 
     def __call__(self, event: AnyEvent) -> None:
         """Record an event. `Began` starts a run; times can be compared only within a run."""
-        with self._lock:
-            self._pending.append(event)
-            if len(self._pending) >= ENTRIES_PER_BLOCK_MAX or time.monotonic() >= self._due:
-                self._close_block()
+        pending = self._pending
+        pending.append(event)
+        if len(pending) >= ENTRIES_PER_BLOCK_MAX or _now() >= self._due:
+            self.flush()
 
     def flush_if_due(self) -> None:
         """Close the block if it has been open for `SPAN_S`. Must be called at intervals while no events occur."""
@@ -87,7 +89,8 @@ class JournalRecorder:
                 return
             self._close_block()  # also writes blocks that were staged before an interrupt
             if self._cost_events:
-                self._pending, self._cost_events = [*self._improvements(self._cost_events, self._given)], None
+                found = [*self._improvements(self._cost_events, self._given)]
+                self._pending[:0], self._cost_events = found, None
             if self.outcome is not None:
                 self._pending.append(Ended.from_outcome(self.outcome))
             self._close_block()
@@ -118,13 +121,16 @@ class JournalRecorder:
         if not self._pending or self._closed:
             return
         if all(sink.failure for sink in self._sinks):
-            self._pending = []
+            self._pending.clear()
             return
-        lines, cost_events, given = self._with_improvements(self._pending)
+        pending = self._pending.copy()  # other threads may append entries in the meantime
+        count = len(pending)
+        lines, cost_events, given = self._with_improvements(pending)
         blocks, digest = self._packed(lines)
-        due = time.monotonic() + SPAN_S
-        self._pending, self._cost_events, self._given, self._digest, self._staged, self._due = (
-            [], cost_events, given, digest, blocks, due,
+        due = _now() + SPAN_S
+        del self._pending[:count]
+        self._cost_events, self._given, self._digest, self._staged, self._due = (
+            cost_events, given, digest, blocks, due,
         )  # fmt: skip
         self._pass_on()
 
@@ -278,12 +284,17 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
     reader = TeamReader()
     now: Mapping[str, Mapping[str, int]] | None
     decided: dict[str, dict[str, int]] = {}
+    current: dict[str, int] | None = None  # the values in `decided`; None: to be computed
     names: list[str] = []
     several = list(events)
     for event, following in zip(several, [*several[1:], None], strict=True):
         yield event
         match event:
             case Decided():
+                if current is not None and [*decided.get(event.robot, ())] == [*event.assignment]:
+                    current.update(event.assignment)
+                else:
+                    current = None
                 decided[event.robot] = event.assignment
                 objective.change({event.robot: event.assignment})
                 if objective.in_step and isinstance(following, Decided) and following.t == event.t:
@@ -298,10 +309,13 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
                 continue
         if cost < best and now is not None:
             best = cost
-            if now.keys() != set(names):
-                names = sorted(now, key=natural_key)
-            values = {name: value for robot in names for name, value in now[robot].items()}
-            yield Improved(t=event.t, cost=objective.in_user_units(best), assignment=values)
+            values = current if now is decided else None
+            if values is None:
+                if now.keys() != set(names):
+                    names = sorted(now, key=natural_key)
+                values = {name: value for robot in names for name, value in now[robot].items()}
+                current = values if now is decided else current
+            yield Improved(t=event.t, cost=objective.in_user_units(best), assignment=values.copy())
 
 
 def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
