@@ -68,6 +68,8 @@ _BLOCK_OPACITY = 0.85
 _WALL_OPACITY = 0.6
 _BESIDE_UNIT = 3.4
 """The distance from an axis's numbers to its name if it has a unit, in heights of the numbers: such names are wider."""
+_CELL_LINES_MAX = 16
+"""The maximum number of lines along an axis between cells, since lines in large boxes are too faint to be visible."""
 _FLAT = 0.02
 """The height of flat areas on the ground, in cells."""
 
@@ -184,8 +186,9 @@ def _draw_box(meshcat: MeshcatCommands, axes: Sequence[BoxAxis]) -> None:
     """Draw the edges, the back and bottom sides with their grids, and very faintly every cell."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
+    cells = [wall[:: 1 + len(wall) // _CELL_LINES_MAX] for wall in walls]
     parts = {
-        "cells": (walls, 0.5 / max(map(len, walls))),
+        "cells": (cells, 0.5 / max(map(len, cells))),
         "floor": ([*walls[:2], low[2:]], 0.35),
         "side": ([low[:1], *walls[1:]], 0.2),
         "back": ([walls[0], high[1:2], walls[2]], 0.2),

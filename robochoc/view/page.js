@@ -4,15 +4,12 @@ try {
   const element = (id) => document.getElementById(id);
   const playback = JSON.parse(element("playback").textContent);
   const viewer = new MeshCat.Viewer(element("scene"));
-  const dark = matchMedia("(prefers-color-scheme: dark)");
+  viewer.gui.domElement.remove(); // meshcat's own controls, a row for each object
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   const narrow = matchMedia("(max-width: 40rem)");
   // ?driven: a surrounding page has the time line. Then nothing plays by itself, and this page shows no time line.
   const driven = new URLSearchParams(location.search).has("driven");
-  const paintSky = () => {
-    viewer.set_property(["Background"], "top_color", dark.matches ? [0.05, 0.07, 0.1] : [0.8, 0.88, 0.95]);
-    viewer.set_property(["Background"], "bottom_color", dark.matches ? [0.12, 0.15, 0.2] : [0.97, 0.97, 0.95]);
-  };
+  viewer.set_property(["Background"], "visible", false); // the page's own sky is faster
   const free = () => {
     const [caption, controls] = [element("caption"), element("controls")].map((one) => one.getBoundingClientRect());
     const bottom = controls.top;
@@ -32,11 +29,13 @@ try {
   const camera = new Camera(viewer, playback.corners, playback.cell, free, still);
   const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
   const drones = playback.drones.map((drone) => object(drone.path));
+  const swarm = new Swarm(viewer, playback.drones.map((drone) => object(`${drone.path}/body`)));
   const labels = new Labels(viewer, playback.drones.map((drone) => object(`${drone.path}/name`)), object("axes"));
 
   const frame = (now) => {
     player.step(now);
     camera.step(now);
+    swarm.step();
     labels.step(now);
     requestAnimationFrame(frame);
   };
@@ -166,11 +165,9 @@ try {
   addEventListener("click", (event) => { if (event.detail) event.target.closest?.("button, summary")?.blur(); });
   addEventListener("click", (event) => { if (!element("keys").contains(event.target)) element("keys").open = false; });
 
-  dark.addEventListener("change", paintSky);
   addEventListener("resize", fit);
   // A long text of an epoch, or the unfolded facts, cover a part of the scene.
   new ResizeObserver(() => { if (narrow.matches) fit(); }).observe(element("caption"));
-  paintSky();
 
   const commands = element("commands").textContent.trim();
   if (commands) {
@@ -180,7 +177,7 @@ try {
   viewer.set_3d_pane_size();
   fit();
   requestAnimationFrame(frame);
-  globalThis.Playback = { viewer, camera, player, trails, drones, labels };
+  globalThis.Playback = { viewer, camera, player, trails, drones, swarm, labels };
 } catch (error) {
   const trouble = document.getElementById("trouble");
   trouble.append(error.message);

@@ -1,9 +1,10 @@
 "use strict";
 
-// The flown paths of the drones until now: one mesh with a ribbon for each straight piece. The pieces have their times
-// as attributes, so that a trail grows by setting the shader's time.
+// The flown paths of the drones until now: one mesh with a ribbon for each straight piece. The corners of the pieces have
+// their times as attributes, so that a trail grows by setting the shader's time.
 class Trails {
-  static CORNERS = [0, -1, 0, 0, 1, 0, 1, 1, 0, 1, -1, 0];
+  static CORNERS = [[0, -1, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0]];
+  static SIZES = { position: 3, begin: 3, end: 3, tint: 3, span: 2 };
   static WIDTH = 2.5; // pixels
   static VERTEX = `
     attribute vec3 begin, end, tint;
@@ -45,14 +46,15 @@ class Trails {
   // `ways` are the drones' [times, positions, states, colour]; `parent` has the frame of their positions.
   draw(ways, parent) {
     const THREE = MeshCat.THREE;
-    const parts = { begin: [], end: [], tint: [], span: [] };
+    const parts = Object.fromEntries(Object.keys(Trails.SIZES).map((name) => [name, []]));
     for (const way of ways) Trails.add(parts, ...way);
-    const ribbons = new THREE.InstancedBufferGeometry();
-    ribbons.setAttribute("position", new THREE.Float32BufferAttribute(Trails.CORNERS, 3));
-    ribbons.setIndex([0, 1, 2, 0, 2, 3]);
+    const ribbons = new THREE.BufferGeometry();
     for (const [name, values] of Object.entries(parts))
-      ribbons.setAttribute(name, new THREE.InstancedBufferAttribute(new Float32Array(values), name === "span" ? 2 : 3));
-    ribbons.instanceCount = parts.span.length / 2;
+      ribbons.setAttribute(name, new THREE.BufferAttribute(new Float32Array(values), Trails.SIZES[name]));
+    const corners = [];
+    for (let first = 0; first < parts.span.length / 2; first += 4)
+      corners.push(first, first + 1, first + 2, first, first + 2, first + 3);
+    ribbons.setIndex(corners);
     const paint = new THREE.ShaderMaterial({
       uniforms: this.uniforms, vertexShader: Trails.VERTEX, fragmentShader: Trails.FRAGMENT,
       transparent: true, depthWrite: false, side: THREE.DoubleSide,
@@ -80,10 +82,14 @@ class Trails {
         while (paint + 1 < paints.length && paints[paint + 1][0] <= from + 1e-3) paint++;
         const next = paint + 1 < paints.length ? paints[paint + 1][0] : Infinity;
         const upto = Math.min(times[key + 1], next);
-        parts.begin.push(...at(from, key));
-        parts.end.push(...at(upto, key));
-        parts.span.push(from, upto);
-        parts.tint.push(...new MeshCat.THREE.Color(paints[paint][2]).toArray());
+        const [begin, end, tint] = [at(from, key), at(upto, key), new MeshCat.THREE.Color(paints[paint][2]).toArray()];
+        for (const corner of Trails.CORNERS) {
+          parts.position.push(...corner);
+          parts.begin.push(...begin);
+          parts.end.push(...end);
+          parts.tint.push(...tint);
+          parts.span.push(from, upto);
+        }
         from = upto;
       }
     }

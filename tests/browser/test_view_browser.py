@@ -68,6 +68,26 @@ def test_the_drones_move(player: Page) -> None:
     assert (np.abs(begin - end).max(axis=2) > 40).mean() > 0.005
 
 
+DRAWN = """([joined, separate]) => {
+  Playback.swarm.mesh.visible = joined;
+  for (const body of Playback.swarm.bodies) body.children.find((child) => child.isMesh).visible = separate;
+  Playback.viewer.set_dirty();
+}"""
+
+
+def test_joined_drones_look_like_separate_objects(player: Page) -> None:
+    """In the air, with attitudes, and with the colours of rows and of a fallen drone."""
+    player.evaluate("Playback.player.seek(4.2)")
+    joined = picture(player)
+    player.evaluate(DRAWN, [False, True])
+    separate = picture(player)
+    player.evaluate(DRAWN, [False, False])
+    without = picture(player)
+    player.evaluate(DRAWN, [True, False])
+    assert (np.abs(joined - without).max(axis=2) > 20).sum() > 500
+    assert (np.abs(joined - separate).max(axis=2) > 20).sum() < 100
+
+
 def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> None:
     """That of the drone which is nearest, or which is followed."""
 

@@ -1,0 +1,71 @@
+// All drones drawn by one call: one mesh has a copy of the drone's shape for each drone, and a texture has the position,
+// the attitude and the colour of each drone, taken from the scene's objects, which are not drawn themselves.
+// Light is computed for each corner, not for each pixel, which without a graphics card takes most of the time. For the
+// same reason these are not instances, which it draws one by one.
+class Swarm {
+  static TEXELS = 4; // of a drone: three rows of its matrix, and its colour
+
+  // `bodies` are the scene's objects, each of which receives the mesh of a drone as its child.
+  constructor(viewer, bodies) {
+    this.viewer = viewer;
+    this.bodies = bodies;
+    this.mesh = null;
+  }
+
+  // Once a frame, until the scene has all drones.
+  step() {
+    if (this.mesh || !this.bodies.length) return;
+    const parts = this.bodies.map((body) => body.children.find((child) => child.isMesh));
+    if (parts.every((part) => part)) this.join(parts);
+  }
+
+  join(parts) {
+    const THREE = MeshCat.THREE;
+    const count = parts.length;
+    const drone = parts[0].geometry.toNonIndexed(); // each face has its own normal
+    drone.computeVertexNormals();
+    const { position, normal, color } = drone.attributes;
+    const size = position.count;
+    const shape = new THREE.BufferGeometry();
+    for (const [name, { array, itemSize, normalized }] of Object.entries({ position, normal, color })) {
+      const copies = new array.constructor(array.length * count);
+      for (let number = 0; number < count; number++) copies.set(array, number * array.length);
+      shape.setAttribute(name, new THREE.BufferAttribute(copies, itemSize, normalized));
+    }
+    const rows = new Float32Array(size * count);
+    for (let number = 0; number < count; number++) rows.fill((number + 0.5) / count, number * size, (number + 1) * size);
+    shape.setAttribute("row", new THREE.BufferAttribute(rows, 1));
+
+    const states = new Float32Array(4 * Swarm.TEXELS * count);
+    const texture = new THREE.DataTexture(states, Swarm.TEXELS, count, THREE.RGBAFormat, THREE.FloatType);
+    const paint = new THREE.MeshLambertMaterial({ vertexColors: true, side: THREE.DoubleSide });
+    paint.onBeforeCompile = (shader) => {
+      shader.uniforms.states = { value: texture };
+      shader.vertexShader = `attribute float row;
+        uniform sampler2D states;
+        ${shader.vertexShader}`
+        .replace("#include <color_vertex>", `#include <color_vertex>
+          vec4 x = texture2D(states, vec2(0.125, row));
+          vec4 y = texture2D(states, vec2(0.375, row));
+          vec4 z = texture2D(states, vec2(0.625, row));
+          vColor *= texture2D(states, vec2(0.875, row)).rgb;`)
+        .replace("#include <beginnormal_vertex>",
+          "vec3 objectNormal = vec3(dot(x.xyz, normal), dot(y.xyz, normal), dot(z.xyz, normal));")
+        .replace("#include <begin_vertex>", `vec4 here = vec4(position, 1.0);
+          vec3 transformed = vec3(dot(x, here), dot(y, here), dot(z, here));`);
+    };
+    this.mesh = new THREE.Mesh(shape, paint);
+    this.mesh.name = "swarm";
+    this.mesh.frustumCulled = false;
+    this.mesh.updateMatrixWorld = () => {}; // the texture has positions in the frame of the world
+    this.mesh.onBeforeRender = () => {
+      for (const [drone, { matrixWorld: { elements: e }, material: { color } }] of parts.entries())
+        states.set([e[0], e[4], e[8], e[12], e[1], e[5], e[9], e[13], e[2], e[6], e[10], e[14], color.r, color.g, color.b, 1],
+          4 * Swarm.TEXELS * drone);
+      texture.needsUpdate = true;
+    };
+    for (const part of parts) part.visible = false;
+    this.viewer.scene.add(this.mesh);
+    this.viewer.set_dirty();
+  }
+}
