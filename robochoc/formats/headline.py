@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome, Verdict
 
@@ -27,6 +29,8 @@ def describe_outcome(
         case Verdict.UNKNOWN:
             so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.withdrawn_alive else ""
             return f"no verdict, a limit was reached{so_far}"
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.count is not None:
+            return counted_solutions(outcome.count, outcome)
         case Verdict.NO_SOLUTION:
             once_solved = any(epoch.assignment for epoch in outcome.epochs)
             return f"no solution{_left(outcome)}{' in the end' if once_solved else ''}"
@@ -38,6 +42,13 @@ def describe_outcome(
             return f"{_solution(outcome)} for {flying} of {total} {noun}s ({len(outcome.lost)} lost)"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             return f"{_solution(outcome)} for {f'all {total} {noun}s' if total > 1 else f'the {noun}'}{_cost(outcome)}"
+
+
+def counted_solutions(count: int, outcome: Outcome) -> str:
+    """Return the number of solutions or optima as text. The number may be arbitrarily large."""
+    if outcome.verdict == Verdict.SOLUTION:
+        return f"{Decimal(count):,} solution{'s' * (count != 1)}"
+    return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"
 
 
 def _solution(outcome: Outcome) -> str:

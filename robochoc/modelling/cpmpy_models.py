@@ -28,12 +28,13 @@ from robochoc.model.problem import Domain, ProblemKind, Team, Variable
 from robochoc.modelling.cpmpy_terms import COMPARISONS, TRANSLATED, Translation, integer_of, is_variable
 from robochoc.modelling.errors import ModelError, ModelTypeError
 from robochoc.modelling.model import Model
+from robochoc.modelling.numbers import whole_number
 
 if TYPE_CHECKING:
     import cpmpy
 
-Owner = Mapping[str, str] | Callable[[str], str]
-"""The robot of each variable, by the variable's name."""
+Owner = Mapping[Any, str] | Callable[[str], str]
+"""The robot of each variable: a mapping from variables or their names, or a function of a name."""
 
 
 def from_cpmpy(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmpy") -> Model:
@@ -42,7 +43,7 @@ def from_cpmpy(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
     Args:
         model: The model: integer and Boolean variables, constraints, and optionally an objective. The objective is
             split into a cost function for each scope of its terms.
-        owner: The robot of each variable: a mapping from variable names, or a function of a variable name. None: each
+        owner: The robot of each variable: a mapping from variables or their names, or a function of a name. None: each
             variable has its own robot. The robots' priorities follow the order of their first variables.
         name: The name of the team.
 
@@ -86,6 +87,8 @@ def _translated(model: cpmpy.Model, owner: Owner | None, name: str) -> tuple[Tea
     if not (owner is None or callable(owner) or hasattr(owner, "get")):
         hint = "expected a mapping from names of variables to names of robots, or a function of a variable's name"
         raise ModelTypeError(f"owner={owner!r} is not allowed", hint)
+    if isinstance(owner, Mapping):
+        owner = {one.name if is_variable(one) else one: robot for one, robot in owner.items()}
     constraints = toplevel_list(model.constraints)
     has_objective = hasattr(model.objective_, "name")
     own = {one.name: one for one in get_variables([*constraints, *([model.objective_] if has_objective else [])])}
@@ -158,9 +161,19 @@ class _Robots:
 def _owner_of(variable: str, owner: Owner | None) -> str:
     if owner is None:
         return variable
-    robot = owner(variable) if callable(owner) else owner.get(variable)
+    robot: Any  # checked below
+    if callable(owner):
+        try:
+            robot = owner(variable)
+        except (AttributeError, TypeError) as error:
+            hint = "its argument is the name of a variable, a text"
+            raise ModelTypeError(f"owner failed for {variable!r}: {error}", hint) from error
+    else:
+        robot = owner.get(variable)
     if robot is None:
         raise ModelError(f"owner has no robot for the variable {variable!r}", "each variable needs one robot")
+    if not isinstance(robot, str) and whole_number(robot) is None:
+        raise ModelTypeError(f"owner returns {robot!r} for the variable {variable!r}", "expected the name of a robot")
     return str(robot)
 
 

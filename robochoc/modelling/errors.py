@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from types import FrameType
 from typing import NamedTuple
 
 from robochoc.system.errors import RobochocError
@@ -40,8 +41,20 @@ class UnknownNameError(ModelError, KeyError):
 
 
 def calling_line() -> SourceLine:
-    """Return the line that called robochoc: the innermost frame outside the package."""
+    """Return the line that called robochoc: the innermost frame outside of robochoc and CPMpy."""
     frame = sys._getframe(1)  # noqa: SLF001 - `inspect.stack` reads the files of all frames
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
+    while frame.f_back is not None and (frame.f_code.co_filename.startswith(_HERE) or _is_of_cpmpy(frame)):
         frame = frame.f_back
     return SourceLine(frame.f_code.co_filename, frame.f_lineno)
+
+
+def is_called_by_cpmpy() -> bool:
+    """Return whether a function of CPMpy called robochoc, usually because it received a variable of robochoc."""
+    frame: FrameType | None = sys._getframe(1)  # noqa: SLF001 - see `calling_line`
+    while frame is not None and frame.f_code.co_filename.startswith(_HERE):
+        frame = frame.f_back
+    return frame is not None and _is_of_cpmpy(frame)
+
+
+def _is_of_cpmpy(frame: FrameType) -> bool:
+    return str(frame.f_globals.get("__name__")).split(".", 1)[0] == "cpmpy"

@@ -207,7 +207,8 @@ def conflict_of(model: Model, timeout: float | None) -> tuple[ModelConstraint, .
     if model.given is not None:
         if model.imported:
             raise UnsupportedError(
-                "conflict() does not know CPMpy's constraints; call cpmpy.tools.mus(model.constraints) for these"
+                "conflict() does not know CPMpy's constraints; call cpmpy.tools.mus with the constraints of your CPMpy"
+                " model, not of this model"
             )
         raise UnsupportedError(
             "conflict() requires constraints that were added by add(); this model was loaded from files"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Never
 
 from robochoc.formats.names import MAX_NAME, MAX_WEIGHT, RESERVED, is_name
 from robochoc.model.expression import Expression
@@ -92,7 +92,7 @@ class ModelRobot:
             raise UnknownNameError(f"{self.name} has no variable {name!r}", hint)
         return self.variables[name]
 
-    def variable(self, name: str, domain: object, *, qualified: bool = True) -> ModelVariable:
+    def variable(self, name: str, domain: object, *rest: Never, qualified: bool = True) -> ModelVariable:
         """Add a variable: a decision of the robot.
 
         Args:
@@ -100,6 +100,7 @@ class ModelRobot:
             domain: A range, an `Enum`, `bool`, or a list of values of one kind: numbers, texts, tuples, or other
                 hashable values. Numbers support arithmetic; all other values can be compared by `==` and `!=`, and
                 listed in tables.
+            *rest: Any other argument is an error.
             qualified: True if the variable's name in the team begins with the robot's name. False: it is `name`, which
                 must be unique in the team.
 
@@ -110,6 +111,11 @@ class ModelRobot:
             ModelError: if the robot has a variable with this name, or the domain is invalid.
         """
         place = calling_line()
+        if rest:
+            hint = "expected a range, an Enum, or a list of values"
+            if len(rest) == 1 and (high := whole_number(rest[0])) is not None and whole_number(domain) is not None:
+                hint = f"write range({domain}, {high + 1}) for the values from {domain} to {high}"
+            raise ModelTypeError(f"variable() takes one domain, not {', '.join(map(repr, (domain, *rest)))}", hint)
         whole = f"{self.name}.{name}" if qualified else name
         if not is_name(whole) or len(whole) > MAX_NAME:
             raise ModelError(f"invalid variable name {name!r}", "a letter, then letters, digits, '.' and '_'")
@@ -196,7 +202,8 @@ def check_robot(name: object, robots: Mapping[str, ModelRobot], weight: object) 
     if not isinstance(name, str) or not is_name(name) or name == RESERVED or len(name) > MAX_NAME:
         raise ModelError(f"invalid robot name {name!r}", "a letter, then letters, digits, '.' and '_'")
     if name in robots:
-        raise ModelError(f"robot {name} exists already, created at {robots[name].place}", "use another name")
+        hint = "keep the robot that robot() returned, or use another name"
+        raise ModelError(f"robot {name} exists already, created at {robots[name].place}", hint)
     if not 1 <= (whole_number(weight) or 0) <= MAX_WEIGHT:
         raise ModelTypeError(f"invalid weight {weight!r}", f"expected an integer from 1 to {MAX_WEIGHT:,}")
     return name

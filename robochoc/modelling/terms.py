@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import NamedTuple, NoReturn
 
 from robochoc.modelling.codes import BOOLEAN, NUMBER, DomainCodes, ValueKind, kind_of
-from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
+from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine, is_called_by_cpmpy
 from robochoc.modelling.numbers import Exact, exact, is_number, is_truth, shown
 from robochoc.modelling.operators import OPERATORS, PARTIAL, UndefinedTermError
 from robochoc.system.suggestions import did_you_mean
@@ -175,6 +175,7 @@ class Term:
         return Operation("not", term)
 
     def __bool__(self) -> NoReturn:
+        self._refuse_cpmpy()
         raise ModelTypeError(
             f"{self!r} has no truth value before the problem is solved",
             "write & | ~ for and, or, not; .implies() for if; .is_in() for in; (1 < x) & (x < 3) for 1 < x < 3;"
@@ -188,7 +189,14 @@ class Term:
         )
 
     def __iter__(self) -> NoReturn:
+        self._refuse_cpmpy()
         raise ModelTypeError(f"{self!r} is one term, not a list of terms", "put it in a list")
+
+    def _refuse_cpmpy(self) -> None:
+        """Raise `ModelTypeError` if a function of CPMpy received this term."""
+        if is_called_by_cpmpy():
+            hint = "use robochoc.all_different, minimum, maximum, element, all_of, any_of"
+            raise ModelTypeError(f"a function of CPMpy cannot use {self!r}, a term of robochoc", hint)
 
     def __deepcopy__(self, memo: dict[int, object]) -> Term:
         """Return a copy. The deepest subterms are copied first, since recursion could exceed Python's limit."""

@@ -129,7 +129,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case Verdict.UNKNOWN:
             return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}{_so_far(team, outcome)}"
         case _ if outcome.count is not None:
-            return _counted(outcome.count, outcome)
+            return headline
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.withdrawn_alive:
             unfinished = f"; {outcome.reason}" * _is_unfinished(outcome)
             proof = f"{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
@@ -147,13 +147,6 @@ def _verdict(team: Team, outcome: Outcome) -> str:
 def _is_unfinished(outcome: Outcome) -> bool:
     """Return whether the run stopped at a checked solution because a message was lost."""
     return outcome.verified and outcome.reason is not None and outcome.metrics.lost_messages > 0
-
-
-def _counted(count: int, outcome: Outcome) -> str:
-    """Return the number of solutions or optima as text. The number may be arbitrarily large."""
-    if outcome.verdict == Verdict.SOLUTION:
-        return f"{Decimal(count):,} solution{'s' * (count != 1)}"
-    return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"
 
 
 def _confirmed(outcome: Outcome) -> str:

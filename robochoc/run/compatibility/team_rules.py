@@ -133,7 +133,7 @@ TEAM_RULES = (
     TeamRule(
         lambda c: c.options.count and c.has_costs and not c.is_distributed,
         "{team} has costs (DCOP), so every assignment that satisfies the hard constraints is a solution",
-        "add --protocol count-dpop, which counts optima",
+        "add --protocol count-dpop instead of central: it counts optima",
     ),
     TeamRule(
         lambda c: c.is_distributed and (c.traits.costs or c.minimum_withdrawal) and c.max_total >= LARGEST,

@@ -154,6 +154,16 @@ def test_random_models_have_the_same_optimum(number: int) -> None:
         assert solved(cpmpy_team(model)) == by_hand(model, given), (seed, str(model))
 
 
+def test_owners_by_variables_and_terms_in_functions_of_cpmpy() -> None:
+    x = cp.intvar(1, 3, shape=3, name="x")
+    model = cp.Model(cp.AllDifferent(x))
+    assert cpmpy_team(model, {x[0]: "a", x[1]: "b", x[2]: "a"}).owner == {"x_0": "a", "x_2": "a", "x_1": "b"}
+    ours = [robochoc.Model().robot(name).variable("x", range(3)) for name in "ab"]
+    for call in (cp.AllDifferent, cp.max):
+        with pytest.raises(robochoc.ModelError, match=r"test_cpmpy_models.py:\d+: a function of CPMpy .*all_different"):
+            call(ours)
+
+
 def test_owners_names_and_kinds() -> None:
     x = cp.intvar(1, 3, shape=(2, 2), name="grid")
     model = cp.Model([cp.AllDifferent(x[0]), x[1, 0] > x[0, 1]], maximize=cp.sum(x))
@@ -167,6 +177,10 @@ def test_owners_names_and_kinds() -> None:
     for owner in ({"grid[0,0]": "r"}, lambda _: None):
         with pytest.raises(robochoc.ModelError, match="owner has no robot"):
             cpmpy_team(model, owner)  # type: ignore[arg-type] # wrong on purpose
+    with pytest.raises(robochoc.ModelError, match=r"owner failed for .*the name of a variable, a text"):
+        cpmpy_team(model, lambda variable: variable.name)
+    with pytest.raises(robochoc.ModelError, match="owner returns <built-in method upper"):
+        cpmpy_team(model, lambda variable: variable.upper)
     with pytest.raises(robochoc.ModelError, match="owner='r' is not allowed"):
         cpmpy_team(model, "r")  # type: ignore[arg-type] # wrong on purpose
 

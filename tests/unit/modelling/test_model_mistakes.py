@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import fields
 from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -138,6 +139,28 @@ def test_a_mistake_is_told_with_its_line(mistake: Callable[[Made], object], says
     assert Path(file).name == Path(__file__).name
     assert int(rest.partition(":")[0]) > 0
     assert "\n" not in str(refused.value)
+
+
+def test_bounds_instead_of_a_domain_and_a_robot_that_exists() -> None:
+    model = robochoc.Model()
+    robot = model.robot("r")
+    variable: Any = robot.variable
+    with pytest.raises(ModelTypeError, match=r"one domain, not 0, 3 \(write range\(0, 4\)"):
+        variable("x", 0, 3)
+    with pytest.raises(ModelTypeError, match=r"one domain, not \[1\], 3 \(expected a range"):
+        variable("x", [1], 3)
+    with pytest.raises(robochoc.ModelError, match=r"robot r exists already.*keep the robot that robot\(\) returned"):
+        model.robot("r")
+
+
+def test_counts_are_in_the_text_of_a_solution() -> None:
+    model = robochoc.Model()
+    x = model.robot("r").variable("x", range(1000))
+    assert "1,000 solutions" in repr(model.solve("central", count=True))
+    model.minimize(x // 500)
+    with pytest.raises(robochoc.UnsupportedError, match="count-dpop' instead of central"):
+        model.solve("central", count=True)
+    assert "500 optima of cost 0" in repr(model.solve("count-dpop", count=True))
 
 
 def test_mistakes_have_the_type_that_python_gives_such_ones() -> None:
