@@ -71,6 +71,8 @@ def disagreements(members: TeamMembers) -> Iterator[Diagnostic]:
 
 def cycles(members: TeamMembers) -> Iterator[Diagnostic]:
     """Yield cycles of parents. No two cycles have a common link."""
+    if members.priority is not None:
+        return
     parents = {name: set(agreed) for name, agreed in members.agreed.items()}
     while True:
         try:

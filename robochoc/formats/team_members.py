@@ -93,6 +93,14 @@ class TeamMembers:
             for robot in self.robots
         }
 
+    @cached_property
+    def priority(self) -> tuple[str, ...] | None:
+        """The priority order that follows from the links; None if they form a cycle."""
+        try:
+            return priority_order(self.agreed)
+        except CycleError:
+            return None
+
     def has_all_parents(self, name: str) -> bool:
         """Return whether every parent of `name` is valid and lists it as a child."""
         return len(self.agreed[name]) == len(self.files[name].robot.parents)
@@ -114,10 +122,9 @@ class TeamMembers:
         """
         if self.broken or not all(self.has_all_parents(name) for name in self.files):
             return ()
-        try:
-            orders = {priority_order(self.agreed), self.order or priority_order(self.agreed)}
-        except CycleError:
+        if self.priority is None:
             return ()
+        orders = {self.priority, self.order or self.priority}
         return tuple({name: place for place, name in enumerate(order)} for order in orders)
 
     @cached_property

@@ -106,7 +106,7 @@ def _in_one_unit(folder: Path, files: dict[str, RobotFile], found: list[Diagnost
 
 
 def _assembled(folder: Path, members: TeamMembers) -> Team:
-    order = priority_order(members.agreed)
+    order = members.priority or priority_order(members.agreed)
     return Team(encodable(folder.resolve().name), tuple(_with_implied_variables(members, name) for name in order))
 
 

@@ -14,6 +14,7 @@ import weakref
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from operator import itemgetter
 
 from robochoc.model.expression import UndefinedValueError
@@ -236,7 +237,14 @@ def _body(definition: Predicate | Function) -> Closure:
 def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], tuple[int, ...]]:
     """Return a function that selects the arguments of the definition of `constraint` from values of `names`."""
     place = {name: index for index, name in enumerate(names)}
-    terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
+    return _selector(
+        tuple([(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters])
+    )
+
+
+@lru_cache(maxsize=1024)
+def _selector(terms: tuple[tuple[int | None, int], ...]) -> Callable[[Sequence[int]], tuple[int, ...]]:
+    """Return a function that selects values by index, and adds constants where the index is None."""
     places = [index for index, _ in terms if index is not None]
     if len(places) == len(terms) > 1:
         return itemgetter(*places)

@@ -40,7 +40,12 @@ def team_network(team: Team) -> tuple[Network, Codes]:
     charges: list[CodeTable] = []
     impossible = False
     together = [one.variables for one in soft]
-    for part in components(team.variables.values(), team.constraints(), together, may_split=True):
+    parts = components(team.variables.values(), team.constraints(), together, may_split=True)
+    first = {name: part.names[0] for part in parts for name in part.names}
+    paid_in: dict[str, list[Constraint]] = {part.names[0]: [] for part in parts}
+    for constraint in soft:
+        paid_in[first[constraint.variables[0]]].append(constraint)
+    for part in parts:
         places = [place.setdefault(name, len(place)) for name in part.names]
         network = with_cliques(part.network, lambda _: None)
         for name, codes in zip(part.names, network.domains, strict=True):
@@ -49,8 +54,7 @@ def team_network(team: Team) -> tuple[Network, Codes]:
         tables += [_over_values(table, part, places) for table in network.tables]
         different += [tuple([places[member] for member in scope]) for scope in network.different]
         if not part.network.impossible:
-            known = set(part.names)
-            charges += _charges(part, places, [one for one in soft if one.variables[0] in known])
+            charges += _charges(part, places, paid_in[part.names[0]])
     paid = _cost_domains(team, charges)
     costs = tuple(range(len(domains), len(domains) + len(paid)))
     tables += [replace(table, scope=(*table.scope, cost)) for table, cost in zip(charges, costs, strict=False)]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.model.absence import may_count_when_absent, restated
@@ -130,10 +130,31 @@ def _priced(part: Component, soft: Iterable[Constraint]) -> WeightedComponent:
 
 
 def costs_by_scope(part: Component, network: Network, soft: Iterable[Constraint]) -> dict[Codes, CostRows]:
-    """Return the costs of `soft` constraints on variables in `part`, by scope, for the codes in `network`."""
+    """Return the costs of `soft` constraints on variables in `part`, by scope, for the codes in `network`.
+
+    Scopes with equal constraints and domains share one object.
+    """
     together = _by_scope(part, soft)
     _join_unary(together)
-    return {scope: _prices(part, network, scope, held) for scope, held in together.items()}
+    known: dict[Hashable, CostRows] = {}
+    found: dict[Codes, CostRows] = {}
+    for scope, held in together.items():
+        place = {part.names[index]: number for number, index in enumerate(scope)}
+        alike = tuple(
+            [
+                (
+                    id(one.definition),
+                    one.cost,
+                    tuple([place[t] if isinstance(t, str) else (t,) for t in one.parameters]),
+                )
+                for one in held
+            ]
+        )
+        key = alike, tuple([network.domains[index] for index in scope])
+        if key not in known:
+            known[key] = _prices(part, network, scope, held)
+        found[scope] = known[key]
+    return found
 
 
 def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[Constraint]]:
