@@ -1,8 +1,8 @@
-"""The Authority: a small certification authority, and the registry of names that may take part.
+"""The Authority: a small certification authority, and the registry of the names that may participate.
 
 A person enrols a name and carries the token to the robot. The robot creates a key, and redeems the token once. The
 Authority signs a certificate, which is valid for a day and is renewed before it expires. A revocation is recorded until
-the certificate would have expired. Anyone who has `ca.key` of the folder can act as the Authority.
+the certificate would have expired. Anyone who has the file `ca.key` in the folder can act as the Authority.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class NotGrantedError(RobochocError):
 
 
 class Authority:
-    """The Authority in `folder`, constructed by `create` and `open`.
+    """The Authority in `folder`. It is constructed by `create` or `open`.
 
     Several threads and processes may use the same folder at once.
 
@@ -217,11 +217,11 @@ class Authority:
     def renew(self, request: bytes, current: Certificate, origin: str = "") -> bytes:
         """Return a new certificate (PEM) for the holder of `current`, with the key in `request` (PKCS 10, PEM).
 
-        The caller has verified by TLS that the request comes from the holder of the key in `current`. The current
-        certificate stays in force until it expires. `origin` is the origin of the request, for the observer.
+        The caller must have verified by TLS that the request comes from the holder of the key in `current`. The current
+        certificate remains valid until it expires. `origin` is the origin of the request, for the observer.
 
         Raises:
-            NotGrantedError: `current` is not in force, or the request has another name.
+            NotGrantedError: `current` is not valid, or the request contains another name.
         """
         what = "renew a certificate"
         with self._reported_refusals(what, request, origin) as (name, holder), self._registry.change() as members:
@@ -290,7 +290,7 @@ class Authority:
         return not any(one.serial == serial for member in members.values() for one in member.certificates)
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
-        """Return the sorted names that have a certificate in force now. See `Admission.names`."""
+        """Return the names that currently have a valid certificate, sorted. See `Admission.names`."""
         now = self.clock()
         return tuple(
             member.name

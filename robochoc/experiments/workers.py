@@ -31,7 +31,8 @@ _CHUNK = 1 << 16
 class LocalWorkers:
     """Processes on this machine. Each has one bundle of tasks at a time, whose tasks are runs on the same problem.
 
-    If a worker dies or does not finish in time, its current task is lost; other workers continue with the rest.
+    If a worker dies or does not finish in time, its current task is lost, and other workers continue with its other
+    tasks.
     """
 
     def __init__(self, count: int, memory_mb: int | None = None) -> None:

@@ -3,8 +3,9 @@
 Draw n (1, 2, ...) is a hash of key + n * step, modulo 2**64: SplitMix64 (Steele, Lea, Flood: "Fast splittable
 pseudorandom number generators", OOPSLA 2014), with Stafford's 13th variant of its mixing function. Key and step are two
 halves of a BLAKE2b digest of seed and name, so similar names have independent streams. A robot's n-th number depends on
-nothing else: not on the runtime, nor on other robots' draws. Plain Python computes a number from two words of state in
-a third of a microsecond; numpy computes the same ones for all robots at once (`communication/arrays/cycle_run.py`).
+nothing else, in particular neither on the runtime nor on other robots' draws. Plain Python computes a number from two
+words of state in a third of a microsecond; numpy computes the same numbers for all robots at once
+(`communication/arrays/cycle_run.py`).
 
 Secrets must not depend on this generator: see `key_stream.py`.
 """

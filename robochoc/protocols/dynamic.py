@@ -1,4 +1,4 @@
-"""The base of protocols that continue when the problem changes.
+"""The base class of protocols that continue when the problem changes.
 
 It is separate from `protocol.py`, which is compiled: such a protocol has two base classes, and mypyc allows only one.
 """
@@ -22,7 +22,7 @@ class DynamicProtocol(Protocol):
 
     @abstractmethod
     def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """Adopt the changed problem, and drop everything that depends on anything `invalidated`. Send nothing.
+        """Adopt the changed problem, and drop everything that depends on `invalidated` knowledge. Send no messages.
 
         No robot searches in the meantime. A verdict that is still valid after the changes is kept, and ends the epoch
         at once.
@@ -33,5 +33,5 @@ class DynamicProtocol(Protocol):
         """Continue the search; called before any message is received.
 
         Args:
-            lossless: No message of the previous epoch was lost.
+            lossless: True if no message of the previous epoch was lost.
         """

@@ -1,7 +1,8 @@
-"""A robot's knowledge about the search besides its own value, for the collected result only, not for other robots.
+"""A robot's knowledge about the search, apart from its own value. It is used in the result, and not sent to robots.
 
-A protocol that minimises may be queried before it ends. Each protocol reports what it has: the cheapest assignment so
-far, a lower bound, the robot's position in the pseudo-tree that the robots have built, or its values in each cycle.
+A protocol that minimises costs may be queried before it ends. Each protocol reports the knowledge that it has: the
+cheapest assignment so far, a lower bound, the robot's position in the pseudo-tree that the robots have built, or its
+values in each cycle.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from robochoc.model.problem import Value
 
 
 class Incumbent(msgspec.Struct, frozen=True):
-    """The cheapest assignment of all robots that one robot knows, and its `cost`."""
+    """The cheapest assignment of all robots that is known to one robot, and its `cost`."""
 
     cost: float
     values: dict[str, Value]
@@ -41,8 +42,8 @@ class Findings(msgspec.Struct, frozen=True):
 
     `bound` is a lower bound on the cost of every assignment of the robots that it covers (for a root: the robots of its
     tree; for the first robot: all). `count` is the number of optima of a root's tree, in hexadecimal digits, because it
-    may need more than 64 bits; `listing` has the robot's values in some of these optima. `left` contains the indices of
-    the values that remain after preprocessing.
+    may need more than 64 bits; `listing` contains the robot's values in some of these optima. `left` contains the
+    indices of the values that remain after preprocessing.
     """
 
     best: Incumbent | None = None

@@ -1,8 +1,8 @@
 """Messages between robots, and their envelope.
 
 A protocol defines its own messages as subclasses of `Message`, named as in its paper. Messages are sent as msgpack
-(msgspec): compact, and validated against their declared types when they are decoded. Bytes from an unknown source can
-at worst fail to decode.
+(msgspec), which is compact, and are validated against their declared types when they are decoded. So the worst that
+bytes from an unknown source can cause is a decoding error.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ __all__ = ["Envelope", "Message", "Value", "encode"]  # `Value` is exported for 
 class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     """The base class of the messages of all protocols; the class's name is its type on the wire.
 
-    A class declares all that is special about its messages: fields, `act`, sentence, proofs. The sniffer, FIPA ACL, the
-    exports and the privacy measure use these declarations.
+    A class declares everything that is specific to its messages: fields, `act`, sentence, proofs. The sniffer, FIPA
+    ACL, the exports and the privacy measure use these declarations.
     """
 
     act: ClassVar[Act] = INFORM
@@ -68,5 +68,5 @@ _encoder = msgspec.msgpack.Encoder()
 
 
 def encode(message: Message) -> bytes:
-    """Return the content of `message` as it is sent, and as its bytes are counted."""
+    """Return the content of `message` as it is sent. The metric `bytes` counts the bytes of this content."""
     return _encoder.encode(message)

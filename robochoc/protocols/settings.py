@@ -49,7 +49,7 @@ def equip(protocol: HasSettings, given: Mapping[str, str]) -> None:
 
 
 def read_settings(protocol: type[HasSettings], given: Mapping[str, str]) -> Settings:
-    """Return the settings of `protocol`: the `given` ones, and defaults for the others. Raises `SettingsError`."""
+    """Return the settings of `protocol`: the `given` settings, and defaults for all others. Raises `SettingsError`."""
     known = type(cast("Settings", protocol.settings))
     names = known.__struct_fields__
     for name in given:

@@ -1,11 +1,11 @@
 """Plans routes on which vehicles fly to their targets and keep the fleet's distance.
 
-The planner is that of the simulated flight (`robochoc.flight.coordination`). It returns moves that are safe one after
-the other, of which only the paths and their order are used. A plan contains no times, so vehicles may be late:
-`traffic.py` decides by telemetry when each move may begin.
+It uses the planner of the simulated flight (`robochoc.flight.coordination`), which returns moves that are safe one
+after the other. Only the paths and their order are used. A plan contains no times, so vehicles may be late:
+`traffic.py` uses telemetry to decide when each move may begin.
 
-Vehicles on the ground first rise straight up, as their autopilots do. If the place above one of these is not free,
-vehicles in the air fly to their targets first.
+Vehicles on the ground first rise straight up, as their autopilots do. If the space above one of these vehicles is not
+free, vehicles in the air fly to their targets first.
 """
 
 from __future__ import annotations
