@@ -8,7 +8,6 @@ runs callbacks in its own threads; they only put items into `inbox`.
 from __future__ import annotations
 
 import base64
-import socket
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -223,18 +222,10 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
             return zenoh.open(client_config(endpoint, identity, min(attempt_s, left), lease_ms))
         except zenoh.ZError as error:
             if time.monotonic() >= until:
-                raise CannotConnectError(_reason(endpoint, identity.name)) from error
+                raise CannotConnectError(
+                    f"no master answers at {endpoint}, or it does not admit {identity.name}"
+                ) from error
         attempt_s = min(2 * attempt_s, _LONGEST_ATTEMPT_S)
-
-
-def _reason(endpoint: str, name: str) -> str:
-    """Return why no session was opened. Errors of zenoh do not distinguish a missing master from a refusal."""
-    host, _, port = endpoint.rpartition(":")
-    try:
-        socket.create_connection((host, int(port)), _FIRST_ATTEMPT_S).close()
-    except (OSError, ValueError):
-        return f"no master answers at {endpoint}"
-    return f"{endpoint} answers, but does not admit {name}: it was revoked, or no master of its team listens there"
 
 
 def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
