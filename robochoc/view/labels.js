@@ -16,6 +16,30 @@ class Labels {
     this.axes = axes;
     this.due = 0;
     this.followed = -1;
+    this.pictures = new Map();
+  }
+
+  // Postpone the picture in `command`, if it draws the label of a drone: each picture takes milliseconds to load, and of
+  // a large team most labels are never visible.
+  postpone({ type, path, object }) {
+    if (type !== "set_object" || object.object.type !== "Sprite") return;
+    const label = this.viewer.scene_tree.find(path.split("/").filter((part) => part)).object;
+    if (!this.names.includes(label)) return;
+    this.pictures.set(label, object.images[0].url);
+    object.images = object.textures = [];
+    delete object.materials[0].map;
+    object.object.visible = false;
+  }
+
+  load(label) {
+    const picture = label.children.find((child) => child.isSprite);
+    new MeshCat.THREE.TextureLoader().load(this.pictures.get(label), (texture) => {
+      picture.material.map = texture;
+      picture.material.needsUpdate = true;
+      picture.visible = true;
+      this.viewer.set_dirty();
+    });
+    this.pictures.delete(label);
   }
 
   // Once a frame; labels are updated only every `EVERY` ms.
@@ -37,6 +61,7 @@ class Labels {
         shown.push(box);
     const wanted = new Set(shown.map((box) => box.label));
     for (const { label } of boxes) {
+      if (wanted.has(label) && this.pictures.has(label)) this.load(label);
       if (label.visible !== wanted.has(label)) this.viewer.set_dirty();
       label.visible = wanted.has(label);
     }

@@ -58,9 +58,10 @@ try {
   element("speed").addEventListener("change", () => setSpeed(Number(element("speed").value)));
   element("trail").addEventListener("change", () => setTrail(element("trail").value));
 
-  // The scene's camera comes with the commands; its distance depends on the window.
+  // Pictures of labels are postponed. The scene's camera comes with the commands; its distance depends on the window.
   const handle = viewer.handle_command.bind(viewer);
   viewer.handle_command = (command) => {
+    labels.postpone(command);
     handle(command);
     if (String(command.path).startsWith("/Cameras")) fit();
   };

@@ -111,6 +111,27 @@ def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> No
     assert all(named())
 
 
+def test_pictures_of_labels_are_loaded_when_they_are_first_visible(player: Page) -> None:
+    picture = "({ visible, material: { map } }) => visible && map.image.complete && map.image.width > 20"
+    loaded = f"Playback.labels.names.map((name) => name.children[0]).every({picture})"
+    until(lambda: player.evaluate(loaded), "a picture is missing")
+    pending = player.evaluate("""(() => {
+      const [first, second] = Playback.labels.names;
+      Playback.labels.pictures.set(first, first.children[0].material.map.image.src);
+      Playback.drones[0].position.copy(Playback.drones[1].position);
+      const [known, followed] = [Playback.labels.pictures, Playback.labels.followed];
+      Playback.labels.followed = 1;
+      Playback.labels.choose();
+      const hidden = known.has(first);
+      Playback.labels.followed = 0;
+      Playback.labels.choose();
+      Playback.labels.followed = followed;
+      return [hidden, known.has(first), first.visible, second.visible];
+    })()""")
+    assert pending == [True, False, True, False]
+    player.evaluate("Playback.player.seek(1), Playback.player.seek(0)")
+
+
 SLOW, FAST = 1e-4, 1e4
 """Speeds at which the end is hours away, however busy the machine is, or a picture away."""
 
