@@ -91,6 +91,13 @@ class Commands(click.Group):
         except click.UsageError as error:
             import difflib
 
+            from robochoc.system import pydcop_words
+
+            if instead := pydcop_words.COMMANDS.get(args[0]):
+                why = instead.removeprefix("none: ")
+                rest = f"use {instead} instead" if why == instead else f"there is no counterpart: {why}"
+                text = f"No such command {args[0]!r}, which pyDCOP has; {rest}."
+                raise click.UsageError(text, ctx) from None
             near = difflib.get_close_matches(args[0], COMMANDS, 1)
             if not near:
                 raise

@@ -24,6 +24,7 @@ from robochoc.system.installed import (
     load_entry_point,
     not_installed_message,
 )
+from robochoc.system.pydcop_words import PROTOCOLS
 
 GROUP = "robochoc.protocols"
 _NAME = re.compile(r"[A-Za-z0-9]+(-[A-Za-z0-9]+)*")
@@ -159,6 +160,8 @@ def installed_protocols() -> tuple[InstalledProtocol, ...]:
 
 def unknown_protocol(name: str) -> str:
     """Return the error text for the unknown protocol `name`, with suggestions."""
+    if instead := PROTOCOLS.get(name.lower()):
+        return f"no protocol {name!r} is installed; instead of this algorithm of pyDCOP, use {instead}"
     return not_installed_message(GROUP, "protocol", name, also=(CENTRAL, AUTO), listed_by="robochoc protocols")
 
 

@@ -323,5 +323,17 @@ def test_options_of_pydcop_are_answered_by_ours() -> None:
         done = robochoc_within("solve", "instances/queens3d-3", theirs, "dsa")
         assert done.returncode == 2
         assert f"No such option '{theirs}': instead of this option of pyDCOP, use {ours}." in done.stderr
+    for command, text in (
+        (["batch", "f.yaml"], "No such command 'batch', which pyDCOP has; use robochoc experiment run instead."),
+        (["distribute", "f.yaml"], "which pyDCOP has; there is no counterpart: a robot owns its variables."),
+        (["solve", "instances/queens3d-3", "--protocol", "DSA-tuto"], "instead of this algorithm of pyDCOP, use dsa"),
+        (
+            ["solve", "instances/queens3d-3", "--protocol", "dsa", "--set", "stop_cycle=9"],
+            "--set: instead of pyDCOP's stop_cycle, set cycles",
+        ),
+    ):
+        done = robochoc_within(*command)
+        assert done.returncode == 2
+        assert text in done.stderr
     done = robochoc_within("solve", "instances/queens3d-3", "--protocoll", "dsa")
     assert "Did you mean '--protocol'?" in done.stderr

@@ -152,14 +152,12 @@ class SolveCommand(SectionedCommand):
         try:
             return super().parse_args(ctx, args)
         except click.NoSuchOption as error:
-            if (name := error.option_name) in _PYDCOP_OPTIONS:
-                text = f"No such option {name!r}: instead of this option of pyDCOP, use {_PYDCOP_OPTIONS[name]}."
+            from robochoc.system.pydcop_words import OPTIONS
+
+            if (name := error.option_name) in OPTIONS:
+                text = f"No such option {name!r}: instead of this option of pyDCOP, use {OPTIONS[name]}."
                 raise click.UsageError(text, ctx) from None
             raise
-
-
-_PYDCOP_OPTIONS = {"--algo": "--protocol", "--algo_params": "--set", "--mode": "--runtime", "--output": "--json"}
-"""Options of `pydcop solve`, and the corresponding options of robochoc."""
 
 
 def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str]) -> None:

@@ -10,6 +10,7 @@ from robochoc.protocols.settings import SettingsError, read_settings
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.pydcop_words import SETTINGS
 
 
 def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, str]) -> None:
@@ -17,6 +18,10 @@ def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, 
     try:
         known = read_settings(protocol, settings)
     except SettingsError as wrong:
+        for name_of_pydcop, ours in SETTINGS.items():
+            if name_of_pydcop in settings and ours in protocol.settings.__struct_fields__:
+                instead = f"instead of pyDCOP's {name_of_pydcop}, set {ours}"
+                raise UnsupportedError(f"--set: {instead} (protocol {name})") from None
         raise UnsupportedError(f"--set: {wrong} (protocol {name})") from None
     if isinstance(known, CycleSettings) and known.anytime == "yes" and not _finds_best_cycle(protocol):
         raise UnsupportedError(f"--set: anytime=yes needs `AnytimeMessage` among the `messages` of protocol {name}")
