@@ -30,6 +30,7 @@ import sniffer
 import solver
 import start_up
 import transport
+import wide_tables
 from measure import RUNS
 from report import Section, machine
 
@@ -52,6 +53,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "sniffer": sniffer.measured,
     "app": app_pages.measured,
     "auctions": auctions.measured,
+    "wide": wide_tables.measured,
     "mujoco": other_flight.mujoco,
     "rotorpy": other_flight.rotorpy,
 }
