@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 
 from robochoc.journal.events import Decided, Received, Sent
 from robochoc.journal.journal import Journal
@@ -90,6 +91,7 @@ class _RunMeasurement:
             and any(one.model == ConstraintModel.PKC for one in self._team.constraints()),
             minimises=any(host.protocol.problem.has_costs for host in robots.hosts.values()),
         )
+        self._without_knowledge: dict[tuple[str, Kind, bool], Loss | None] = {}
         self._observers = {
             name: Observer(facts, name, host.protocol.problem.values) for name, host in robots.hosts.items()
         }
@@ -166,11 +168,25 @@ class _RunMeasurement:
                     raise self._wrong(observer, subject, "decision")
                 numbers = [(len(self._secrets.declared[subject]), len(values))]
                 yield from _there(loss_between(observer.name, subject, Kind.DECISION, numbers, known=known))
-            charges = self._secrets.unknown_charges(subject, observer.name)
-            entries = self._secrets.unknown_entries(subject, observer.name)
-            for kind, secrets in ((Kind.DOMAIN, charges), (Kind.CONSTRAINTS, entries)):
-                numbers = [self._numbers(observer, subject, secret) for secret in secrets]
-                yield from _there(loss_between(observer.name, subject, kind, numbers, known=known))
+            for kind in (Kind.DOMAIN, Kind.CONSTRAINTS):
+                yield from _there(self._loss(observer, subject, kind, known=known))
+
+    def _loss(self, observer: Observer, subject: str, kind: Kind, *, known: bool) -> Loss | None:
+        """Return the loss of one kind. It is the same for all observers without knowledge of the subject's secrets."""
+        of_subject = self._secrets.charges[subject].values() if kind is Kind.DOMAIN else self._secrets.entries[subject]
+        if not observer.knowledge.known.keys().isdisjoint(of_subject):
+            return self._computed_loss(observer, subject, kind, known=known)
+        if (subject, kind, known) not in self._without_knowledge:
+            computed = self._computed_loss(observer, subject, kind, known=known)
+            self._without_knowledge[subject, kind, known] = computed
+        found = self._without_knowledge[subject, kind, known]
+        return None if found is None else replace(found, observer=observer.name)
+
+    def _computed_loss(self, observer: Observer, subject: str, kind: Kind, *, known: bool) -> Loss | None:
+        charged = kind is Kind.DOMAIN
+        unknown = self._secrets.unknown_charges if charged else self._secrets.unknown_entries
+        numbers = [self._numbers(observer, subject, secret) for secret in unknown(subject, observer.name)]
+        return loss_between(observer.name, subject, kind, numbers, known=known)
 
     def _numbers(self, observer: Observer, subject: str, secret: Secret) -> tuple[int, int]:
         """Return the number of all states of a secret, and of those still possible. The true state must be possible."""
