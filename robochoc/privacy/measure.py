@@ -173,7 +173,7 @@ class _RunMeasurement:
 
     def _loss(self, observer: Observer, subject: str, kind: Kind, *, known: bool) -> Loss | None:
         """Return the loss of one kind. It is the same for all observers without knowledge of the subject's secrets."""
-        of_subject = self._secrets.charges[subject].values() if kind is Kind.DOMAIN else self._secrets.entries[subject]
+        of_subject = self._secrets.charges[subject].values() if kind == Kind.DOMAIN else self._secrets.entries[subject]
         if not observer.knowledge.known.keys().isdisjoint(of_subject):
             return self._computed_loss(observer, subject, kind, known=known)
         if (subject, kind, known) not in self._without_knowledge:
@@ -183,7 +183,7 @@ class _RunMeasurement:
         return None if found is None else replace(found, observer=observer.name)
 
     def _computed_loss(self, observer: Observer, subject: str, kind: Kind, *, known: bool) -> Loss | None:
-        charged = kind is Kind.DOMAIN
+        charged = kind == Kind.DOMAIN
         unknown = self._secrets.unknown_charges if charged else self._secrets.unknown_entries
         numbers = [self._numbers(observer, subject, secret) for secret in unknown(subject, observer.name)]
         return loss_between(observer.name, subject, kind, numbers, known=known)
