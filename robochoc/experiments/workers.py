@@ -29,7 +29,7 @@ _CHUNK = 1 << 16
 
 
 class LocalWorkers:
-    """Processes on this machine. Each has one bundle of tasks at a time, whose tasks are runs on the same problem.
+    """Processes on this machine. Each has one bundle of tasks at a time, which are runs on the same problem.
 
     If a worker dies or does not finish in time, its current task is lost, and other workers continue with its other
     tasks.

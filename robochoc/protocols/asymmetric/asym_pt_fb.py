@@ -1,17 +1,17 @@
 """Asymmetric Pseudo-tree Forward Bounding (AsymPT-FB).
 
 PT-FB for asymmetric costs: each robot in a constraint pays its own part, which no other robot knows. The bounds that
-robots in a subtree report are on their own sides. Before a robot has its subtree searched, it asks all robots above
+robots in a subtree report cover their own sides only. Before a robot has its subtree searched, it asks all robots above
 with which it shares a constraint for the costs of their sides with each of its values. It stores the answers: they
 apply whenever that robot has the same value, and are part of its bounds from then on.
 
 - **When to use**: asymmetric costs, a pseudo-tree with branches.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. In addition to
-  PT-FB's state, a robot stores at most as many costs as the other sides of its constraints have.
+  PT-FB's state, a robot stores at most all costs of the other sides of its constraints.
 - **Parameters**: none.
 - **Reference**: Litov, Meisels: "Forward bounding on pseudo-trees for DCOPs and ADCOPs", AIJ 252, 2017 (AsymPT-FB).
 
-The methods, besides those of PT-FB (`pt_fb.py`):
+The methods, in addition to those of PT-FB (`pt_fb.py`):
 
     ask robots above for their sides   `search_subtree`     their answers   `_send_row`     add them    `_add_row`
 
@@ -21,7 +21,7 @@ a robot uses only the least entry for each of its values, and the rows for value
 
 Choices that the paper leaves open, and differences:
 
-- A robot asks about all its values at once, and once for each value of the robot above.
+- A robot asks about all its values in one request, with one request for each value of the robot above.
 - A robot's costs contain, from the beginning, the least costs of its own parts with robots below. Its answers are the
   costs of its side in excess of these.
 - Totally known constraints are paid by the robot in the scope that is lowest in the tree, as in PT-FB; they may be

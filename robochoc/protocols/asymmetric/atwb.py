@@ -13,7 +13,7 @@ value.
 - **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
   problems", JAIR 47, 2013 (ATWB).
 
-The methods, besides those of AFB (`afb.py`):
+The methods, in addition to those of AFB (`afb.py`):
 
     backward bounding: ask robots before   `_pass_on`          their answers            `_send_side`
     both costs are known: pass on the CPA  `_assign_cpa`       add them                 `_add_side`

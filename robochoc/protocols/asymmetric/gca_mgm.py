@@ -1,7 +1,8 @@
 """Guaranteed Convergence Asymmetric MGM (GCA-MGM).
 
-MCS-MGM in which a robot hands over its entry whenever a neighbour's move has cost it anything. From then on a robot
-pays the entries that it has received, so fewer and fewer moves seem better than they are, and the robots stop moving.
+MCS-MGM in which a robot hands over its entry whenever a neighbour's move has increased its costs at all. From then on a
+robot pays the entries that it has received, so fewer and fewer moves seem better than they are, and the robots stop
+moving.
 
 - **When to use**: asymmetric costs, if convergence is required.
 - **Guarantees**: incomplete; it converges, and stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji,

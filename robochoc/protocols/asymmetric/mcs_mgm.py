@@ -16,13 +16,14 @@ Information disclosed: the single entries of parts that are handed over, values,
 
 Choices that the paper leaves open, and differences:
 
-- A cycle has three phases: values, transfers (mostly of nothing), gains.
+- A cycle has three phases: values, transfers (most of them empty), gains.
 - No entry is handed over before a robot has moved.
 - If neighbours have the same gain, the first of them in the priority order moves.
 - Gains and entries are pairs, broken hard constraints first. Totally known constraints are paid by all robots in the
   scope, as in MGM, and never handed over.
-- If a value is lost, the last known one is used; a robot that misses a gain does not move. No robot counts a lost entry
-  from then on: P_ij + P_ji then falls for the robots, but not in the result, whose cost is computed from the files.
+- If a value is lost, the last known one is used; a robot that misses a gain does not move. A lost entry is no longer
+  counted by either robot. P_ij + P_ji then decreases for the robots, but not in the result, whose cost is computed from
+  the files.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

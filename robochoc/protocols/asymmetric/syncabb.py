@@ -5,8 +5,8 @@ values of the robots so far (the CPA) go from robot to robot in priority order, 
 knows only its own side. So the CPA also goes back, and the robots before the holder add the costs of their own sides
 for the new value. Only the sum is sent. Once it reaches the bound, the holder takes its next value.
 
-With one phase (`phases=1`), the cost of each new value is computed at once. With two, the CPA first becomes complete
-with the sides of lower robots alone, then goes back once, and each robot adds its sides towards all lower robots.
+With one phase (`phases=1`), the cost of each new value is computed at once. With two phases, the CPA is first completed
+with the sides of lower robots only. Then it goes back once, and each robot adds its sides towards all lower robots.
 
 - **When to use**: asymmetric costs, few robots, and robots should disclose little about their costs.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Space is linear.

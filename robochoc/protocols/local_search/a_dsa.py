@@ -3,7 +3,7 @@
 DSA without cycles: each robot acts in its own ticks, and waits for no other robot. In a tick it finds its best value
 given the last known values of its neighbours, decides as in DSA, and sends its value, changed or not.
 
-- **When to use**: as DSA, if some robots or links are much slower than others: no robot has to wait for them.
+- **When to use**: like DSA, if some robots or links are much slower than others: no robot has to wait for them.
 - **Guarantees**: incomplete; each robot stops after `cycles` ticks, without a proof of optimality. It always ends. The
   result is the cheapest of the assignments that the robots had after the same number of their ticks. A robot with an
   empty domain proves that there is no solution.

@@ -5,7 +5,7 @@ likelier it moves. In every `period`-th cycle all robots explore: robots without
 their other values; the less this raises their cost, the likelier they do so. So the search leaves local optima, and the
 best cycle counts.
 
-- **When to use**: as DSA, with time for many cycles.
+- **When to use**: like DSA, if there is time for many cycles.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime); costs rise when robots explore. A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `pa` and `pb` (a robot that saves the part r of its cost moves with probability

@@ -5,8 +5,8 @@ different colours. Then in each cycle a robot waits until its neighbours with sm
 its best value given the present values of all neighbours. Robots with the same colour move at the same time, and no
 robot waits for robots other than its neighbours.
 
-- **When to use**: as MGM: the cost never rises. A cycle needs half as many messages as in MGM, and every robot may move
-  in it.
+- **When to use**: like MGM, if the cost must never rise. A cycle needs half as many messages as in MGM, and every robot
+  may move in a cycle.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
   one cycle to the next (anytime), and it ends in a local optimum after enough cycles. The course of the search
   does not depend on message delays. A robot with an empty domain proves that there is no solution.

@@ -4,7 +4,7 @@ Local search in cycles: distributed breakout (Yokoo, Hirayama 1996) without weig
 the gain of their best move. Among neighbours only the robot with the largest gain moves. So a move saves the team as
 much as it saves the robot.
 
-- **When to use**: as DSA, if the cost must never rise. It ends in a local optimum.
+- **When to use**: like DSA, if the cost must never rise. The search ends in a local optimum.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
   one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `cycles` (default 100).

@@ -7,7 +7,7 @@ best offer if its total gain is positive; then both robots are committed to the 
 the largest gain among its neighbours moves. A committed pair moves if both have the largest gain, each among its
 neighbours without the partner.
 
-- **When to use**: as MGM, if better results are worth more messages.
+- **When to use**: like MGM, if better results are worth more messages.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
   one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
 - **Parameters (`--set`)**: `threshold` (q; default 0.5), `cycles` (default 100).
@@ -24,9 +24,9 @@ The phases of a cycle:
 
 Choices that the paper leaves open, and differences:
 
-- An offer contains all pairs of values, also pairs with which the offerer alone does not gain. Without these, as in the
-  paper, some moves that save the team costs are missed. With them, a team in which no robot or pair can gain is at a
-  2-optimum.
+- An offer contains all pairs of values, including pairs with which the offerer alone does not gain. Without these, as
+  in the paper, some moves that save the team costs are missed. With them, a team in which no robot or pair can gain is
+  at a 2-optimum.
 - A robot that is not an offerer, or has no offer for a neighbour, sends an empty offer, because its neighbours wait for
   all offers.
 - First values, equally good values and equal gains are treated as in `mgm`. Constraints may be n-ary.

@@ -2,15 +2,15 @@
 
 Local search in cycles. The regret of a value is the cost that a robot would have saved so far with this value instead
 of the values that it had, given its neighbours' values at the time. In each cycle a robot draws a value with a
-probability proportional to its regret, if that is positive. So it prefers values that paid over many cycles, not only
-in the last one.
+probability proportional to its regret, if that is positive. So it prefers values that would have paid off over many
+cycles, not only in the last cycle.
 
-- **When to use**: as `dsa`, with time for thirty cycles or more.
+- **When to use**: like `dsa`, if there is time for thirty cycles or more.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime); costs rise and fall. A robot with an empty domain proves that there is no solution.
-- **Parameters (`--set`)**: `variant` (rm or rm+; default rm+), `weight` (the fading memory rho: a cycle counts for this
-  part of the regret, those before for the rest; 0: all cycles count alike; default 0.1), `inertia` (the probability to
-  keep the value in spite of regrets; default 0.1), `cycles` (default 100).
+- **Parameters (`--set`)**: `variant` (rm or rm+; default rm+), `weight` (the fading memory rho: the weight of the
+  latest cycle in the regret, where all earlier cycles together have the rest; 0: all cycles have the same weight;
+  default 0.1), `inertia` (the probability to keep the value in spite of regrets; default 0.1), `cycles` (default 100).
 - **References**: Hart, Mas-Colell: "A simple adaptive procedure leading to correlated equilibrium", Econometrica 68,
   2000 (regret matching); Marden, Arslan, Shamma: "Regret based dynamics: convergence in weakly acyclic games",
   AAMAS 2007 (fading memory and inertia); Chapman, Rogers, Jennings, Leslie: "A unifying framework for iterative

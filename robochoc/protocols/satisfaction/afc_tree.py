@@ -6,7 +6,7 @@ continue at the same time, each in its own subtree. Nogoods contain ancestors on
 are on one branch. `Accept` goes up when a whole subtree has accepted a CPA. Once all children of a root have sent
 accepts, the root knows a solution of its component, and sends it to all robots there.
 
-- **When to use**: as AFC-ng, on sparse graphs: branches are searched at the same time.
+- **When to use**: like AFC-ng, on sparse graphs: branches are searched at the same time.
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
 - **Parameters**: none.
 - **Reference**: Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms",
