@@ -7,10 +7,13 @@ from collections.abc import Sequence
 from itertools import accumulate
 from random import Random
 
+import pytest
+
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.problem import Team, Value
+from robochoc.protocols.optimization import sfb_bounds
 from robochoc.protocols.optimization.run_lengths import RunLengths
 from robochoc.protocols.optimization.sfb import SFB, Explored
 from robochoc.protocols.optimization.sfb_bounds import BOUND, COST, VALUES, ForwardBounds
@@ -122,7 +125,9 @@ def plainly_extended(
 
 
 @count("teams", 40, 3000)
-def test_rows_are_those_of_a_plain_computation(teams: int) -> None:
+def test_rows_are_those_of_a_plain_computation(monkeypatch: pytest.MonkeyPatch, teams: int) -> None:
+    monkeypatch.setattr(sfb_bounds, "FEW_COLUMNS", 0)
+    monkeypatch.setattr(sfb_bounds, "MANY_COLUMNS", 2)
     chance = Random("plain rows")
     partly = entirely = 0
     for seed in range(teams):

@@ -28,6 +28,10 @@ Rows = NDArray[np.integer[Any]]
 BOUND, COST, VALUES = 0, 1, 2
 """The columns of a row: its bound, its cost, and the first value's index."""
 
+FEW_COLUMNS = 128
+"""The number of columns up to which computations with all columns are faster than with some (measured)."""
+MANY_COLUMNS = 3
+"""The ratio of all columns to the changed ones up to which computations with all columns are faster (measured)."""
 _SIZES = ("<u1", "<u2", "<u4", "<i8")
 
 
@@ -50,8 +54,8 @@ class ForwardBounds:
     last one. So each constraint is evaluated once, as soon as only one of its robots has no value. `most` is an upper
     bound on the sum of their costs.
 
-    All computations are restricted to the vectors that change, those of the last robots. If these are more than half
-    of the columns, they are done for all vectors, because a contiguous part of an array is faster.
+    In large teams all computations are restricted to the vectors that change, those of the last robots. If these are a
+    large part, or if there are few columns, they are done for all vectors: a contiguous part of an array is faster.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: RunLengths[Domain]) -> None:
@@ -72,7 +76,8 @@ class ForwardBounds:
             for _, agents, charges in problem.tables({**above, name: domains[rank]}, lowest=name)
         ]
         changed = [*dict.fromkeys([rank for rank, _, _ in found])]
-        if 2 * sum([len(domains[rank]) for rank in changed]) >= self._total:
+        few = self._total <= FEW_COLUMNS
+        if few or MANY_COLUMNS * sum([len(domains[rank]) for rank in changed]) >= self._total:
             changed = [*range(self.rank + 1, len(domains))]
         self._sizes = [len(domains[rank]) for rank in changed]
         self._starts = np.cumsum([0, *self._sizes])
