@@ -19,8 +19,8 @@ from measure import ROOT, RUNS, say
 from report import Row, Section
 
 PURE = "pure:"
-Problem = Mapping[str, int | float]
-"""The arguments of `random_csp` for the problems that are measured."""
+Problem = Mapping[str, int | float | str]
+"""The arguments of `random_csp`, or of `coloring` if there are `colors`, in the order min-width."""
 HARD: Problem = {"agents": 20, "domain": 10, "density": 0.25, "tightness": 0.6, "seed": 1, "connected": True}
 COSTLY: Problem = {
     "agents": 8, "domain": 4, "density": 0.4, "tightness": 0.0, "seed": 2, "connected": True, "max_cost": 10
@@ -28,6 +28,8 @@ COSTLY: Problem = {
 LARGE: Problem = {
     "agents": 100, "domain": 5, "density": 0.04, "tightness": 0.0, "seed": 1, "connected": True, "max_cost": 10
 }  # fmt: skip
+COLOURED: Problem = {"colors": 3, "degree": 3, "conflicts": "hard"}
+SIZES = (64, 256, 1_024, 4_096)
 PROBLEMS = {
     "abt": HARD,
     "afc-ng": HARD,
@@ -44,12 +46,15 @@ PROGRAM = """
 import json, sys, time
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
+from robochoc.model.orders import Order, with_order
 from robochoc.run.registry import protocol_named
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.agent_problem import RunParameters
 protocol = protocol_named(sys.argv[1])
-team = CompiledTeam(random_csp(**json.loads(sys.argv[2])))
+given = json.loads(sys.argv[2])
+team = CompiledTeam(with_order(coloring(**given), Order.MIN_WIDTH) if "colors" in given else random_csp(**given))
 settings = {"cycles": "20"} if hasattr(protocol.settings, "cycles") else {}
 least, began = float("inf"), time.process_time()
 while time.process_time() - began < 0.5:
@@ -98,9 +103,16 @@ def measured() -> Section:
         "Schedule concurrent, no delays, one process; the search alone, up to 50,000 messages, the least of "
         f"{RUNS} times half a second. ABT, AFC-ng and SFB: `{_call(HARD)}`. ADOPT, BnB-ADOPT and DPOP: "
         f"`{_call(COSTLY)}`. DSA, MGM, Max-Sum, 20 cycles: `{_call(LARGE)}`. "
-        "`python benchmarks/messages.py --tree . --tree OTHER` compares two checkouts."
+        "`python benchmarks/messages.py --tree . --tree OTHER` compares two checkouts. SFB over the size of the team: "
+        "3-colouring, hard conflicts, degree 3, order min-width."
     )
-    return Section("messages", "What a message costs", notes, (_table(costs(PROBLEMS, [str(ROOT)], RUNS), ["us CPU"]),))
+    growing = [_table(costs({"sfb": {"agents": size, **COLOURED}}, [str(ROOT)], RUNS), ["us CPU"]) for size in SIZES]
+    by_size = [
+        ("robots", *growing[0][0][1:]),
+        *((f"{n:,}", *rows[1][1:]) for n, rows in zip(SIZES, growing, strict=True)),
+    ]
+    tables = _table(costs(PROBLEMS, [str(ROOT)], RUNS), ["us CPU"]), by_size
+    return Section("messages", "What a message costs", notes, tables, ("By protocol", "SFB by the size of the team"))
 
 
 def _call(problem: Problem) -> str:
