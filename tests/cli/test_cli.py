@@ -326,9 +326,9 @@ def test_options_of_pydcop_are_answered_by_ours() -> None:
     for command, text in (
         (["batch", "f.yaml"], "No such command 'batch', which pyDCOP has; use robochoc experiment run instead."),
         (["distribute", "f.yaml"], "which pyDCOP has; there is no counterpart: a robot owns its variables."),
-        (["solve", "instances/queens3d-3", "--protocol", "DSA-tuto"], "instead of this algorithm of pyDCOP, use dsa"),
+        (["solve", "instances/queens3d-4", "--protocol", "DSA-tuto"], "instead of this algorithm of pyDCOP, use dsa"),
         (
-            ["solve", "instances/queens3d-3", "--protocol", "dsa", "--set", "stop_cycle=9"],
+            ["solve", "instances/queens3d-4", "--protocol", "dsa", "--set", "stop_cycle=9"],
             "--set: instead of pyDCOP's stop_cycle, set cycles",
         ),
     ):
