@@ -25,16 +25,21 @@ from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import printable
 
 _encode = msgspec.json.encode
-_LEVEL = 6
+AT_ONCE = 1_000_000
+"""The largest total size, in bytes, of answers that a page reads without unpacking, before its `load` event."""
+_STORED, _COMPRESSED = 0, 6
+"""Levels of zlib."""
 
 
 def embedded_answers(data: PageData, journal: Journal | None = None, *, most_states: int = 20_000) -> dict[str, bytes]:
     """Return the answers about the complete trace in `data`, with the robots' states if `journal` is given.
 
     States are computed by replay for the robots in the order of their names, until they have `most_states` steps in
-    total.
+    total. Small sets of answers are stored as zlib's bytes without compression, so that a small page is drawn at once.
     """
-    return {name: zlib.compress(answer, _LEVEL) for name, answer in _answers(data, journal, most_states)}
+    answers = dict(_answers(data, journal, most_states))
+    level = _STORED if sum(map(len, answers.values())) <= AT_ONCE else _COMPRESSED
+    return {name: zlib.compress(answer, level) for name, answer in answers.items()}
 
 
 def _answers(data: PageData, journal: Journal | None, most_states: int) -> Iterator[tuple[str, bytes]]:

@@ -2,7 +2,23 @@
 /* The sources of the page's data: a server on this machine, or the page itself (an exported file). */
 (() => {
   const KEPT = 24; // the number of cached chunks of details, and of states
-  const AT_ONCE = 1 << 18; // compressed bytes of an embedded answer that is unpacked before the page's `load` event
+
+  /* The content of zlib's bytes (RFC 1950) if all blocks are stored without compression (RFC 1951, 3.2.4), otherwise
+     null. There is no promise, so that a small page is drawn before its `load` event: browsers without a window take a
+     screenshot then. */
+  const stored = (bytes) => {
+    const content = new Uint8Array(bytes.length);
+    let [at, size, head] = [2, 0, 0]; // after zlib's header
+    do {
+      head = bytes[at];
+      if (head & 6) return null;
+      const length = bytes[at + 1] | bytes[at + 2] << 8;
+      content.set(bytes.subarray(at + 5, at + 5 + length), size);
+      at += 5 + length;
+      size += length;
+    } while (!(head & 1));
+    return content.slice(0, size).buffer;
+  };
 
   /* Caches the last answers, which are lists that may grow: an answer shorter than `least`, or a failed request, is
      requested again. */
@@ -97,7 +113,8 @@
       const element = document.getElementById("feed:" + name);
       if (!element) throw new Error("this page does not contain them");
       const packed = Uint8Array.from(atob(element.textContent.trim()), (sign) => sign.charCodeAt(0));
-      if (packed.length <= AT_ONCE) return Sniffer.inflate(packed);
+      const content = stored(packed);
+      if (content) return content;
       const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
       return new Response(stream).arrayBuffer();
     }
