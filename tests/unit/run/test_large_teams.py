@@ -26,6 +26,7 @@ from robochoc.model.problem import Constraint, Domain, Predicate, Team, Variable
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver import encoding
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.verification.checker import violations
 from tests.support.growth import kept_bytes, operations
@@ -111,7 +112,8 @@ def test_a_constraint_of_many_robots_is_compiled_once(monkeypatch: pytest.Monkey
         return compile_expression(body, names)
 
     monkeypatch.setattr(encoding, "compile_expression", compile_noted)
-    Simulation(team, protocol_named("dsa"), Concurrent(0))
+    run = Simulation(team, protocol_named("dsa"), Concurrent(0), parameters=RunParameters(settings={"cycles": "2"}))
+    assert run.search().verdict is Verdict.SOLUTION
     assert len(compiled) == 1
 
 
