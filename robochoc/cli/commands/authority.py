@@ -148,9 +148,9 @@ def list_members(folder: Path | None, *, as_json: bool) -> None:
 @click.argument("name")
 @authority_option
 def revoke(name: str, folder: Path | None) -> None:
-    """Revoke the certificates of NAME, and its token if it is not used yet.
+    """Revoke the certificates of NAME, and its token if that has not been used yet.
 
-    A running master notices the change. To accept the name again, enrol it again.
+    A running master notices the change. To admit the name again, enrol it again.
     """
     with _errors_as_failures(), _opened(folder) as opened:
         opened.revoke(name)

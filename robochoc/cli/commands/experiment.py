@@ -45,7 +45,10 @@ def experiment() -> None:
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
 @click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Number of workers.  [default: one per processor]")
 @click.option(
-    "--again", type=click.Choice(AGAIN), multiple=True, help="Also repeat the runs with this status. Repeatable."
+    "--again",
+    type=click.Choice(AGAIN),
+    multiple=True,
+    help="Also rerun the runs with this status. May be given more than once.",
 )
 @click.option("--dry-run", is_flag=True, help="Show the number of runs without running any.")
 @click.option(

@@ -61,7 +61,7 @@ _SECTIONS: Sections = {
     default="127.0.0.1:7447",
     show_default=True,
     metavar="HOST:PORT",
-    help="Address at which robots reach this machine. Robots enrol at the next higher port.",
+    help="Address at which robots reach this machine. Robots enrol on the next higher port.",
 )
 @click.option(
     "--host",

@@ -26,7 +26,8 @@ if TYPE_CHECKING:
     "settings",
     multiple=True,
     metavar="NAME=VALUE",
-    help="A parameter of the protocol in that run, for a journal without the robots' problems. Repeatable.",
+    help="A protocol parameter of the recorded run, for a journal that does not include the robots' local problems. May"
+    " be given more than once.",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 @local_options

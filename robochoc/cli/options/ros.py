@@ -177,7 +177,7 @@ situation_options = _all_of(
         "--patience",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="Time after which a silent robot counts as lost.  [default: no limit; on a network 10]",
+        help="Time after which a silent robot counts as lost.  [default: no limit; 10 on a network]",
     ),
     click.option(
         "--report-timeout",
