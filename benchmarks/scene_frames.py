@@ -9,9 +9,9 @@ slowly, so that each frame differs from the previous one. It needs Playwright, a
 
 from __future__ import annotations
 
+import argparse
 import os
 import shutil
-import sys
 from pathlib import Path
 
 SECONDS = 5
@@ -47,15 +47,18 @@ def cpu_s() -> float:
 
 def main() -> None:
     """Print a line for each page."""
+    arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments.add_argument("pages", nargs="+", type=Path, metavar="PAGE")
+    pages: list[Path] = arguments.parse_args().pages
     from playwright.sync_api import sync_playwright  # noqa: PLC0415 - an extra
 
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
     with sync_playwright() as play:
         browser = play.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
-        for file in sys.argv[1:]:
+        for file in pages:
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.set_default_timeout(600_000)
-            page.goto(Path(file).resolve().as_uri())
+            page.goto(file.resolve().as_uri())
             page.evaluate("Playback.player.speed = 0.25, Playback.player.seek(0), Playback.player.play()")
             page.wait_for_timeout(2_000)
             before = cpu_s()
