@@ -239,8 +239,17 @@ class MissionBuilder:
 
     def _landing_point(self, number: int) -> Point:
         if number not in self._landing_points:
-            self._landing_points[number] = self.layout.homes[number] if self.walls else next(self._edge)
+            self._landing_points[number] = (
+                self.layout.homes[number] if self.walls else self._on_ground(next(self._edge))
+            )
         return self._landing_points[number]
+
+    def _on_ground(self, point: Point) -> Point:
+        """Return a landing point at the height 0 if places are published exactly, and none is below 0."""
+        levels = self.layout.axes[2]
+        if not self._exact or self._ground is not None or levels.first < 0:
+            return point
+        return point[0], point[1], levels.at(0)
 
     def _metres(self, point: Point) -> Point:
         x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.layout.axes, point, strict=True))

@@ -30,8 +30,6 @@ ENTRIES_PER_BLOCK_MAX = 8192
 SPAN_S = 0.25
 """Seconds after which the next event closes a block. A killed run loses at most the events of this time."""
 
-_now = time.monotonic
-
 BlockSink = Callable[[bytes], object]
 """A function that receives complete blocks, the first with the beginning of the file. It may raise `OSError`."""
 
@@ -67,10 +65,10 @@ class JournalRecorder:
 
     def __call__(self, event: AnyEvent) -> None:
         """Record an event. `Began` starts a run; times can be compared only within a run."""
-        pending = self._pending
-        pending.append(event)
-        if len(pending) >= ENTRIES_PER_BLOCK_MAX or _now() >= self._due:
-            self.flush()
+        with self._lock:
+            self._pending.append(event)
+            if len(self._pending) >= ENTRIES_PER_BLOCK_MAX or time.monotonic() >= self._due:
+                self._close_block()
 
     def flush_if_due(self) -> None:
         """Close the block if it has been open for `SPAN_S`. Must be called at intervals while no events occur."""
@@ -89,8 +87,7 @@ class JournalRecorder:
                 return
             self._close_block()  # also writes blocks that were staged before an interrupt
             if self._cost_events:
-                found = [*self._improvements(self._cost_events, self._given)]
-                self._pending[:0], self._cost_events = found, None
+                self._pending, self._cost_events = [*self._improvements(self._cost_events, self._given)], None
             if self.outcome is not None:
                 self._pending.append(Ended.from_outcome(self.outcome))
             self._close_block()
@@ -121,16 +118,13 @@ class JournalRecorder:
         if not self._pending or self._closed:
             return
         if all(sink.failure for sink in self._sinks):
-            self._pending.clear()
+            self._pending = []
             return
-        pending = self._pending.copy()  # other threads may append entries in the meantime
-        count = len(pending)
-        lines, cost_events, given = self._with_improvements(pending)
+        lines, cost_events, given = self._with_improvements(self._pending)
         blocks, digest = self._packed(lines)
-        due = _now() + SPAN_S
-        del self._pending[:count]
-        self._cost_events, self._given, self._digest, self._staged, self._due = (
-            cost_events, given, digest, blocks, due,
+        due = time.monotonic() + SPAN_S
+        self._pending, self._cost_events, self._given, self._digest, self._staged, self._due = (
+            [], cost_events, given, digest, blocks, due,
         )  # fmt: skip
         self._pass_on()
 

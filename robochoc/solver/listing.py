@@ -1,4 +1,4 @@
-"""Lists all solutions of a network in few searches, with bounded memory.
+"""Lists all solutions of a network in few searches.
 
 The first searches have growing limits, so that the first solutions arrive early. A network with more solutions than the
 last limit is divided by the values of one variable, again and again, until every part has few enough solutions.
@@ -13,7 +13,7 @@ from robochoc.solver.ace import SolverAnswer
 from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.propagation import propagate
 
-BATCHES = (10, 300, 10_000, 50_000)
+BATCHES = (10, 300, 10_000)
 """The limits of the first searches. The last one is also the maximum number of solutions of an undivided part."""
 
 Search = Callable[[Network, int], SolverAnswer]

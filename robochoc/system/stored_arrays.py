@@ -49,8 +49,11 @@ def is_on_disk(array: NDArray[Any]) -> bool:
 
 
 def free_disk_bytes() -> int:
-    """Return the free space of the folder for temporary files."""
-    return shutil.disk_usage(temporary_folder()).free
+    """Return the free space of the folder for temporary files; 0 if there is no such folder."""
+    try:
+        return shutil.disk_usage(temporary_folder()).free
+    except FileNotFoundError:
+        return 0
 
 
 def _map_of(array: NDArray[Any]) -> mmap.mmap | None:

@@ -211,6 +211,18 @@ def warehouse(folder: Path) -> Path:
     return folder
 
 
+def test_who_leaves_high_above_the_ground_lands_on_it(tmp_path: Path) -> None:
+    model = robochoc.Model("high")
+    for name, x in (("a", 0), ("b", 3)):
+        robot = model.robot(name)
+        robot.topic(f"/{name}/goal", x=x, y=robot.variable("y", [0, 1]), z=50)
+    model.after_solution().remove_robot("b")
+    model.save(tmp_path / "high")
+    recording = tmp_path / "run.mcap"
+    ran("solve", tmp_path / "high", "--protocol", "abt", "--runtime", "simulator", "--ros", f"mcap:{recording}")
+    assert [at[2] for _, at in published(recording, "/b/goal")] == [50, 0]
+
+
 def test_places_are_in_metres_and_robots_on_the_ground_do_not_land(tmp_path: Path) -> None:
     team = warehouse(tmp_path / "warehouse")
     words = ("--protocol", "abt", "--runtime", "simulator", "--ros", f"mcap:{tmp_path / 'run.mcap'}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from random import Random
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -13,6 +15,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.disclosure import HasOnly, Pays, Reception
 from robochoc.protocols.findings import NO_FINDINGS
 from robochoc.protocols.message import Message, encode
 from robochoc.protocols.optimization.run_lengths import expanded
@@ -98,13 +101,24 @@ def test_domains_of_more_or_fewer_robots_than_there_are_above_are_refused(messag
 
 @looped(
     "message",
-    [Below([BOTH], [], [(0, 1)], 0), Below([BOTH], [(0,)], [(0, 1)], 0), Below([BOTH], [(0, 0)], [(0, 2)], 0)],
+    [
+        *(Below([BOTH], [], [(0, 1)], 0), Below([BOTH], [(0,)], [(0, 1)], 0), Below([BOTH], [(0, 0)], [(0, 2)], 0)),
+        *(Below([BOTH], [(0, wrong)], [(0, 1)], 0) for wrong in (-3, 0.5, -math.inf, math.nan)),
+        Below([BOTH], [(0, 0)], [(0, 1)], -1),
+    ],
 )
 def test_charges_that_do_not_fit_are_refused(message: Below) -> None:
     robot = agents(team(CHAIN))["RB"]
     replies(robot, ("RA", above([BOTH])))
     with pytest.raises(ValueError, match="unexpected "):
         robot.receive("RC", message)
+
+
+def test_an_observer_expands_no_more_runs_than_there_are_robots() -> None:
+    """A journal may contain anything: a list of 10^12 entries would not fit into memory."""
+    reception = SimpleNamespace(order=["RA", "RB", "RC"], receiver="RB")
+    proofs = Below([BOTH], [(0, 5)], [(0, 10**12)], 5).proves(cast("Reception", reception))
+    assert proofs == [HasOnly("RC", BOTH), Pays("RC", (1,), {}, 0, 0), Pays("RC", (2,), {}, 5, 5)]
 
 
 # Many at a time

@@ -355,8 +355,8 @@ def _empty(shape: Sequence[int], kind: DTypeLike, *, on_disk: bool) -> NDArray[A
     except OSError as error:
         size = math.prod(shape) * np.dtype(kind).itemsize
         raise TooLargeError(
-            f"a table of {size:,} bytes cannot be stored in the folder for temporary files: {error.strerror} (free"
-            " space there, or choose another folder by the environment variable TMPDIR)"
+            f"a table of {size:,} bytes cannot be stored in the folder for temporary files: {error.strerror or error}"
+            " (free space there, or choose another folder by the environment variable TMPDIR)"
         ) from None
 
 

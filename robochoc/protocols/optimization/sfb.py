@@ -155,11 +155,6 @@ class Below(Message, frozen=True):
 
     act = Act(Performative.INFORM, "the receiver learns the domains and charges below it")
 
-    @property
-    def robots(self) -> list[tuple[Domain, Charges]]:
-        """The domain and the charges of each robot."""
-        return expanded(list(zip(self.domains, self.charges, strict=True)), self.runs)
-
     def in_words(self, words: Wording) -> str:
         domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         if not domains:
@@ -171,7 +166,8 @@ class Below(Message, frozen=True):
     def proves(self, reception: Reception) -> Sequence[Proof]:
         below = reception.order[reception.order.index(reception.receiver) + 1 :]
         found: list[Proof] = []
-        for robot, (values, charges) in zip(below, self.robots, strict=False):
+        told = expanded(list(zip(self.domains, self.charges, strict=True)), cut_off(self.runs, len(below)))
+        for robot, (values, charges) in zip(below, told, strict=False):
             paid = [Pays(robot, value, {}, cost, cost) for value, cost in zip(values, charges, strict=True)]
             found += [HasOnly(robot, tuple(values)), *paid]
         return found
@@ -462,8 +458,9 @@ class SFB(Protocol):
             case Above(domains, runs):
                 fitting = fits(len(domains), runs, self.rank)
                 return sender == self.previous and not self.domains and fitting
-            case Below(domains, charges, runs):
+            case Below(domains, charges, runs, most):
                 alike = len(domains) == len(charges) and all(map(_same_length, domains, charges))
+                alike = alike and most >= 0 and all(_is_charge(charge) for row in charges for charge in row)
                 fitting = alike and fits(len(domains), runs, len(self.order.names) - self.rank - 1)
                 return sender == self.next and bool(self.domains) and not self._priced and fitting
             case CPAs(_, _, least, ceiling):
@@ -611,6 +608,11 @@ class SFB(Protocol):
 def _as_integer(cost: float) -> float:
     """Return `cost` as an integer if it is finite: integers take fewer bytes in a message."""
     return cost if cost == math.inf else int(cost)
+
+
+def _is_charge(cost: float) -> bool:
+    """Return whether `cost` is infinite, or an integer of 0 or more."""
+    return cost == math.inf or (cost >= 0 and cost == int(cost))
 
 
 def max_finite(charges: Sequence[float]) -> int:
