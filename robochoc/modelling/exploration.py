@@ -102,7 +102,7 @@ class _Searches:
 
     @property
     def can_list(self) -> bool:
-        """Whether the central solver may list the other solutions, instead of a search for each."""
+        """True if the central solver can list the other solutions instead of searching for each."""
         ace = self._options.get("central_with", CentralSolverName.ACE) == CentralSolverName.ACE
         return self.found[0].protocol == CENTRAL and ace and self._options.keys() <= LISTING_OPTIONS
 

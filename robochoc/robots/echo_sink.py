@@ -27,7 +27,7 @@ class EchoSink(Sink):
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - the header has the time
         """Print the message."""
-        print(topic, kind, json.dumps(fields), file=sys.stderr)  # noqa: T201 - the purpose of this sink
+        print(topic, kind, json.dumps(fields, default=str), file=sys.stderr)  # noqa: T201 - the purpose of this sink
 
     def close(self) -> None:
         """Do nothing, since every message has been printed."""

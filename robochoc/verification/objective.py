@@ -70,9 +70,11 @@ class Objective:
         known, costs = self._values, self._costs
         for number in touched:
             try:
-                cost = self._prices[number]([known[name] for name in self._scopes[number]])
+                chosen = [known[name] for name in self._scopes[number]]
             except KeyError:
                 cost = self._cost_with_absent(number) if self._withdrawal_cost is not None else 0
+            else:
+                cost = self._prices[number](chosen)
             if cost != costs[number]:
                 self._set_cost(number, cost)
 

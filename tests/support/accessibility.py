@@ -1,4 +1,4 @@
-"""What axe-core finds on a page in a browser."""
+"""Accessibility faults of a page in a browser, found by axe-core."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Tables of costs in DPOP: how they are joined, projected, stored and sent (see `dpop`).
 
 An axis belongs to a robot, an index on it to one of the robot's values. Costs are integers, or `inf` if a hard
-constraint is broken; they are added up as the narrowest integers that have room for the sums, or in float64, which is
+constraint is broken; they are added up as the narrowest integers that can hold the sums, or in float64, which is
 exact below 2^53. Stored and sent tables contain unsigned integers, as narrow as the costs allow; the largest number
 represents `inf`. The memory that an operation needs is known before: `bytes_of`.
 """
@@ -129,7 +129,7 @@ class _Codes:
     """Numbers for a cost and the value that attains it, so that a single minimum finds the cheapest and first value.
 
     The number is `cost * many + value`, where `many` is the number of this robot's values. Any number from `infinite`
-    on is an infinite cost. If no integer type has room for these numbers, or there are few, they are floats for costs
+    on is an infinite cost. If no integer type can hold these numbers, or there are few, they are floats for costs
     alone.
     """
 
