@@ -25,6 +25,7 @@ from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunP
 from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.garbage import collection_paused
 from robochoc.system.stopping import stop_requested
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
@@ -62,9 +63,10 @@ class ArraysRun(Session):
         assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
         given = read_settings(protocol, parameters.settings)
         settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
-        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
         try:
-            self._layout = computed_by(deadline, _laid_out, parts)
+            with collection_paused():
+                parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
+                self._layout = computed_by(deadline, _laid_out, parts)
         except TimeLimitError:
             raise TeamCompileTimeoutError("the time was over before the robots knew their problems") from None
         self._run = form(self._layout, settings, parameters.seed, changes=True)
