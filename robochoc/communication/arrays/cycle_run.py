@@ -6,6 +6,7 @@ One `step` is a cycle of all robots. Comments name the corresponding methods in 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterable, Iterator
 from functools import cached_property
 from typing import NamedTuple, TypeVar, cast
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
+from robochoc.communication.arrays.border import WHOLE_TEAM, Border
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import MessageTally
 from robochoc.model.outcome import Metrics, Verdict
@@ -74,6 +76,7 @@ class CycleRun(ABC):
         tally: The counts of sent messages.
         checks: The constraint checks of all robots together.
         clocks: The NCCC clock of each row; None if clocks are not computed.
+        border: The connection to the robots in other processes.
     """
 
     settings: CycleCount
@@ -96,6 +99,7 @@ class CycleRun(ABC):
         self.tally = MessageTally()
         self.checks = 0
         self.clocks: Integers | None = np.zeros(layout.many, np.int64) if clocks else None
+        self.border: Border = WHOLE_TEAM
         names = layout.description.names
         self.draws = Draws(seed, (names[robot] for robot in layout.robots.tolist()), layout.many)
         self._firsts = [np.arange(group.active) * group.size for group in layout.groups]
@@ -108,7 +112,9 @@ class CycleRun(ABC):
     @property
     def is_over(self) -> bool:
         """True if the run has ended."""
-        return self.verdict is not None or self.cycle >= self.settings.cycles or not self._active
+        return (
+            self.verdict is not None or self.cycle >= self.settings.cycles or not (self._active or self.border.active)
+        )
 
     def start(self) -> None:
         """Start all robots: cycle 0."""
@@ -124,6 +130,7 @@ class CycleRun(ABC):
 
     def step(self) -> None:
         """Run one cycle."""
+        self.border.exchange(self.values, self.clocks)
         before = self.values.copy()
         self._step()
         if self.verdict is not None:
@@ -137,6 +144,7 @@ class CycleRun(ABC):
         """Compute the cost of the last cycle's values."""
         if self.layout.empty.size or len(self.costs) > self.cycle:
             return
+        self.border.exchange(self.values)
         self._weigh()
 
     def metrics(self, wall_s: float) -> Metrics:
@@ -189,7 +197,7 @@ class CycleRun(ABC):
                 sums.add(self.layout, now - chosen, block.held.others.shape[1] + 1)
                 chosen = now
             found.append(total)
-        self.note(sums.cost)
+        self.note(sums.cost(self.border))
         return found
 
     def note(self, cost: float) -> None:
@@ -263,12 +271,15 @@ class _Sums:
         self._broken[times] = self._broken.get(times, 0) + broken
         self._paid[times] = self._paid.get(times, 0) + layout.costs.sum(costs) - (broken << layout.costs.bits)
 
-    @property
-    def cost(self) -> float:
-        """The resulting sum."""
-        if any(self._broken.values()):
-            return INFINITE
-        return sum(paid // times for times, paid in self._paid.items())
+    def cost(self, border: Border) -> float:
+        """Return the resulting sum, including the robots beyond the border."""
+        total: Counter[int] = Counter()
+        for broken, paid in border.gather((any(self._broken.values()), list(self._paid.items()))):
+            if broken:
+                return INFINITE
+            for times, part in paid:
+                total[times] += part
+        return sum(paid // times for times, paid in total.items())
 
 
 def _fixed(group: RobotGroup) -> Integers:

@@ -7,7 +7,7 @@ integers compare like `LexicographicCost`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -142,9 +142,13 @@ class ArrayLayout:
         places: The row of each robot; -1 for robots without values.
         groups: The groups of robots with the same number of values, in ascending order of that number.
         degrees: The number of neighbours of the robot in each row.
+
+    Args:
+        description: The team, or a block of it.
+        costs: The integer form of costs, if the team is larger than `description`.
     """
 
-    def __init__(self, description: Description) -> None:
+    def __init__(self, description: Description, costs: IntegerCosts | None = None) -> None:
         self.description = description
         sizes, degrees = description.sizes, description.degrees
         order = np.lexsort((-degrees, sizes))
@@ -155,7 +159,7 @@ class ArrayLayout:
         self.degrees = degrees[self.robots]
         self.kind = narrowest(int(sizes.max(initial=1)))
         held = [] if self.empty.size else list(description.held)
-        self.costs = IntegerCosts.up_to(*_largest(description, held))
+        self.costs = costs or cost_form(description)
         self.groups = list(self._groups(held))
 
     @property
@@ -265,7 +269,13 @@ class ArrayLayout:
         return ConstraintBlock(held, rows, tuple(found))
 
 
-def _largest(description: Description, held: list[KnownConstraints]) -> tuple[float, int]:
+def cost_form(description: Description) -> IntegerCosts:
+    """Return the integer form of the costs of a team. Raises `TooLargeError` if the costs do not fit into 64 bits."""
+    held = () if (description.sizes == 0).any() else description.held
+    return IntegerCosts.up_to(*_largest(description, held))
+
+
+def _largest(description: Description, held: Sequence[KnownConstraints]) -> tuple[float, int]:
     """Return the largest possible sum of a robot's costs, and number of its violated constraints."""
     many = len(description.sizes)
     total, constraints = np.zeros(many), np.zeros(many, np.int64)

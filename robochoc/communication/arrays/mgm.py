@@ -40,6 +40,7 @@ class ArrayGainers(CycleRun):
         costs = self.layout.costs
         lengths = _REST + integer_bytes(costs.broken(gains)) + integer_bytes(costs.paid(gains))
         self.tally.add(Gain.__name__, lengths, self.layout.degrees)
+        self.border.exchange(gains, self.clocks)
 
     def wins(self, gains: Integers, partners: Integers | None = None) -> Flags:
         """Return the robots that gain most among their neighbours except `partners`. The highest wins ties."""
