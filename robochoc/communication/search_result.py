@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import reduce
 from operator import add
@@ -44,7 +44,7 @@ class SearchResult:
 
     `witness` is the robot that concluded the verdict alone, or None if the verdict follows from quiescence or a limit.
     `lost` maps the robots whose loss stopped the search to the reasons. `findings` is the robots' knowledge about the
-    team.
+    team. `cycle_costs` contains the cost of the robots' values in each cycle, if the runtime has computed it.
     """
 
     verdict: Verdict
@@ -53,6 +53,7 @@ class SearchResult:
     metrics: Metrics
     lost: dict[str, str] = field(default_factory=dict)
     findings: dict[str, Findings] = field(default_factory=dict)
+    cycle_costs: Sequence[float] = ()
 
     @classmethod
     def of(

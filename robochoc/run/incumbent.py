@@ -105,7 +105,9 @@ def _best_cycle(compiled: CompiledTeam, result: SearchResult, objective: Objecti
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return
-    costs = list(_costs_by_cycle(compiled, trails, objective))
+    costs = result.cycle_costs
+    if len(costs) != _complete_cycles(trails):
+        costs = list(_costs_by_cycle(compiled, trails, objective))
     if costs:
         own: _Own = {}
         for changed in itertools.islice(_changes(compiled, trails), costs.index(min(costs)) + 1):
@@ -119,5 +121,10 @@ def _changes(compiled: CompiledTeam, trails: Mapping[str, Trail]) -> Iterator[_O
     for name, trail in trails.items():
         for cycle, index in trail.entries:
             changes.setdefault(cycle, {})[name] = compiled[name].solution(index)
-    for cycle in range(min((trail.cycle for trail in trails.values()), default=-1) + 1):
+    for cycle in range(_complete_cycles(trails)):
         yield changes.get(cycle, {})
+
+
+def _complete_cycles(trails: Mapping[str, Trail]) -> int:
+    """Return the number of cycles that all robots have completed."""
+    return min((trail.cycle for trail in trails.values()), default=-1) + 1

@@ -97,8 +97,9 @@ class ArraysRun(Session):
         witness = None if run.witness is None else self._names[run.witness]
         if self._observer and witness is not None:
             self._observer(Concluded(t=run.cycle, robot=witness, verdict=str(verdict)))
+        metrics = run.metrics(time.monotonic() - began)
         return SearchResult(
-            verdict, witness, self._assignments(), run.metrics(time.monotonic() - began), findings=self._findings()
+            verdict, witness, self._assignments(), metrics, findings=self._findings(), cycle_costs=self.costs
         )
 
     def _watched(self) -> None:
