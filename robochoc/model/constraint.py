@@ -135,6 +135,12 @@ class Relation:
             case Semantics.SOFT:
                 return self._listed, self.default_cost
 
+    @cached_property
+    def finite_costs(self) -> tuple[float, float]:
+        """The smallest and the largest finite cost of a tuple; 0 and 0 if there is none."""
+        finite = [cost for cost in {*self.costs, self.default_cost} if cost < INFINITE] or [0]
+        return min(finite), max(finite)
+
     def cost(self, values: Sequence[int]) -> float:
         """Return the cost of the tuple `values`: 0 or `INFINITE` unless the relation is soft."""
         listed, other = self.prices

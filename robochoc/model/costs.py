@@ -185,7 +185,7 @@ def _needs_normalizing(robot: Robot) -> bool:
 def _may_be_negative(constraint: Constraint) -> bool:
     match constraint.definition:
         case Relation() as relation:
-            return min((*relation.costs, relation.default_cost)) < 0
+            return relation.finite_costs[0] < 0
         case Predicate():
             return constraint.cost < 0
         case Function():

@@ -277,18 +277,18 @@ class _Reordering:
         unmoved = set(map(id, old.shared))
         for constraint in self._held[name]:
             others = _owners(self._old, constraint) - {name}
-            moved = constraint if id(constraint) in unmoved else replace(constraint, line=0)
+            moved = replace(constraint, line=0) if constraint.line and id(constraint) not in unmoved else constraint
             under[max(others, key=self._seen.__getitem__)].append(moved)
         parents = {parent.name: parent for parent in old.parents}
         children = {child.name: child for child in old.children}
         return replace(
             old,
             parents=tuple(
-                replace(parents.get(parent, Parent(parent)), constraints=tuple(under[parent]))
+                Parent(parent, tuple(under[parent]), parents[parent].line if parent in parents else 0)
                 for parent in self._listed(parents, self._parents[name])
             ),
             children=tuple(
-                self._with_needed_variables(old, children.get(child, Child(child)))
+                self._with_needed_variables(old, children.get(child) or Child(child))
                 for child in self._listed(children, self._children[name])
             ),
         )
@@ -303,7 +303,8 @@ class _Reordering:
         needed_before = self._needed_before[child.name].get(robot.name, set())
         remaining = [name for name in child.variables if name in needs_now or name not in needed_before]
         own = [variable.name for variable in robot.variables if variable.name in needs_now]
-        return replace(child, variables=tuple(dict.fromkeys([*remaining, *own])))
+        variables = tuple(dict.fromkeys([*remaining, *own]))
+        return child if variables == child.variables else replace(child, variables=variables)
 
 
 def _child(parent: Robot, name: str) -> Child:

@@ -63,11 +63,17 @@ def choose(team: Team, options: Options, *, environment: bool = False, ordered: 
     """
     if options.protocol == AUTO:
         choice = _decided(team, options, environment=environment)
-    elif ordered or options.order is not None or options.chosen or options.protocol == CENTRAL:
+    elif (
+        ordered
+        or options.order is not None
+        or options.chosen
+        or options.protocol == CENTRAL
+        or _keeps_order(options, Facts(team, environment))
+    ):
         choice = ProtocolChoice(options)
     else:
-        facts = Facts(team, environment)
-        choice = ProtocolChoice(_with_order(options, facts, Order.MAX_DEGREE, "the imported file orders no robots"))
+        reasons = {**options.chosen, "order": "the imported file orders no robots"}
+        choice = ProtocolChoice(replace(options, order=Order.MAX_DEGREE, chosen=reasons))
     if choice.options.order == Order.GIVEN:
         choice = replace(choice, options=replace(choice.options, order=None))
     return choice
@@ -92,20 +98,21 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
     facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss)
     rejected: dict[str, list[str]] = {}
     for rule in RULES:
-        against = rule.unmet(facts) or refusal(rule.protocol, team, options)
+        against = rule.unmet(facts)
         if not against:
-            rejected.pop(rule.protocol, None)
-            return _choice(facts, options, (rule.protocol, rule.why), rejected)
+            chosen = _chosen(facts, options, rule.protocol, rule.why)
+            against = refusal(rule.protocol, team, chosen)
+        if not against:
+            return _choice(facts, chosen, rejected)
         if against != LOSSY.otherwise:  # without losses the rule is not worth reporting
             rejected.setdefault(rule.protocol, []).append(against)
     for name in _others(tolerating_loss=facts.loss > 0):
         if accepts(name, team, options):
-            rejected.pop(name, None)
-            return _choice(facts, options, (name, ACCEPTS), rejected)
+            return _choice(facts, _chosen(facts, options, name, ACCEPTS), rejected)
     usual = (
         DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL
     )  # the resulting error text names the protocols that accept the team
-    return _choice(facts, options, (usual, NONE_ACCEPTS), {})
+    return _choice(facts, _chosen(facts, options, usual, NONE_ACCEPTS), {})
 
 
 def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
@@ -151,18 +158,16 @@ def refusal(name: str, team: Team, options: Options) -> str:
     try:
         protocol = protocol_named(name)
         refuse_settings(name, protocol, options.settings)
-        refuse_team(team, replace(options, protocol=name), protocol.traits)
+        case = options if options.protocol == name else replace(options, protocol=name)
+        refuse_team(team, case, protocol.traits)
     except (UnknownProtocolError, UnsupportedError) as refused:
         return str(refused)
     return ""
 
 
-def _choice(
-    facts: Facts, options: Options, taken: tuple[str, str], rejected: Mapping[str, list[str]]
-) -> ProtocolChoice:
-    name, why = taken
-    chosen = _with_suitable_order(replace(options, protocol=name, chosen={"protocol": why}), facts)
-    against = tuple((other, "; ".join(dict.fromkeys(whys))) for other, whys in rejected.items())
+def _choice(facts: Facts, chosen: Options, rejected: Mapping[str, list[str]]) -> ProtocolChoice:
+    others = ((name, whys) for name, whys in rejected.items() if name != chosen.protocol)
+    against = tuple((name, "; ".join(dict.fromkeys(whys))) for name, whys in others)
     return ProtocolChoice(chosen, tuple(_in_words(facts)), against)
 
 
@@ -191,29 +196,31 @@ def faster_order(team: Team, options: Options) -> Order | None:
         team: The team with its scenario.
         options: How to run, with the name of a protocol.
     """
-    if options.protocol not in STATIC or options.order is not None:
+    if options.protocol not in STATIC or options.order is not None or _keeps_order(options, Facts(team)):
         return None
-    order = _with_order(options, Facts(team), Order.MAX_DEGREE, "").order
-    return order if isinstance(order, Order) else None
+    return Order.MAX_DEGREE
 
 
-def _with_suitable_order(options: Options, facts: Facts) -> Options:
-    """Return `options` with the order that suits the protocol, if such an order is known."""
-    order = ORDERS.get(options.protocol)
-    if options.protocol == DEFAULT_COST_PROTOCOL and options.withdraw == Withdrawal.MINIMUM:
+def _chosen(facts: Facts, options: Options, protocol: str, why: str) -> Options:
+    """Return `options` with `protocol`, and with the order that suits it, if the order is to be chosen too."""
+    order = ORDERS.get(protocol)
+    if protocol == DEFAULT_COST_PROTOCOL and options.withdraw == Withdrawal.MINIMUM:
         order = Order.DOM_DEG  # robots that must withdraw are found soon
     if order == Order.MIN_WIDTH and facts.has_costs:
         order = Order.MAX_DEGREE
-    if options.order is not None or order is None:
-        return options
-    return _with_order(options, facts, order, f"{options.protocol} is usually fastest in it")
+    if options.order is not None or order is None or _keeps_order(options, facts):
+        return replace(options, protocol=protocol, chosen={"protocol": why})
+    reasons = {"protocol": why, "order": f"{protocol} is usually fastest in it"}
+    return replace(options, protocol=protocol, order=order, chosen=reasons)
 
 
-def _with_order(options: Options, facts: Facts, order: Order, why: str) -> Options:
-    """Return `options` with `order`, unless the order of the team must be kept."""
-    if options.withdraw == Withdrawal.MAXIMAL or facts.changes or facts.partially_known:
-        return options  # priorities decide withdrawals, changes depend on the order, and PKC links cannot be reversed
-    return replace(options, order=order, chosen={**options.chosen, "order": why})
+def _keeps_order(options: Options, facts: Facts) -> bool:
+    """Return whether the order of the files must be kept.
+
+    Priorities decide withdrawals, changes depend on the order, and links of partially known constraints are not
+    reversed.
+    """
+    return options.withdraw == Withdrawal.MAXIMAL or facts.changes or facts.partially_known
 
 
 # Facts

@@ -79,11 +79,15 @@ class Facts:
     @cached_property
     def declared_sizes(self) -> Sizes:
         """The declared number of values of each robot. Private constraints may leave fewer values."""
-        sizes = {}
-        for robot in self.first.robots:
-            seen = set(robot.interface)
-            sizes[robot.name] = math.prod(len(one.domain) for one in robot.variables if one.name in seen)
-        return sizes
+        robots = self.first.robots
+        seen = {name for robot in robots for name in robot.shown}
+        for robot in robots:
+            seen.update(name for constraint in robot.shared for name in constraint.variables)
+            for child in robot.children:
+                seen.update(child.variables, *(constraint.variables for constraint in child.constraints))
+        return {
+            robot.name: math.prod([len(one.domain) for one in robot.variables if one.name in seen]) for robot in robots
+        }
 
     @cached_property
     def sizes(self) -> Sizes:
@@ -134,8 +138,8 @@ class Facts:
     def _largest_table(self, sizes: Sizes) -> int:
         owner = self.first.owner
         shared = (one for robot in self.first.robots for one in robot.shared)
-        scopes = ({owner[name] for name in one.variables} for one in shared)
-        return max((math.prod(sizes[name] + 1 for name in scope) for scope in scopes), default=1)
+        scopes = {frozenset([owner[name] for name in one.variables]) for one in shared}
+        return max((math.prod([sizes[name] + 1 for name in scope]) for scope in scopes), default=1)
 
 
 def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> float:

@@ -174,12 +174,12 @@ def max_cost(constraint: Constraint) -> Cost:
     """Return the maximum finite cost of `constraint`; for a function, the bound on its expression."""
     match constraint.definition:
         case Relation() as relation:
-            prices: tuple[Cost, ...] = (*relation.costs, relation.default_cost)
+            return relation.finite_costs[1]
         case Predicate():
-            prices = (constraint.cost,)
+            most: Cost = constraint.cost
         case Function() as function:
-            prices = (bounds(function.body, defaultdict(lambda: ANY_INTEGER)).high,)
-    return max((price for price in prices if price < INFINITE), default=0)
+            most = bounds(function.body, defaultdict(lambda: ANY_INTEGER)).high
+    return most if most < INFINITE else 0
 
 
 def is_soft(constraint: Constraint) -> bool:
