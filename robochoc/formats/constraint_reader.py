@@ -82,7 +82,7 @@ def _scope_only(element: etree._Element) -> Constraint:
 def _read(element: etree._Element, context: ConstraintContext, model: ConstraintModel | None) -> Constraint | None:
     """Return the constraint, or None if its definition is invalid. Raises `MistakeError`."""
     scope = _terms(element.get("scope") or "")
-    given = element.find("parameters")
+    given = next(element.iterchildren("parameters"), None)
     reference = attribute(element, "reference")
     definition: Definition | None
     if is_global(reference):
@@ -91,7 +91,7 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
             definition = replace(definition, symbolic=definition.parameters)
     else:
         _refuse_elements(given)
-        parameters = scope if given is None else _terms(given.text or "")
+        parameters = scope if given is None or given.text == element.get("scope") else _terms(given.text or "")
         definition = _definition(reference, context)
     if not definition:
         return None

@@ -5,6 +5,7 @@ docs/reference/format.md, "Costs".
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -59,13 +60,13 @@ def scale_text(places: int) -> str:
 def places_used(root: etree._Element) -> int:
     """Return the largest number of decimal places in the costs of a file. Invalid costs are ignored."""
     words = [attribute(element, "constant") for element in root.iterchildren("presentation")]
-    words += [attribute(element, "defaultCost") for element in root.iterfind("relations/relation")]
     words += [attribute(element, "cost") for element in root.iter("constraint")]
-    for relation in root.iterfind("relations/relation"):
+    for relation in itertools.chain.from_iterable(root.iterchildren("relations")):
+        words.append(attribute(relation, "defaultCost"))
         text = relation.text or ""
         if "." in text and attribute(relation, "semantics") == Semantics.SOFT:
             words += [part.partition(":")[0].strip() for part in text.split("|") if ":" in part]
-    return max((_places(word) for word in words), default=0)
+    return max((_places(word) for word in words if "." in word), default=0)
 
 
 def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> CostUnits:

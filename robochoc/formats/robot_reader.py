@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeVar, cast
 
 from lxml import etree
 
@@ -60,6 +61,8 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.model.symbols import with_table
+
+_Part = TypeVar("_Part", Domain, Definition)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,18 +204,16 @@ class _RobotReader:
         context = ConstraintContext(kind, units, model, self._own, self._definitions(kind, units), symbolic)
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
+        implied: set[str] = set()
         parents = tuple(self._parents(context))
-        children = tuple(self._children(context, copies))
+        children = tuple(self._children(context, copies, implied))
         self._check_neighbours(parents, children)
         self._report.finish()
         weight = int(attribute(presentation, "weight") or Robot.weight)
         file = self._report.file
         robot = Robot(self._name, variables, kind, private, parents, children, topics, file, weight=weight, costs=units)
-        implied_children = frozenset(
-            attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
-        )
         places = FileLocations(file, line(presentation), self._own)
-        return RobotFile(robot, places, copies, implied_children, context=context)
+        return RobotFile(robot, places, copies, frozenset(implied), context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
         """Yield the elements in a section of the instance, and check their number."""
@@ -227,8 +228,17 @@ class _RobotReader:
             with self._report.at(line(element)):
                 check_unique("domain", attribute(element, "name"), domains)
                 domains[attribute(element, "name")] = None
-                domains[attribute(element, "name")] = read_domain(element, self._table)
+                domains[attribute(element, "name")] = self._once(element, lambda one: read_domain(one, self._table))
         return domains
+
+    def _once(self, element: etree._Element, read: Callable[[etree._Element], _Part], units: object = None) -> _Part:
+        """Return the result of `read`. Elements with equal texts, read in equal `units`, share one object."""
+        text = etree.tostring(element, with_tail=False) if len(element) else element.text
+        key = units, element.tag, *element.attrib.items(), text
+        part = self._table.parts.get(key)
+        if part is None:
+            part = self._table.parts[key] = read(element)
+        return cast("_Part", part)
 
     def _variables(self, domains: Mapping[str, Domain | None]) -> tuple[Variable, ...]:
         variables = []
@@ -267,7 +277,7 @@ class _RobotReader:
     def _definitions(self, kind: ProblemKind, units: CostUnits) -> dict[str, Definition | None]:
         definitions: dict[str, Definition | None] = {}
         for element in self._elements("relations", "relation", "nbRelations"):
-            self._define(element, lambda one, code: read_relation(one, units, code), definitions)
+            self._define(element, lambda one, code: read_relation(one, units, code), definitions, units)
             with self._report.at(line(element)):
                 check_semantics(Semantics(attribute(element, "semantics")), kind)
         for element in self._elements("predicates", "predicate", "nbPredicates"):
@@ -283,13 +293,15 @@ class _RobotReader:
         element: etree._Element,
         read: Callable[[etree._Element, Callable[[str], int]], Definition],
         definitions: dict[str, Definition | None],
+        units: CostUnits | None = None,
     ) -> None:
         name = attribute(element, "name")
         with self._report.at(line(element)):
             check_unique("definition", name, definitions)
             definitions[name] = None
             refuse_predefined(name)
-            definitions[name] = read(element, self._code_at(line(element)))
+            code = self._code_at(line(element))
+            definitions[name] = self._once(element, lambda one: read(one, code), units)
 
     def _code_at(self, line_number: int) -> Callable[[str], int]:
         """Return a function for the codes of symbols that occur in a line."""
@@ -313,14 +325,21 @@ class _RobotReader:
         return tuple(constraints)
 
     def _agents(self, side: str) -> Iterator[etree._Element]:
-        return self._instance.iterfind(f"agents_neighbours/{side}/agent")
+        for neighbours in self._instance.iterchildren("agents_neighbours"):
+            for container in neighbours.iterchildren(side):
+                yield from container.iterchildren("agent")
 
     def _parents(self, context: ConstraintContext) -> Iterator[Parent]:
         for agent in self._agents("agents_parent"):
             yield Parent(attribute(agent, "name"), self._constraints(agent, context, read_shared), line(agent))
 
-    def _children(self, context: ConstraintContext, copies: dict[str, tuple[Constraint, ...]]) -> Iterator[Child]:
-        """Yield the children with this robot's parts of PKCs. Copies of TKCs are added to `copies`."""
+    def _children(
+        self, context: ConstraintContext, copies: dict[str, tuple[Constraint, ...]], implied: set[str]
+    ) -> Iterator[Child]:
+        """Yield the children with this robot's parts of PKCs.
+
+        Copies of TKCs are added to `copies`, and children without the attribute `variable` to `implied`.
+        """
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
             listed = self._constraints(agent, context, read_shared)
@@ -330,8 +349,11 @@ class _RobotReader:
                 copies[name] = copied
             scopes = itertools.chain.from_iterable(constraint.variables for constraint in listed)
             shown = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
-            if agent.get("variable") is not None:
-                shown = tuple((agent.get("variable") or "").split())
+            given = agent.get("variable")
+            if given is None:
+                implied.add(name)
+            else:
+                shown = tuple(given.split())
                 with self._report.at(line(agent)):
                     check_shown_variables(shown, self._own)
             yield Child(name, shown, parts, line(agent), copied)

@@ -6,7 +6,7 @@ docs/reference/format.md, "Symbols".
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 
 from robochoc.formats.definitions import MAX_VALUES, PREDEFINED
 from robochoc.formats.diagnostics import Diagnostic, MistakeError, shortened, suggestion
@@ -23,13 +23,18 @@ _NUMBER = re.compile(r"[-+.0-9]+")
 
 
 class SymbolTable:
-    """The symbols in a team's files, in the order of their first use. The index of a symbol is its code."""
+    """The symbols in a team's files, in the order of their first use. The index of a symbol is its code.
+
+    Attributes:
+        parts: The domains and definitions read so far, by their text: equal texts in several files become one object.
+    """
 
     def __init__(self, known: Sequence[str] = ()) -> None:
         """Start with the symbols `known`. Their codes are their indices."""
         self._codes = {name: code for code, name in enumerate(known)}
         self._declared: set[str] = set()
         self._mentioned: dict[str, tuple[str, int]] = {}
+        self.parts: dict[Hashable, Domain | Definition] = {}
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -131,6 +136,8 @@ def check_argument_types(constraint: Constraint, symbolic: Mapping[str, bool]) -
     if len(kinds) != len(constraint.parameters):
         return  # another mistake
     given = [False if isinstance(term, int) else symbolic.get(term) for term in constraint.parameters]
+    if True not in given and True not in kinds:
+        return  # integers only
     for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True):
         if None not in {wanted, kind} and wanted is not kind:
             name = shortened(constraint.definition.name)

@@ -113,6 +113,8 @@ def _assembled(folder: Path, members: TeamMembers) -> Team:
 def _with_implied_variables(members: TeamMembers, name: str) -> Robot:
     """Return the robot `name` with the variables that its children must know, even if its file only implies them."""
     file = members.files[name]
+    if not file.implied_children:
+        return file.robot
     children = []
     for child in file.robot.children:
         variables = child.variables

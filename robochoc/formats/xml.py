@@ -19,6 +19,7 @@ from robochoc.formats.schema import check_schema, entries, schema_for
 MAX_BYTES = 16 * 1024 * 1024
 _SMALL = 64 * 1024
 _CHUNK = 1024
+_BLOCK = 64 * 1024
 
 BLANKS = " \t\r\n"
 """The characters that count as blanks in XML."""
@@ -101,7 +102,8 @@ def parsed_tree(content: bytes, path: Path, most: int, *, long_texts: bool = Fal
 
 def attribute(element: etree._Element, name: str) -> str:
     """Return the text of an attribute, stripped of blanks; empty if the attribute is missing."""
-    return (element.get(name) or "").strip(BLANKS)
+    given = element.get(name)
+    return given.strip(BLANKS) if given else ""
 
 
 def line(element: etree._Element) -> int:
@@ -155,12 +157,17 @@ def _check_text(content: bytes, path: Path, most: int) -> None:
 
 def _bytes(path: Path, most: int) -> bytes:
     """Return at most one byte more than allowed. A FIFO is opened without waiting for its writer, and rejected."""
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise _invalid(path, 0, "is not a regular file", "move it away: each .xml here must be an XML file")
+        content = os.read(descriptor, min(status.st_size, most) + 1)
+        while content and len(content) <= most and (more := os.read(descriptor, _BLOCK)):
+            content += more
+        return content[: most + 1]
+    finally:
         os.close(descriptor)
-        raise _invalid(path, 0, "is not a regular file", "move it away: each .xml here must be an XML file")
-    with os.fdopen(descriptor, "rb") as file:
-        return file.read(most + 1)
 
 
 def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInputError:

@@ -238,7 +238,7 @@ class Constraint:
     @cached_property
     def variables(self) -> tuple[str, ...]:
         """The distinct variables of the scope, in its order."""
-        return tuple(dict.fromkeys(term for term in self.scope if isinstance(term, str)))
+        return tuple(dict.fromkeys([term for term in self.scope if isinstance(term, str)]))
 
     def price(self, assignment: Assignment) -> float:
         """Return the cost of `assignment`, which must contain the scope. 0: the constraint is satisfied."""

@@ -178,3 +178,16 @@ def test_parts_of_a_constraint_may_cost(tmp_path: Path) -> None:
         file("B", parents=CHILD_OF_A.format(part)),
     )
     assert sum(one.price({"A": 1, "B": 3}) for one in read_team(folder).constraints()) == -4
+
+
+@pytest.mark.parametrize("other", ["", '<constraint name="P" reference="ne" scope="B 1" cost="0.5"/>'])
+def test_equal_texts_in_two_files_are_read_once_in_each_unit(tmp_path: Path, other: str) -> None:
+    relation = '<relation name="r" arity="1" semantics="soft">4:1|2:2</relation>'
+    for own, more in (("A", ""), ("B", other)):
+        private = f'<constraint name="C" reference="r" scope="{own}"/>{more}'
+        (tmp_path / f"R{own}.xml").write_text(file(own, relations=relation, private=private))
+    one, second = read_team(tmp_path).robots
+    definitions = [one.private[0].definition, second.private[0].definition]
+    assert all(isinstance(read, Relation) and read.costs == ((40, 20) if other else (4, 2)) for read in definitions)
+    assert one.variables[0].domain is second.variables[0].domain
+    assert (definitions[0] is definitions[1]) is not bool(other)

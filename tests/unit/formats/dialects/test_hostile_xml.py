@@ -11,6 +11,7 @@ from robochoc.formats import InvalidInputError
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import NAMES, dialects, find_dialect, read_foreign, recognise
 from robochoc.formats.names_file import NAMES_FILE, original_names
+from robochoc.formats.xml import read_tree
 from tests.support.cases import looped
 
 FRODO = '<presentation format="XCSP 2.1_FRODO"/><agents><agent name="a"/></agents>'
@@ -81,6 +82,12 @@ def test_what_is_no_file_is_not_recognised(tmp_path: Path) -> None:
     assert recognise(fifo) is recognise(tmp_path) is recognise(tmp_path / "nowhere") is None
     with pytest.raises(InvalidInputError, match="has an unknown format"):
         read_foreign([fifo], ImportOptions())
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").is_file(), reason="no file whose size is stated as 0")
+def test_a_file_that_is_larger_than_it_states_is_read_on() -> None:
+    with pytest.raises(InvalidInputError, match="is larger than"):
+        read_tree(Path("/proc/self/status"), 100)
 
 
 def test_all_dialects_have_their_names() -> None:
