@@ -11,7 +11,7 @@ Both are thin layers over the code that the command line uses.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +26,7 @@ from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 from robochoc.system.posix import IS_POSIX, REQUIREMENT
 

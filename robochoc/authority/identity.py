@@ -7,7 +7,6 @@ certificate of the issuing Authority, the only one that this machine accepts.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import NamedTuple
@@ -30,6 +29,7 @@ from robochoc.authority.certificates import (
 from robochoc.authority.registry import PRIVATE
 from robochoc.system.errors import RobochocError
 from robochoc.system.files import write_atomically
+from robochoc.system.lazy_dataclass import dataclass
 
 KEY, CERTIFICATE, CA = "key.pem", "cert.pem", "ca.pem"
 _OTHERS = 0o077

@@ -11,9 +11,9 @@ import base64
 import binascii
 import hashlib
 import secrets
-from dataclasses import dataclass
 
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 SECRET_BYTES = 20
 FINGERPRINT_BYTES = 32

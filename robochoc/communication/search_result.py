@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import reduce
 from operator import add
 from typing import NamedTuple, Self
@@ -12,6 +12,7 @@ from typing import NamedTuple, Self
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import Findings
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 _MOST_NAMED = 5
 

@@ -6,7 +6,6 @@ import io
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any, NamedTuple
 
@@ -22,6 +21,7 @@ from robochoc.experiments.study import WIDTH
 from robochoc.experiments.summary import METRICS, Rows
 from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import listed
 
 _SETTINGS = {

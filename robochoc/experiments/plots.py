@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Hashable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import matplotlib as mpl
@@ -22,6 +21,7 @@ from robochoc.experiments.axes import (
     tick_numbers,
 )
 from robochoc.experiments.statistics import Band
+from robochoc.system.lazy_dataclass import dataclass
 
 _MOST_BANDS = 4
 """With more ways to run, intervals are drawn as bars, and quartiles are left out, since bands would overlap."""

@@ -6,7 +6,7 @@ import itertools
 import math
 import statistics
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 
 from robochoc.experiments.summary import Rows, labels
 from robochoc.experiments.task import Status
+from robochoc.system.lazy_dataclass import dataclass
 
 RESAMPLES = 2000
 CONFIDENCE = 0.95

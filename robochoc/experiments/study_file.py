@@ -6,13 +6,14 @@ import itertools
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input, shortened, suggestion
 from robochoc.formats.toml import line_of
+from robochoc.system.lazy_dataclass import dataclass
 
 HINT = "the page Experiments of the documentation describes the file of a study"
 MAX_INTEGER = 2**53

@@ -6,7 +6,6 @@ import math
 import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -14,6 +13,7 @@ from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import listed
 
 Rows = Sequence[Mapping[str, Any]]

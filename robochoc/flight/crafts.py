@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import product, zip_longest
 from math import prod
 
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate, names
 from robochoc.model.problem import Assignment, Robot, Topic
+from robochoc.system.lazy_dataclass import dataclass
 
 Cell = tuple[int, int]
 """Row and column, or the x and y of a topic."""

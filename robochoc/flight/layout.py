@@ -8,12 +8,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from itertools import count, product
 
 from robochoc.flight.crafts import Cell, Craft, row_and_column
 from robochoc.maps.ground_map import GroundMap
+from robochoc.system.lazy_dataclass import dataclass
 
 Point = tuple[float, float, float]
 

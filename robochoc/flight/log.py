@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.layout import Point
+from robochoc.system.lazy_dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -8,7 +8,7 @@ topic's coordinates is `scale` metres.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
+from robochoc.system.lazy_dataclass import dataclass
 
 _Array = npt.NDArray[np.float64]
 

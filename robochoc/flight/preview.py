@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from robochoc.flight.flight import fly
 from robochoc.flight.layout import BoxAxis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission, in_cells
+from robochoc.system.lazy_dataclass import dataclass
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
 """The errors of an impossible flight: places too close to each other, no routes, or numbers out of range.

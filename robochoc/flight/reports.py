@@ -6,9 +6,8 @@ all reports of a source.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from robochoc.flight.layout import Point
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from lxml import etree
 
@@ -31,6 +31,7 @@ from robochoc.model.problem import (
     Term,
     WhenAbsent,
 )
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

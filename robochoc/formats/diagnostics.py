@@ -6,12 +6,12 @@ import itertools
 import os
 from collections.abc import Collection, Iterable
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 from robochoc.model.priorities import natural_key
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.names import in_short
 from robochoc.model.problem import Child, Constraint, Parent
+from robochoc.system.lazy_dataclass import dataclass
 
 
 class Location(NamedTuple):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar, cast
 
@@ -61,6 +61,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from robochoc.model.symbols import with_table
+from robochoc.system.lazy_dataclass import dataclass
 
 _Part = TypeVar("_Part", Domain, Definition)
 

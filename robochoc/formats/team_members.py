@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from functools import cached_property
 
 from robochoc.formats.locations import Location, Locations
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Parent, Robot
+from robochoc.system.lazy_dataclass import dataclass
 
 
 class NeighbourRole(StrEnum):

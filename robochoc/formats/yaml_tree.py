@@ -10,13 +10,14 @@ import difflib
 import math
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from typing import Any, TypeVar
 
 import yaml  # noqa: TID251 - here, and nowhere else
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_BYTES = 64 * 1024 * 1024
 """The maximum size of all files together, in bytes."""

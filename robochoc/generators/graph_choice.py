@@ -10,7 +10,6 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Hashable, Iterable
-from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from robochoc.formats import Diagnostic, InvalidInputError
 from robochoc.generators import graphs
 from robochoc.generators.draws import MAX_NODES
 from robochoc.generators.graphs import Edge, Graph, GraphKind
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_BYTES = 16 * 1024 * 1024
 MAX_LABEL = 50

@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Collection, Iterable, Iterator
-from dataclasses import dataclass
 from enum import StrEnum
 from math import isqrt
 from random import Random
 
 from robochoc.generators.draws import MAX_EDGES, MAX_NODES, check_bounds, sample
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_GRAPH_DRAWS = 1000
 """The maximum number of graphs that are drawn to find a connected one."""

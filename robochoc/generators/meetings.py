@@ -23,7 +23,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from random import Random
 from typing import assert_never
@@ -43,6 +42,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Domain, Predicate, ProblemKind, Relation, Semantics, Team, Variable
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.suggestions import member
 
 _TERMS = ("X", "Y", "i", "j")

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import assert_never
 
@@ -30,6 +29,7 @@ from robochoc.generators.draws import MAX_AGENTS, check_bounds, limited, sample,
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Name, Type, parse, total
 from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Semantics, Team, Term, Variable
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.suggestions import member
 
 MAX_NEEDED = 10

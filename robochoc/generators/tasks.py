@@ -15,7 +15,6 @@ up. With several tasks, the distance to each task is measured from the robot's i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from random import Random
 from typing import assert_never
 
@@ -41,6 +40,7 @@ from robochoc.model.allocation import (
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.suggestions import member
 
 MAX_SIDE = 10_000

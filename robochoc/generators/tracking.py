@@ -13,7 +13,6 @@ Cells are numbered row by row from 0; distances between cells are Euclidean.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from math import prod
 from random import Random
 
@@ -22,6 +21,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Apply, Constant, Expression, Name, total
 from robochoc.model.problem import Constraint, Domain, Function, ProblemKind, Team, Variable
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_SIDE = 100
 MAX_REQUIREMENT = 1000

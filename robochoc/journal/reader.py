@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
 from operator import attrgetter
@@ -20,6 +19,7 @@ from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
 from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.garbage import collection_paused
+from robochoc.system.lazy_dataclass import dataclass
 
 ENTRIES_MAX = 30_000_000
 """The maximum number of entries that `read_journal` reads: about 10 million messages with a kilobyte of memory each."""

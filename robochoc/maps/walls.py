@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from robochoc.maps.ground_map import GroundMap, WallPixels
 from robochoc.maps.occupancy.packed import unpacked
+from robochoc.system.lazy_dataclass import dataclass
 
 _Array = npt.NDArray[np.float64]
 

@@ -12,7 +12,7 @@ import itertools
 import re
 import zlib
 from collections.abc import Collection, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from robochoc.model.constraint import (
     INFINITE,
@@ -26,6 +26,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.expression import Apply, Constant, Expression, Name, names, text
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 AGGREGATES = frozenset({"add", "min", "max", "and", "or"})
 """The operators whose arguments are terms of an aggregate."""

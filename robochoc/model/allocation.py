@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from fractions import Fraction
 from math import floor, isqrt
@@ -22,6 +22,7 @@ from typing import cast
 
 from robochoc.model.constraint import Constraint, Domain, Predicate, Relation, Semantics, Variable
 from robochoc.model.expression import Apply, Constant, Expression, Name, Type, parse, total
+from robochoc.system.lazy_dataclass import dataclass
 
 NOT_THE_SAME = Predicate("notSame", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
 """Two robots do not do the same task. 0 means no task."""

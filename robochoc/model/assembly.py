@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 from robochoc.model.constraint import (
     INFINITE,
@@ -25,6 +25,7 @@ from robochoc.model.expression import Apply, Name
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import Child, Parent, ProblemKind, Robot, Team, Topic
 from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

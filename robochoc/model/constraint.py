@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from functools import cached_property
 
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate
+from robochoc.system.lazy_dataclass import dataclass
 
 Assignment = Mapping[str, int]
 """Values of variables, by name."""

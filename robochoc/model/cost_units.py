@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from decimal import Decimal
+
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_PLACES = 9
 """The maximum number of decimal places of a cost."""

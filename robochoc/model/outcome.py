@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, field, fields, replace
+from dataclasses import KW_ONLY, field, fields, replace
 from enum import StrEnum
 from typing import Any, NamedTuple
 
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
+from robochoc.system.lazy_dataclass import dataclass
 
 RULED_OUT = "has ruled everything out"
 """The reason why a single robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty

@@ -12,7 +12,7 @@ violated hard constraints.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from functools import cached_property
 from importlib import import_module
@@ -36,6 +36,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits, common_units
 from robochoc.model.expression import Expression
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
 __all__ = [

@@ -10,7 +10,6 @@ import re
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -35,6 +34,7 @@ from robochoc.run.options import Options
 from robochoc.run.registry import protocol_named
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import OptionTypeError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError
 

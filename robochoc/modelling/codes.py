@@ -11,7 +11,7 @@ import itertools
 import math
 import re
 from collections.abc import Hashable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import Enum
 from fractions import Fraction
 from functools import cached_property
@@ -23,6 +23,7 @@ from robochoc.formats.symbols import check_symbol
 from robochoc.model.constraint import merge_ranges
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import exact, is_number, is_truth
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_VALUES = 100_000
 """The maximum size of a domain."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robochoc.model.constraint import WhenAbsent
 from robochoc.modelling.errors import ModelError, ModelTypeError, SourceLine
 from robochoc.modelling.numbers import Exact, exact, is_infinite, is_truth, shown
 from robochoc.modelling.terms import ModelVariable, Term, condition
+from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from robochoc.modelling.drafts import Draft

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -28,6 +28,7 @@ from robochoc.modelling.numbers import Exact, exact, is_infinite, places_of, rou
 from robochoc.modelling.tables import Price, Row, commonest, in_short, listed_rows, prices, truths
 from robochoc.modelling.terms import Linear, ModelVariable, Operation, TableTerm, Term
 from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
+from robochoc.system.lazy_dataclass import dataclass
 
 _FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping, ValuesView
-from dataclasses import dataclass, field
+from dataclasses import field
 from decimal import Decimal
 from fractions import Fraction
 from functools import cached_property
@@ -18,6 +18,7 @@ from robochoc.model.problem import Team
 from robochoc.modelling.errors import ModelTypeError, UnknownNameError
 from robochoc.modelling.operators import UndefinedTermError
 from robochoc.modelling.terms import ModelVariable, Term
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:

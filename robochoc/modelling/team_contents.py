@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation, Variable
 from robochoc.model.cost_units import CostUnits, common_units
@@ -11,6 +11,7 @@ from robochoc.model.problem import AddConstraint, Change, ConstraintModel, Probl
 from robochoc.modelling.codes import NUMBER, DomainCodes, Symbols, kind_of
 from robochoc.modelling.errors import SourceLine
 from robochoc.modelling.terms import ModelVariable
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

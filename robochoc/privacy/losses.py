@@ -11,8 +11,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
+
+from robochoc.system.lazy_dataclass import dataclass
 
 
 class Kind(StrEnum):

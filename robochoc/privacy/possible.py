@@ -11,10 +11,11 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple, assert_never
 
 from robochoc.model.problem import INFINITE
+from robochoc.system.lazy_dataclass import dataclass
 
 Secret = int
 """The number of a secret."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib.util import find_spec
 
 from robochoc.model.outcome import Verdict
+from robochoc.system.lazy_dataclass import dataclass
 
 ENDS_WITH_PROOF = (Verdict.NO_SOLUTION,)
 """Solutions are detected by quiescence; one robot alone can only prove that there is none."""

@@ -8,7 +8,6 @@ the search (`--improve`) may be older: it is checked against the constraints, an
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import partial
 from itertools import chain
 
@@ -31,6 +30,7 @@ from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_by_class
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_domain import TooManySolutionsError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.checker import RefutedError, assignment_cost, violations
 
 _COUNTS = ("messages", "bytes", "ncccs", "checks", "largest")

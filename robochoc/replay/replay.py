@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 
 import msgspec
 
@@ -22,6 +21,7 @@ from robochoc.replay.comparison import StepDifference
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
 from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import runs_of
+from robochoc.system.lazy_dataclass import dataclass
 
 PROGRESS_EVERY = 256
 """The number of steps between two progress reports."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import islice
 
 import numpy as np
@@ -19,6 +19,7 @@ from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.closed_loop import TOGETHER_S, Feedback
 from robochoc.robots.mission_publisher import FlightBroadcast, nanoseconds
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 NAMES_MAX = 12
 """The maximum number of drones named in an error."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import assert_never
 
@@ -19,6 +18,7 @@ from robochoc.flight.mission import Drone
 from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
 from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
+from robochoc.system.lazy_dataclass import dataclass
 
 _Cell = tuple[int, int, int]
 _A_HAIR_MORE = 1 + 1e-9

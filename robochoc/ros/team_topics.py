@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from robochoc.flight.layout import Point
@@ -13,6 +12,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.robots.sink import Fields
 from robochoc.ros.names import TEAM_TOPICS
 from robochoc.ros.waypoint_types import UPRIGHT, point
+from robochoc.system.lazy_dataclass import dataclass
 
 GOAL, BODY = "goal", "base_link"
 """The last parts of the names of a drone's frames: its goal, and the drone itself."""

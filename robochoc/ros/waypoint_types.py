@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType
 from typing import cast
@@ -20,6 +19,7 @@ from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.sink import Fields, Waypoint
 from robochoc.system.errors import RobochocError
 from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
+from robochoc.system.lazy_dataclass import dataclass
 
 GROUP = "robochoc.waypoints"
 

@@ -8,7 +8,7 @@ installed protocol that accepts the team and the options is chosen, complete pro
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 from robochoc.model.costs import UnboundedCostError, normalized
@@ -25,6 +25,7 @@ from robochoc.run.registry import UnknownProtocolError, installed_protocols, pro
 from robochoc.solver.compile import CompileError, CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
 ACCEPTS = "it accepts the team with these options, unlike the protocols that suit the team better"

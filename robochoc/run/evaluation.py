@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 from robochoc.communication.search_result import SearchResult
@@ -21,6 +21,7 @@ from robochoc.run.listed_optima import combined_optima
 from robochoc.run.phases import RunPhase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.checker import (
     RefutedError,
     assignment_cost,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
 from random import Random
@@ -13,6 +12,7 @@ from robochoc.model.change import team_after_events
 from robochoc.model.orders import Graph, constraint_graph
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Team
 from robochoc.solver.encoding import MAX_TUPLES, allows_function, is_soft
+from robochoc.system.lazy_dataclass import dataclass
 
 _TWO = 2
 LARGE = 1_000_000

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import StrEnum
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -29,6 +29,7 @@ from robochoc.run.option_values import (
 )
 from robochoc.solver.compile import CompileLimits
 from robochoc.system.deprecation import warn_deprecated
+from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robochoc.communication.search_result import Progress
@@ -31,6 +30,7 @@ from robochoc.run.this_machine import ThisMachine
 from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.errors import TooLargeError, UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.time_limit import TimeLimitError, computed_by
 from robochoc.verification.checker import check_user_cost
 

@@ -7,7 +7,6 @@ With other protocols a second phase with another protocol follows when it is kno
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
@@ -15,6 +14,7 @@ from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import Options, Withdrawal
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.agent_problem import RunParameters
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import NamedTuple, cast
 
 from robochoc.protocols.dynamic import DynamicProtocol
@@ -24,6 +23,7 @@ from robochoc.system.installed import (
     load_entry_point,
     not_installed_message,
 )
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.pydcop_words import PROTOCOLS
 
 GROUP = "robochoc.protocols"

@@ -6,7 +6,6 @@ Each runtime is imported on first use: a run needs only one, and the network is 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
 from pkgutil import resolve_name
@@ -25,6 +24,7 @@ from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.posix import IS_POSIX, REQUIREMENT
 
 if TYPE_CHECKING:

@@ -10,10 +10,11 @@ escape, as in Lisp; other backslashes are literal.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple, assert_never
 
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 
 class SymbolicExpressionError(RobochocError, ValueError):

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from robochoc.journal.events import AnyEvent, Began, Received, Sent
 from robochoc.journal.journal import Journal
 from robochoc.sniffer.patterns import matching, unmatched
 from robochoc.sniffer.trace import Trace
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 
 def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:

@@ -19,7 +19,7 @@ import time
 from array import array
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
@@ -54,6 +54,7 @@ from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTi
 from robochoc.solver.linear import Formula, Junction, Operand, conjuncts, renamed
 from robochoc.solver.process_socket import start_by_port
 from robochoc.solver.propagation import propagate
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import signals_delayed
 from robochoc.system.temporary_files import PrivateFolder

@@ -6,7 +6,7 @@ An agent receives nothing else, either in the simulator or in a separate process
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
@@ -14,6 +14,7 @@ from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam, ensure_compiled
 from robochoc.solver.evaluations import SharedEvaluations
 from robochoc.solver.explanation import KeyedConstraint, constraints_above
+from robochoc.system.lazy_dataclass import dataclass
 
 Interfaces = Mapping[str, tuple[str, ...]]
 """For each robot, by name, the interface variables, which its neighbours know."""

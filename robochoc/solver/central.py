@@ -12,7 +12,7 @@ import select
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Protocol
 
 from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
@@ -26,6 +26,7 @@ from robochoc.solver.errors import SolverTimeoutError
 from robochoc.solver.listing import Replayable, combinations, listed_solutions
 from robochoc.solver.symmetry import break_symmetries, orbits, symmetries
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 MAX_CLIQUE_ROWS = 20_000

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from itertools import count
 from types import TracebackType
@@ -17,6 +16,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.errors import SolverLostError, SolverTimeoutError, UnsupportedError
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 if TYPE_CHECKING:

@@ -10,13 +10,14 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Container, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 from robochoc.model.problem import Constraint, Domain, Robot, Value, Variable
 from robochoc.solver.encoding import Codes, Component, Cost, Network, components, cost_function, is_soft
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_SOLUTIONS = 100_000
 """The default maximum number of local solutions of a robot."""

@@ -8,11 +8,11 @@ passed around alone. A `CompiledTeam` has the domains of exactly its team.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 
 from robochoc.model.problem import Robot, Team
 from robochoc.solver.compiled_domain import CompiledDomain, compile_domain
+from robochoc.system.lazy_dataclass import dataclass
 
 CompileRobot = Callable[[Robot], CompiledDomain]
 """Computes a robot's compiled domain: `compile_domain` without a solver, `solver/compile.py` with one."""

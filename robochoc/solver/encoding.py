@@ -13,7 +13,7 @@ import math
 import weakref
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from operator import itemgetter
 
@@ -24,6 +24,7 @@ from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Re
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.linear import FALSE, Formula, Operand, is_small, linear, operands, renamed
 from robochoc.solver.splitting import MAX_TRIED, split
+from robochoc.system.lazy_dataclass import dataclass
 
 Cost = int | float
 """Integers stay integers: mypyc would convert them to a declared `float`, and 3.0 takes nine bytes in a message."""

@@ -7,10 +7,11 @@ names of their variables, so they share their computed costs. Robots still count
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 from robochoc.model.constraint import Constraint, Definition
+from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from numpy import float64

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Literal, assert_never
 
 from robochoc.model.constraint import Constraint, Predicate
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.expression.bounds import Interval
 from robochoc.solver.splitting import collect_terms, largest_value, with_arguments
+from robochoc.system.lazy_dataclass import dataclass
 
 LARGEST = 2**29
 """The maximum of all intermediate results, so that solvers with 32-bit integers stay correct."""

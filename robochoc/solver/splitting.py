@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from robochoc.model.constraint import Constraint, Predicate
 from robochoc.model.expression import (
@@ -28,6 +28,7 @@ from robochoc.model.expression import (
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.tree import BOUND
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 SMALL = 256
 """The maximum number of combinations of values for which parts are joined in one table."""

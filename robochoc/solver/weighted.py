@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.cost_units import cost_shown
@@ -28,6 +28,7 @@ from robochoc.solver.encoding import (
 )
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.propagation import propagate
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_COST_ROWS = 1_000_000
 """The maximum number of combinations of values in a cost table."""

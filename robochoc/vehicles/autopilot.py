@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
 
 from robochoc.flight.layout import Point
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.vehicles.limits import SILENCE_S
 
 OFFBOARD = "OFFBOARD"

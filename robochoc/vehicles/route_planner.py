@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from robochoc.flight.coordination.spacing import TooCloseError, check_spacing
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import SLACK_M, Array, norms, squashed
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.vehicles.fleet import Fleet, point_text
 
 _ORDERS = 6

@@ -11,13 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from enum import Enum, auto
 
 import numpy as np
 
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import SLACK_M, Array, line_distances, squashed
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.vehicles.route_planner import PlannedLeg
 
 _PARTS = 32

@@ -5,8 +5,7 @@ Source: the firmware's supervisor.c. Separate from `cflib_autopilot.py`, which n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.vehicles.autopilot import OFFBOARD
 
 CAN_ARM, IS_ARMED, ARMS_ITSELF, CAN_FLY, FLIES, TUMBLED, LOCKED, CRASHED = (1 << bit for bit in range(8))

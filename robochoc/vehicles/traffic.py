@@ -17,12 +17,13 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from robochoc.flight.layout import Point
 from robochoc.maps.routes.distances import SLACK_M, line_distances, squashed
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.vehicles.fleet import Fleet
 from robochoc.vehicles.messages import VehicleTarget
 from robochoc.vehicles.route_planner import PlannedLeg, RouteError, RoutePlanner, spacing

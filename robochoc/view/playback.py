@@ -6,7 +6,6 @@ Lengths are in cells, as in `scene`; times in seconds from the beginning.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
@@ -16,6 +15,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.log import FlightEvent, FlightLog
 from robochoc.flight.mission import Leg, Mission, in_cells
 from robochoc.model.outcome import Verdict
+from robochoc.system.lazy_dataclass import dataclass
 
 _HITS_GROUND = "hits the ground"
 """The last event of a drone that falls."""

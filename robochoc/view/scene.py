@@ -6,7 +6,6 @@ Lengths are in cells: one cell is one row, one column or one level. Scenes are d
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from robochoc.formats.headline import describe_outcome
 from robochoc.maps.ground_map import ALL_SIDES
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.view.playback import Playback, fallen_drones, playback_of
 from robochoc.view.walls import DrawnWalls, Faces, wall_faces, wall_footprints
 

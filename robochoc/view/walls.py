@@ -8,7 +8,6 @@ are visible.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -16,6 +15,7 @@ import numpy.typing as npt
 
 from robochoc.flight.mission import Mission, in_cells
 from robochoc.maps.walls import PixelFrame, VoxelFrame
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.view.meshes import TriangleMesh
 
 _MOST_FACES = 20_000

@@ -52,9 +52,13 @@ def test_readers_of_foreign_xml_work_on_views() -> None:
 
 
 def test_untrusted_bytes_reach_neither_eval_nor_pickle() -> None:
-    """`control.py` pickles the messages of a parent to a process that it has started, as `multiprocessing` does."""
+    """`control.py` pickles the messages of a parent to a process that it has started, as `multiprocessing` does.
+
+    `lazy_dataclass.py` compiles methods from the names of our own fields, as `dataclasses` does.
+    """
+    trusted = {"control.py", "lazy_dataclass.py"}
     used = re.compile(r"(?<![\w.])(eval|exec)\(|\bpickle\b|Pickler")
-    assert not [path for path in SOURCES if path.name != "control.py" and used.search(path.read_text())]
+    assert not [path for path in SOURCES if path.name not in trusted and used.search(path.read_text())]
 
 
 def test_names_that_say_nothing_are_not_used() -> None:

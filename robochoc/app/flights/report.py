@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from html import escape
 from importlib.resources import files
@@ -31,6 +30,7 @@ from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
 from robochoc.app.sketch.thumbnail import thumbnail
 from robochoc.app.texts import LANGUAGE, say
 from robochoc.model.cost_units import cost_shown
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import printable
 
 _MOST_VALUES = 12

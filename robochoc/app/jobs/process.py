@@ -7,11 +7,11 @@ import signal
 import subprocess
 import sys
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
 from typing import IO
 
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.stopping import STOP
 from robochoc.system.temporary_files import unnamed_file
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections import Counter, deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import BinaryIO
 
@@ -17,6 +17,7 @@ from robochoc.journal.reader import Follower
 from robochoc.model.cost_units import Cost
 from robochoc.run.known_costs import KnownCosts
 from robochoc.sniffer.sentences import JournalSentences, ValueLabel
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0

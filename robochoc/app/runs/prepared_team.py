@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.formats import read_team, write_team
 from robochoc.model.problem import AddAgent, Change, Domain, Robot, ScenarioEvent, Team
 from robochoc.modelling.model import Model
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

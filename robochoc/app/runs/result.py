@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from types import MappingProxyType
 
 from robochoc.app.sketch.sketch import Value
 from robochoc.formats.result import ResultError, read_result
 from robochoc.model.outcome import Answer, Outcome, Verdict
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True, kw_only=True)

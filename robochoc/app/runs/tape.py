@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from io import BufferedReader
 from pathlib import Path
 from typing import NamedTuple
@@ -18,6 +18,7 @@ from robochoc.journal.reader import Follower
 from robochoc.sniffer.growing_file import GrowingFile, open_to_read
 from robochoc.sniffer.live_trace import entries_of, next_entries, sorted_by_time
 from robochoc.sniffer.sentences import JournalSentences, ValueLabel
+from robochoc.system.lazy_dataclass import dataclass
 
 MOST_MOMENTS = 200
 """If there are twice as many moments, pairs of moments are joined."""

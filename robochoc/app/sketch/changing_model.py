@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import cast
 
@@ -25,6 +25,7 @@ from robochoc.modelling.errors import ModelError
 from robochoc.modelling.events import ModelEvent
 from robochoc.modelling.model import Model
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 Domains = dict[tuple[str, str], list[Value]]
 """The allowed values, by robot and decision."""

@@ -10,7 +10,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path, PurePosixPath
 
 from robochoc.app.sketch.files import MAX_SKETCH, sketch_in
@@ -21,6 +21,7 @@ from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import first_bytes, read_foreign, recognise, unknown_format_error
 from robochoc.formats.team_writer import SKETCH_FILE
 from robochoc.model.problem import Team
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.temporary_files import PrivateFolder
 
 MAX_FILES = 2_000

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import cast
 
@@ -18,6 +17,7 @@ from robochoc.app.sketch.python_text import Each, Operand, PythonText
 from robochoc.app.sketch.sketch import NUMBERED, DecisionKind, Sketch, SketchRule
 from robochoc.modelling import functions
 from robochoc.modelling.terms import Term
+from robochoc.system.lazy_dataclass import dataclass
 
 ALL_KINDS = frozenset(DecisionKind)
 PLACES = frozenset({DecisionKind.PLACE})

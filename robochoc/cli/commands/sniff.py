@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -22,6 +21,7 @@ from robochoc.cli.options.saved import JOURNAL_STEP
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid_input_fails
+from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from robochoc.authority.identity import Identity

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import click
 
 from robochoc.cli.options.value_types import Number
+from robochoc.system.lazy_dataclass import dataclass
 
 Command = TypeVar("Command", bound=Callable[..., object])
 

@@ -6,7 +6,6 @@ import math
 import os
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -21,6 +20,7 @@ from robochoc.cli.reports.failures import errors_as_failures
 from robochoc.cli.reports.live_sniffer import SnifferRequest
 from robochoc.communication.kill_schedule import Kill
 from robochoc.run.defaults import AUTO
+from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
     from robochoc.communication.simulator.channel import ChannelModel

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Self
 
 import click
 
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.posix import IS_POSIX, REQUIREMENT
 
 if TYPE_CHECKING:

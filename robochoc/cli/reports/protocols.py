@@ -7,7 +7,7 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, replace
 
 import click
 import msgspec
@@ -22,6 +22,7 @@ from robochoc.run.purposes import PURPOSES, purposes_of
 from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver import central
 from robochoc.system.compiled_core import docstring
+from robochoc.system.lazy_dataclass import dataclass
 
 _KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
 """Traits whose key in `--json` is their name in the first version."""

@@ -12,7 +12,6 @@ import json
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 import msgspec
@@ -27,6 +26,7 @@ from robochoc.communication.arrays.layout import ArrayLayout, IntegerCosts, cost
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.shared.cycles import CycleCount
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 MOST_LEVELS = 10_000
 """The number of breadth-first levels after which the remaining robots keep their order."""

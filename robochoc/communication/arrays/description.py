@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from robochoc.protocols.shared.cycles import Domain
 from robochoc.protocols.shared.cycles import Value as ValueMessage
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ integers compare like `LexicographicCost`.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from robochoc.communication.arrays.description import Description, KnownConstrai
 from robochoc.communication.arrays.jagged import columns, narrowest, segments
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import check_exact
+from robochoc.system.lazy_dataclass import dataclass
 
 _SIGNED_BITS = 63
 _LOW_BITS = 31

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
@@ -25,6 +24,7 @@ from robochoc.protocols.inference.maxsum_factor import MOST
 from robochoc.protocols.message import encode
 from robochoc.protocols.shared.cycles import CycleCount, Domain
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 
 _CHUNK = 1 << 20
 """The number of table entries in one step, chosen to fit into the processor's cache."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, cast
 
@@ -17,6 +16,7 @@ from robochoc.communication.arrays.tally import integer_bytes, list_bytes
 from robochoc.protocols.local_search.mgm2 import Accept, Go, MGM2Settings, Offer, Reject
 from robochoc.protocols.message import encode
 from robochoc.protocols.shared.cycles import Domain
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass(frozen=True)

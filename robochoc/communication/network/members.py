@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
@@ -25,6 +25,7 @@ from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from types import MappingProxyType
 from typing import NamedTuple
@@ -26,6 +26,7 @@ from robochoc.model.outcome import CheckCounts
 from robochoc.model.problem import INFINITE, Domain
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.traits import Traits
+from robochoc.system.lazy_dataclass import dataclass
 
 LARGEST_COUNT = 2**53
 CHECKS_PER_S = 10**12

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 
 from robochoc.solver.compiled_domain import compile_domain
 from robochoc.solver.compiled_team import CompileRobot
+from robochoc.system.lazy_dataclass import dataclass
 
 
 def _ignore(*_arguments: object) -> None:

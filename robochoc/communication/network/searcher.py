@@ -9,7 +9,7 @@ import secrets
 from bisect import bisect_right
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 
 import msgspec
@@ -48,6 +48,7 @@ from robochoc.solver.compiled_domain import CompiledDomain
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, constraints_above
+from robochoc.system.lazy_dataclass import dataclass
 
 
 def check_constraints(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from robochoc.system.lazy_dataclass import dataclass
 
 PATIENCE_S = 10.0
 """The longest time for which a robot may be absent, in seconds."""

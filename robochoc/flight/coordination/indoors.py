@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -22,6 +21,7 @@ from robochoc.flight.coordination.move_order import DroneMove, MoveOrder, NoRout
 from robochoc.flight.coordination.spacing import Spacing
 from robochoc.maps.routes.distances import Array, Flags, norms, squashed
 from robochoc.maps.routes.voxel_plan import Resting, VoxelPlan
+from robochoc.system.lazy_dataclass import dataclass
 
 _ORDERS = 6
 """The number of orders of precedence that are tried."""

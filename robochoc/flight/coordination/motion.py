@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.maps.routes.distances import Array, norms, squashed
+from robochoc.system.lazy_dataclass import dataclass
 
 PEAK = 15 / 8
 """The peak speed, half way, of minimum-jerk motion over a unit of length in a unit of time."""

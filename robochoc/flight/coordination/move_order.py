@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from robochoc.flight.coordination.spacing import Spacing
 from robochoc.maps.routes.distances import Array, norms
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 _Space = TypeVar("_Space", bound=Spacing)
 

@@ -21,7 +21,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -29,6 +28,7 @@ import numpy as np
 from robochoc.flight.coordination.spacing import Spacing
 from robochoc.maps.routes.distances import SLACK_M, Array, Flags, norms, segment_distances
 from robochoc.maps.routes.floor_plan import FloorPlan
+from robochoc.system.lazy_dataclass import dataclass
 
 Column = Array
 """The x and y coordinates of a vertical line."""

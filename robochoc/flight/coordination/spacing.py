@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from robochoc.maps.routes.distances import SLACK_M, Array, Flags, norms, segment_distances
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 
 class TooCloseError(RobochocError, ValueError):

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import islice
 
@@ -32,6 +32,7 @@ from robochoc.flight.coordination.spacing import check_spacing
 from robochoc.maps.routes.distances import Array, Flags, closest_approach, norms, squashed
 from robochoc.maps.routes.voxel_plan import VoxelPlan
 from robochoc.maps.routes.wall_plan import WallPlan
+from robochoc.system.lazy_dataclass import dataclass
 
 Steps = NDArray[np.int64]
 

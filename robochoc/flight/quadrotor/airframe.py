@@ -13,10 +13,11 @@ directions, with the value for hover (in RotorS it grows with the rotor speed, a
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+
+from robochoc.system.lazy_dataclass import dataclass
 
 Array = npt.NDArray[np.float64]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
 
 from robochoc.flight.layout import Point
 from robochoc.flight.quadrotor.airframe import ROTORS
+from robochoc.system.lazy_dataclass import dataclass
 
 WIND_MAX_M_S = 200.0
 """The largest wind speed; winds near the ground are slower."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +16,7 @@ from robochoc.flight.quadrotor.free_points import free_point, nearest_distances,
 from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.maps.routes.distances import SLACK_M, squashed
 from robochoc.maps.routes.wall_plan import WallPlan
+from robochoc.system.lazy_dataclass import dataclass
 
 MARGIN_M = 0.1
 """The margin of routes beyond the distance. Tracking errors use 1 cm of it in calm air, and 6 cm when a drone takes off

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
@@ -12,6 +12,7 @@ from typing import NamedTuple
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import MAX_NAME, RESERVED, is_name
 from robochoc.model.problem import Team
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
 MAX_FILE = 256 * 1024 * 1024

@@ -6,7 +6,6 @@ import math
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 
 from robochoc.formats.definitions import MAX_TUPLES, PREDEFINED
@@ -14,6 +13,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import BEYOND
 from robochoc.model.constraint import INFINITE, Relation, Semantics
 from robochoc.model.cost_units import MAX_PLACES
+from robochoc.system.lazy_dataclass import dataclass
 
 Amount = int | Fraction | float
 """An exact cost. The only float is `INFINITE`, the cost of a forbidden tuple."""

@@ -6,7 +6,6 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -23,6 +22,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.problem import Robot, Team
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 
 CONSTANT = "constant"
 """The name of the constraint that contains the constant cost."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from itertools import combinations
 from math import floor
@@ -22,6 +22,7 @@ from robochoc.model.assembly import Extras
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.problem import Topic
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_ROBOTS = 100
 MAX_CELLS = 1000

@@ -9,7 +9,7 @@ reverse. In the mode `raw`, shades from 0 to 100 (of 255) are the occupancy in p
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import cached_property
 from math import isqrt
@@ -24,6 +24,7 @@ from robochoc.maps.file_content import as_input_errors, read_beginning, read_con
 from robochoc.maps.occupancy.images import Image, is_image, read_image
 from robochoc.maps.occupancy.pgm import MAX_BYTES
 from robochoc.maps.occupancy.rotation import NO_ROTATION, Place, Rotation, split_yaw
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_YAML = 64 * 1024
 _SIDE_MAX_M = Fraction(100)

@@ -10,7 +10,6 @@ import io
 import struct
 import warnings
 import zlib
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +18,7 @@ from PIL import UnidentifiedImageError
 
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.maps.occupancy.pgm import MAX_PIXELS, Pixels, read_pgm
+from robochoc.system.lazy_dataclass import dataclass
 
 _PGM = (b"P2", b"P5")
 _OTHERS = {b"\x89PNG\r\n\x1a\n": "PNG", b"BM": "BMP"}

@@ -5,8 +5,9 @@ Sines are computed in integers, to 40 decimal places, so that the cells of rotat
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
+
+from robochoc.system.lazy_dataclass import dataclass
 
 _ONE = 10**50
 _PLACES = 10**40

@@ -19,13 +19,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
 import numpy.typing as npt
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.system.lazy_dataclass import dataclass
 
 DEPTH = 16
 """The number of levels below the root. A leaf in the last level is a voxel."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from math import prod
@@ -16,6 +15,7 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.maps.file_content import as_input_errors, read_content
 from robochoc.maps.occupancy.grid import Flags
 from robochoc.maps.octomap.octree import DEPTH, MAX_BYTES, Corners, Integers, Leaves, Octree, read_octree
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_VOXELS = 16_000_000
 """The maximum number of voxels around all free space. A larger map is read with larger voxels."""

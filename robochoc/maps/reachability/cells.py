@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from math import ceil, floor
@@ -23,6 +22,7 @@ import numpy.typing as npt
 from robochoc.maps.occupancy.grid import Counts, Flags, OccupancyGrid, summed_area
 from robochoc.maps.octomap.voxels import VoxelGrid
 from robochoc.maps.reachability.free_space import FreeSpace
+from robochoc.system.lazy_dataclass import dataclass
 
 Place = tuple[Fraction, ...]
 """The x and y of a place, and the z on three-dimensional maps, in metres."""

@@ -7,7 +7,6 @@ pixels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
 from math import floor
@@ -16,6 +15,7 @@ import numpy as np
 
 from robochoc.maps.occupancy.clearance import clearances, open_points, parts_per_pixel
 from robochoc.maps.occupancy.grid import Counts, Flags
+from robochoc.system.lazy_dataclass import dataclass
 
 _ROUNDING = 1e-9
 

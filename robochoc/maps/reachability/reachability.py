@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from math import atan2, floor
 
@@ -14,6 +13,7 @@ from robochoc.maps.occupancy.packed import packed
 from robochoc.maps.reachability.cell_size import AnyCells
 from robochoc.maps.reachability.cells import Cells, Cubes, Place
 from robochoc.maps.reachability.path_lengths import UNREACHED, lengths_from
+from robochoc.system.lazy_dataclass import dataclass
 
 PLACES = 1
 """The decimal places of travel times in seconds."""

@@ -9,7 +9,7 @@ A route is found on a lattice (`lattice.py`), and then shortened (`string_pullin
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property
 
 import numpy as np
@@ -20,6 +20,7 @@ from robochoc.maps.routes.distances import Array, Flags
 from robochoc.maps.routes.lattice import Lattice
 from robochoc.maps.routes.string_pulling import taut
 from robochoc.maps.walls import PixelFrame
+from robochoc.system.lazy_dataclass import dataclass
 
 SPARE_M = 0.1
 """The additional distance of routes from walls, if the detour is at most a quarter."""

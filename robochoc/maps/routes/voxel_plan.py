@@ -8,7 +8,7 @@ the first has no route, and then shortened (`string_pulling.py`). Routes can als
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from robochoc.maps.routes.lattice import Lattice, Numbers
 from robochoc.maps.routes.string_pulling import taut
 from robochoc.maps.routes.voxel_surface import VoxelSurface
 from robochoc.maps.walls import VoxelFrame
+from robochoc.system.lazy_dataclass import dataclass
 
 _FINE = (2, 4)
 """The numbers of points in each lattice per distance of drones from walls."""

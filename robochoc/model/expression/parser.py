@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 from robochoc.model.expression.operators import ALIASES, OPERATORS, Operator
 from robochoc.model.expression.tree import SYMBOLIC, Apply, Constant, Expression, Name, Type, text
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_TEXT = 64 * 1024
 MAX_DEPTH = 64

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 
 BOUND = 2**63
 """A result beyond +-BOUND is undefined."""

@@ -47,7 +47,6 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, assert_never, cast
 
@@ -61,6 +60,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import listed
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from urllib.parse import parse_qsl
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.ros2_names import DOMAIN_MAX, domain_id
 from robochoc.ros.live.transport import ErrorClass
+from robochoc.system.lazy_dataclass import dataclass
 
 DEPTHS = range(1, 1001)
 WAIT_S_MAX = 600.0

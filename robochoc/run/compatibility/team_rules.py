@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -17,6 +16,7 @@ from robochoc.run.defaults import CENTRAL
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exclusions import allocation_fault
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -38,6 +38,7 @@ from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.checker import RefutedError
 
 LOOPBACK_ADDRESS = Address(LOOPBACK)

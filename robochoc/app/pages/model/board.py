@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Annotated
 
 import msgspec
@@ -13,6 +13,7 @@ from nicegui.events import GenericEventArguments
 from robochoc.app.pages.model.picture import DrawnLink, DrawnRobot, robots_of
 from robochoc.app.sketch.sketch import Area, Cell, Sketch
 from robochoc.app.texts import say
+from robochoc.system.lazy_dataclass import dataclass
 
 SELECT = "select"
 """The tool for selecting and dragging. Other tools highlight the cell under the pointer."""

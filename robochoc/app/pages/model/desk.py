@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from robochoc.app.listeners import Listeners
 from robochoc.app.pages.shell import edit_error_text
@@ -11,6 +11,7 @@ from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import DecisionKind, Sketch
 from robochoc.app.sketch.troubles import About, Trouble
+from robochoc.system.lazy_dataclass import dataclass
 
 Edit = Callable[[Sketch], Sketch]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 
 from robochoc.app.runs.result import RunResult
@@ -12,6 +11,7 @@ from robochoc.app.sketch.sentences import value_words
 from robochoc.app.sketch.sketch import Decision, Sketch, Value
 from robochoc.model.cost_units import Cost
 from robochoc.modelling.model import Model
+from robochoc.system.lazy_dataclass import dataclass
 
 Values = Mapping[tuple[str, str], Value]
 _SOLVED = frozenset({"solution", "optimal"})

@@ -6,7 +6,7 @@ import importlib.util
 import itertools
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from fractions import Fraction
 from pathlib import Path
 
@@ -20,6 +20,7 @@ from robochoc.formats.dialects.pydcop.translation import VariableInfo, Violation
 from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 from robochoc.model.expression import Expression
 from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_CELLS = 5_000_000
 """The maximum total number of tuples in tables created from functions."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 from robochoc.formats.definitions import MAX_VALUES, check_domain
@@ -13,6 +12,7 @@ from robochoc.formats.dialects.exact_costs import xml_name
 from robochoc.formats.names import check_integer
 from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
 from robochoc.model.constraint import Domain
+from robochoc.system.lazy_dataclass import dataclass
 
 _HINT = "write values: [R, G] or [0..4]"
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable
 from robochoc.formats.yaml_tree import MAX_BYTES, Node, Read, Repeated, read_yaml, root_keys
+from robochoc.system.lazy_dataclass import dataclass
 
 _SECTION = re.compile(r"""^["']?([a-z_]+)["']?[ \t]*:""", re.MULTILINE)
 _PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "external_variables", "distribution_hints"}

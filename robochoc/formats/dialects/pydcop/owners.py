@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from heapq import heapify, heapreplace
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import ConversionNote, owners_by
 from robochoc.formats.yaml_tree import Node, Scalar
+from robochoc.system.lazy_dataclass import dataclass
 
 
 @dataclass

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -14,6 +13,7 @@ from robochoc.model.constraint import Domain
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.expression.parser import MAX_DEPTH
+from robochoc.system.lazy_dataclass import dataclass
 
 _LARGEST = 2**62
 """The limit on all intermediate results. Unlike in Python, values in robochoc are undefined from 2**63 on."""

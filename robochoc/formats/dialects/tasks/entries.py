@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from enum import StrEnum
 from fractions import Fraction
 from typing import TypeVar
 
 from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, shortened, suggestion
 from robochoc.formats.yaml_tree import Node, Scalar, scalar_text
+from robochoc.system.lazy_dataclass import dataclass
 
 Point = tuple[Fraction, ...]
 

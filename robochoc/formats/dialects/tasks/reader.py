@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
@@ -40,6 +39,7 @@ from robochoc.model.allocation import (
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team, Variable
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_NUMBER = 1000
 """The maximum number of robots, and of tasks."""

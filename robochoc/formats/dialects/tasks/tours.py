@@ -7,11 +7,11 @@ arrival at a task is never worse for the following tasks. A tour does not return
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.tasks.entries import MAX_PLACES, Point, RobotEntry, TaskEntry
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_SETS = 4096
 """The maximum number of task sets for which a robot has time and capacity."""

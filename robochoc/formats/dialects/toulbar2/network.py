@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -24,6 +24,7 @@ from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Dom
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.lazy_dataclass import dataclass
 
 LIMIT = 2**53
 """The limit on costs, in units of their last decimal place, because toulbar2 1.1 reads the costs in a cfn as floats."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from decimal import Decimal
 from pathlib import Path
 from typing import NoReturn
@@ -11,6 +11,7 @@ from typing import NoReturn
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.dialects.dialect import ConversionNote
 from robochoc.model.constraint import Function, Predicate
+from robochoc.system.lazy_dataclass import dataclass
 
 UNIT = "unit of costs"
 """The name of the `stats` element of the presentation that states the value of a cost of 1, such as 0.01."""

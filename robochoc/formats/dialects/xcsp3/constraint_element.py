@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 from robochoc.formats.diagnostics import MistakeError, shortened
@@ -12,6 +11,7 @@ from robochoc.formats.dialects.xcsp3.document import flag
 from robochoc.formats.dialects.xcsp3.expressions import integer, zip_equal
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.formats.element_view import ElementView
+from robochoc.system.lazy_dataclass import dataclass
 
 _PARAMETER = re.compile(r"%([0-9]{1,6}|\.\.\.)")
 

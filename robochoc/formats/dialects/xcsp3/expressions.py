@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from functools import lru_cache, reduce
 from typing import Any
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Type
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_TEXT = 1_000_000
 """The maximum length of the text of an expression."""

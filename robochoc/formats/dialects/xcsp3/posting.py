@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
@@ -37,6 +37,7 @@ from robochoc.model.expression import (
 from robochoc.model.expression import text as expression_text
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.problem import Constraint, Definition, Function, Predicate, Relation, Semantics
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_CONSTRAINTS = 500_000
 """The maximum number of constraints."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from robochoc.formats.definitions import MAX_VALUES
@@ -21,6 +21,7 @@ from robochoc.formats.element_view import ElementView, open_xml
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Domain, ProblemKind, Variable
+from robochoc.system.lazy_dataclass import dataclass
 
 NAME = "xcsp3"
 

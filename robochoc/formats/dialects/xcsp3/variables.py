@@ -6,7 +6,7 @@ import itertools
 import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
@@ -15,6 +15,7 @@ from robochoc.formats.dialects.xcsp3.expressions import integer, span, words_of
 from robochoc.formats.element_view import ElementView
 from robochoc.model.constraint import merge_ranges
 from robochoc.model.problem import Domain
+from robochoc.system.lazy_dataclass import dataclass
 
 MAX_VARIABLES = 100_000
 """The maximum number of variables, and of variables in one list."""
