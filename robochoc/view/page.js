@@ -3,7 +3,7 @@ try {
   const THREE = MeshCat.THREE;
   const element = (id) => document.getElementById(id);
   const playback = JSON.parse(element("playback").textContent);
-  const viewer = new MeshCat.Viewer(element("scene"));
+  const viewer = new MeshCat.Viewer(element("scene"), true, Picture.renderer(element("scene")));
   viewer.gui.domElement.remove(); // meshcat's own controls, a row for each object
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   const narrow = matchMedia("(max-width: 40rem)");
@@ -26,6 +26,7 @@ try {
   const player = new Player(playback.duration);
   const timeline = playback.duration ? new Timeline(playback, player) : null;
   const trails = new Trails(viewer);
+  const picture = new Picture(viewer);
   const camera = new Camera(viewer, playback.corners, playback.cell, free, still);
   const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
   const drones = playback.drones.map((drone) => object(drone.path));
@@ -37,6 +38,7 @@ try {
     camera.step(now);
     swarm.step();
     labels.step(now);
+    picture.step(now);
     requestAnimationFrame(frame);
   };
 
@@ -178,7 +180,7 @@ try {
   viewer.set_3d_pane_size();
   fit();
   requestAnimationFrame(frame);
-  globalThis.Playback = { viewer, camera, player, trails, drones, swarm, labels };
+  globalThis.Playback = { viewer, camera, player, trails, drones, swarm, labels, picture };
 } catch (error) {
   const trouble = document.getElementById("trouble");
   trouble.append(error.message);

@@ -25,7 +25,7 @@ _SWATCHES_MAX = 9
 """The maximum number of rows with legend entries; for more rows, the legend shows a colour ramp with its two ends."""
 
 
-_PLAYER = ("labels.js", "swarm.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
+_PLAYER = ("picture.js", "labels.js", "swarm.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
 """The parts of the player's script, in order."""
 
 

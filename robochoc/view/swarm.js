@@ -1,7 +1,6 @@
 // All drones drawn by one call: one mesh has a copy of the drone's shape for each drone, and a texture has the position,
 // the attitude and the colour of each drone, taken from the scene's objects, which are not drawn themselves.
-// Light is computed for each corner, not for each pixel, which without a graphics card takes most of the time. For the
-// same reason these are not instances, which it draws one by one.
+// These are not instances, which are drawn one by one without a graphics card.
 class Swarm {
   static TEXELS = 4; // of a drone: three rows of its matrix, and its colour
 
@@ -19,19 +18,39 @@ class Swarm {
     if (parts.every((part) => part)) this.join(parts);
   }
 
+  // The different corners of a mesh without an index, and for each of its faces the numbers of three of them.
+  static corners({ attributes }) {
+    const numbers = new Map();
+    const corners = [];
+    const faces = [];
+    for (let corner = 0; corner < attributes.position.count; corner++) {
+      const key = Object.values(attributes).flatMap(({ array, itemSize }) =>
+        Array.from(array.subarray(itemSize * corner, itemSize * (corner + 1)), (part) => part.toFixed(4))).join();
+      if (!numbers.has(key)) numbers.set(key, corners.push(corner) - 1);
+      faces.push(numbers.get(key));
+    }
+    return { corners, faces };
+  }
+
   join(parts) {
     const THREE = MeshCat.THREE;
     const count = parts.length;
-    const drone = parts[0].geometry.toNonIndexed(); // each face has its own normal
-    drone.computeVertexNormals();
-    const { position, normal, color } = drone.attributes;
-    const size = position.count;
+    const drone = parts[0].geometry;
+    const { corners, faces } = Swarm.corners(drone);
+    const size = corners.length;
     const shape = new THREE.BufferGeometry();
-    for (const [name, { array, itemSize, normalized }] of Object.entries({ position, normal, color })) {
-      const copies = new array.constructor(array.length * count);
-      for (let number = 0; number < count; number++) copies.set(array, number * array.length);
+    for (const [name, { array, itemSize, normalized }] of Object.entries(drone.attributes)) {
+      const copies = new array.constructor(itemSize * size * count);
+      corners.forEach((corner, at) => {
+        const part = array.subarray(itemSize * corner, itemSize * (corner + 1));
+        for (let number = 0; number < count; number++) copies.set(part, itemSize * (number * size + at));
+      });
       shape.setAttribute(name, new THREE.BufferAttribute(copies, itemSize, normalized));
     }
+    const index = new Uint32Array(faces.length * count);
+    for (let number = 0; number < count; number++)
+      index.set(faces.map((corner) => number * size + corner), number * faces.length);
+    shape.setIndex(new THREE.BufferAttribute(index, 1));
     const rows = new Float32Array(size * count);
     for (let number = 0; number < count; number++) rows.fill((number + 0.5) / count, number * size, (number + 1) * size);
     shape.setAttribute("row", new THREE.BufferAttribute(rows, 1));

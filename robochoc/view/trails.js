@@ -6,6 +6,7 @@ class Trails {
   static CORNERS = [[0, -1, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0]];
   static SIZES = { position: 3, begin: 3, end: 3, tint: 3, span: 2 };
   static WIDTH = 2.5; // pixels
+  static CLOSE = 0.01; // cells: the largest deviation of a trail from the motion
   static VERTEX = `
     attribute vec3 begin, end, tint;
     attribute vec2 span;
@@ -37,6 +38,7 @@ class Trails {
 
   constructor(viewer) {
     this.viewer = viewer;
+    this.begins = [];
     this.uniforms = {
       now: { value: 0 }, lasting: { value: 1e9 }, opacity: { value: 0.9 },
       width: { value: Trails.WIDTH }, pixels: { value: new MeshCat.THREE.Vector2(1, 1) },
@@ -46,15 +48,14 @@ class Trails {
   // `ways` are the drones' [times, positions, states, colour]; `parent` has the frame of their positions.
   draw(ways, parent) {
     const THREE = MeshCat.THREE;
-    const parts = Object.fromEntries(Object.keys(Trails.SIZES).map((name) => [name, []]));
-    for (const way of ways) Trails.add(parts, ...way);
+    const pieces = ways.flatMap((way) => Trails.pieces(...way)).sort((one, other) => one.span[0] - other.span[0]);
+    this.begins = pieces.map(({ span }) => span[0]);
     const ribbons = new THREE.BufferGeometry();
-    for (const [name, values] of Object.entries(parts))
-      ribbons.setAttribute(name, new THREE.BufferAttribute(new Float32Array(values), Trails.SIZES[name]));
-    const corners = [];
-    for (let first = 0; first < parts.span.length / 2; first += 4)
-      corners.push(first, first + 1, first + 2, first, first + 2, first + 3);
-    ribbons.setIndex(corners);
+    for (const [name, size] of Object.entries(Trails.SIZES)) {
+      const values = pieces.flatMap((piece) => Trails.CORNERS.flatMap((corner) => piece[name] ?? corner));
+      ribbons.setAttribute(name, new THREE.BufferAttribute(new Float32Array(values), size));
+    }
+    ribbons.setIndex(pieces.flatMap((_, number) => [0, 1, 2, 0, 2, 3].map((corner) => 4 * number + corner)));
     const paint = new THREE.ShaderMaterial({
       uniforms: this.uniforms, vertexShader: Trails.VERTEX, fragmentShader: Trails.FRAGMENT,
       transparent: true, depthWrite: false, side: THREE.DoubleSide,
@@ -65,34 +66,37 @@ class Trails {
     parent.add(this.mesh);
   }
 
-  // The pieces of one path, cut where its drone changes its state.
-  static add(parts, times, positions, states, colour) {
-    const at = (time, key) => {
-      const between = (time - times[key]) / (times[key + 1] - times[key]);
+  // The pieces of one path, in few keys, cut where its drone changes its state.
+  static pieces(times, positions, states, colour) {
+    const at = (time, key, next) => {
+      const between = (time - times[key]) / (times[next] - times[key]);
       return [0, 1, 2].map((axis) => {
         const from = positions[3 * key + axis];
-        return from + between * (positions[3 * key + 3 + axis] - from);
+        return from + between * (positions[3 * next + axis] - from);
       });
     };
+    const close = (key, next) => {
+      for (let middle = key + 1; middle < next; middle++) {
+        const spot = at(times[middle], key, next);
+        if (Math.hypot(...spot.map((part, axis) => part - positions[3 * middle + axis])) > Trails.CLOSE) return false;
+      }
+      return true;
+    };
     const paints = [[-1, "", colour], ...states];
+    const pieces = [];
     let paint = 0;
-    for (let key = 0; key + 1 < times.length; key++) {
+    for (let key = 0, next = 1; next < times.length; key = next++) {
+      while (next + 1 < times.length && close(key, next + 1)) next++;
       let from = times[key];
-      while (from < times[key + 1]) {
+      while (from < times[next]) {
         while (paint + 1 < paints.length && paints[paint + 1][0] <= from + 1e-3) paint++;
-        const next = paint + 1 < paints.length ? paints[paint + 1][0] : Infinity;
-        const upto = Math.min(times[key + 1], next);
-        const [begin, end, tint] = [at(from, key), at(upto, key), new MeshCat.THREE.Color(paints[paint][2]).toArray()];
-        for (const corner of Trails.CORNERS) {
-          parts.position.push(...corner);
-          parts.begin.push(...begin);
-          parts.end.push(...end);
-          parts.tint.push(...tint);
-          parts.span.push(from, upto);
-        }
+        const upto = Math.min(times[next], paint + 1 < paints.length ? paints[paint + 1][0] : Infinity);
+        const tint = new MeshCat.THREE.Color(paints[paint][2]).toArray();
+        pieces.push({ begin: at(from, key, next), end: at(upto, key, next), tint, span: [from, upto] });
         from = upto;
       }
     }
+    return pieces;
   }
 
   // "all", "none", or a number of seconds.
@@ -102,7 +106,16 @@ class Trails {
     this.viewer.set_dirty();
   }
 
-  set now(time) { this.uniforms.now.value = time; }
+  // Pieces that begin later are not drawn.
+  set now(time) {
+    this.uniforms.now.value = time;
+    let [begun, more] = [0, this.begins.length];
+    while (begun < more) {
+      const middle = (begun + more) >> 1;
+      if (this.begins[middle] <= time) begun = middle + 1; else more = middle;
+    }
+    this.mesh?.geometry.setDrawRange(0, 6 * begun);
+  }
 
   resize() {
     const size = this.viewer.renderer.getDrawingBufferSize(new MeshCat.THREE.Vector2());

@@ -298,6 +298,34 @@ def test_trails_grow_and_can_be_left_out(player: Page) -> None:
     assert abs(painted() - whole) < 20
 
 
+def test_trails_of_curves_are_close_to_the_motion(player: Page) -> None:
+    """At the time of each key, with few pieces; the drone changes its colour at 0.5 s."""
+    pieces = player.evaluate("""(() => {
+      const times = [...Array(101).keys()].map((key) => key / 100);
+      const positions = times.flatMap((time) => [3 * Math.cos(time), 3 * Math.sin(time * time), time]);
+      return Playback.trails.constructor.pieces(times, positions, [[0.5, "fallen", "#ff0000"]], "#0000ff");
+    })()""")
+    assert 4 < len(pieces) < 30
+    assert [piece["tint"][0] for piece in pieces] == [float(piece["span"][0] >= 0.5) for piece in pieces]
+    for time in np.arange(101) / 100:
+        piece = next(one for one in pieces if one["span"][0] - 1e-9 <= time <= one["span"][1] + 1e-9)
+        begin, end = np.array(piece["begin"]), np.array(piece["end"])
+        place = begin + (time - piece["span"][0]) / (piece["span"][1] - piece["span"][0]) * (end - begin)
+        assert np.linalg.norm(place - [3 * np.cos(time), 3 * np.sin(time**2), time]) < 0.0101
+
+
+def test_a_still_picture_without_a_graphics_card_is_antialiased(player: Page) -> None:
+    usual = player.evaluate("Playback.picture.constructor.STILL")
+    shown = []
+    for still in (1e9, 0):
+        player.evaluate(f"Playback.picture.constructor.STILL = {still}; Playback.viewer.set_dirty()")
+        shown.append(picture(player))
+    player.evaluate(f"Playback.picture.constructor.STILL = {usual}")
+    moving, still = (len(np.unique(one.reshape(-1, 3), axis=0)) for one in shown)
+    assert still > 1.2 * moving
+    assert 0.001 < (np.abs(shown[0] - shown[1]).max(axis=2) > 20).mean() < 0.1
+
+
 def test_hostile_names_stay_text(player: Page) -> None:
     assert player.title().startswith(HOSTILE)
     assert player.locator("img").count() == 0
