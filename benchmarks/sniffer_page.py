@@ -11,7 +11,6 @@ import asyncio
 import os
 import signal
 import time
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ import msgspec
 from tornado.httpclient import AsyncHTTPClient
 from tornado.websocket import websocket_connect
 
-from robochoc.journal.events import Began, Received, Sent, Settled
+from robochoc.journal.events import AnyEvent, Began, Received, Sent, Settled
 from robochoc.journal.journal import Header, JournalFile, JournalRecorder
 
 STOPPED = "stopped.pid"
@@ -27,6 +26,8 @@ STOPPED = "stopped.pid"
 _SPAN = 1 << 16
 _ROBOTS = 49
 _FANOUT = 4
+_LATE_EVERY, _LATE_BY = 100, 10
+"""Every 100th step is reported ten steps late."""
 
 
 async def follow(url: str, *, until_over: bool = False, stops: bool = False) -> None:
@@ -73,24 +74,30 @@ def write(path: Path, messages: int) -> None:
     recorder(Began(t=0, protocol="ABT"))
     names = [f"Robot{row}.{column}" for row in range(1, 8) for column in range(1, 8)]
     waiting: list[list[str]] = [[] for _ in names]
-    said = 0
-    for step in count():
+    late: list[AnyEvent] = []
+    for step in range(-(-messages // _FANOUT)):
         robot = step * 31 % _ROBOTS
         name = names[robot]
         t = step * 1e-5
-        for sender in waiting[robot]:
-            recorder(Received(t=t, sender=sender, receiver=name, type="Ok", clock=step))
+        events: list[AnyEvent] = [
+            Received(t=t, sender=sender, receiver=name, type="Ok", clock=step) for sender in waiting[robot]
+        ]
         waiting[robot].clear()
         for place in range(_FANOUT):
             to = (robot + 1 + place * 7 + step % 5) % _ROBOTS
             content = {"value": [step % 7 + 1]}
-            recorder(Sent(t=t, sender=name, receiver=names[to], type="Ok", content=content, bytes=8, clock=step))
+            events.append(Sent(t=t, sender=name, receiver=names[to], type="Ok", content=content, bytes=8, clock=step))
             waiting[to].append(name)
-        said += _FANOUT
-        late = t - 1e-4 if step % 100 == 0 else t
-        recorder(Settled(t=late, robot=name, clock=step, checks=step))
-        if said >= messages:
-            break
+        events.append(Settled(t=t, robot=name, clock=step, checks=step))
+        if step % _LATE_EVERY == 0:
+            late = events
+            continue
+        if step % _LATE_EVERY == _LATE_BY:
+            events, late = [*late, *events], []
+        for event in events:
+            recorder(event)
+    for event in late:
+        recorder(event)
     recorder.close()
     file.close()
 

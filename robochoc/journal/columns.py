@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import accumulate
+from itertools import accumulate, compress
 from math import isfinite
 from operator import sub
 from typing import Annotated, Any, Literal
@@ -25,6 +25,10 @@ SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
 """The kinds of entries in `_Block.kinds`."""
 NANOSECONDS = 1_000_000_000
 _LARGEST = 2**63
+_TOO_LARGE = "a count is too large"
+_ONLY = [bytes(kind == other for other in range(256)) for kind in range(OTHER)]
+"""For each kind of timed entries, a translation of kinds to 1 for this kind, and 0 for all others."""
+_OTHERS, _NO_MESSAGES = bytes([OTHER]), bytes([SETTLED, DECIDED, OTHER])
 
 _Index = Annotated[int, Meta(ge=0)]
 
@@ -210,13 +214,13 @@ def entries_of(content: bytes) -> list[JournalEntry]:
     try:
         block = _decode(content)
         _json(block.values)  # msgpack may contain what messages cannot: keys that are not texts, and extensions
-        return list(_EntryDecoder(block))
+        return _EntryDecoder(block).entries()
     except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, RecursionError, LookupError) as error:
         raise BlockError(str(error)) from error
 
 
 class _EntryDecoder:
-    """Iterates over the entries of a block. Raises `ValueError` or `LookupError` if columns are inconsistent."""
+    """Decodes the entries of a block. Raises `ValueError` or `LookupError` if columns are inconsistent."""
 
     def __init__(self, block: _Block) -> None:
         sent, received, settled, decided, others = map(block.kinds.count, range(5))
@@ -232,43 +236,70 @@ class _EntryDecoder:
         if sent + received + settled + decided != timed:
             raise ValueError("a kind of entries is unknown")
         self._block = block
+        self._actors = [block.words[place] for place in block.actors]
         self._shapes = [_message_shape(shape, block.words) for shape in block.shapes]
         self._times, self._clocks = _times(block), _int64s(accumulate(block.clocks))
         _fit(self._times, timed)
         _finite((*self._times, *(entry.t for entry in block.others)))
 
-    def __iter__(self) -> Iterator[JournalEntry]:
-        block, shapes, words = self._block, self._shapes, self._block.words
-        times, clocks = iter(self._times), iter(self._clocks)
-        actors, partners, says = iter(block.actors), iter(block.partners), iter(block.says)
-        sizes, checks, values = iter(block.sizes), iter(block.checks), iter(block.values)
-        assignments, others = iter(block.assignments), iter(block.others)
-        checked: dict[str, int] = {}
-        left = len(block.values)
-        for kind in block.kinds:
-            if kind == OTHER:
-                yield next(others)
-                continue
-            t, clock, actor = next(times), next(clocks), words[next(actors)]
-            if kind == SENT:
-                word, fields = shapes[next(says)]
-                receiver = words[next(partners)]
-                left -= len(fields)
-                content = dict(zip(fields, values, strict=False))  # `values` continues with the next message
-                yield Sent(
-                    t=t, sender=actor, receiver=receiver, type=word, content=content, bytes=next(sizes), clock=clock
-                )
-            elif kind == RECEIVED:
-                word, _ = shapes[next(says)]
-                yield Received(t=t, sender=words[next(partners)], receiver=actor, type=word, clock=clock)
-            elif kind == SETTLED:
-                (so_far,) = _int64s([checked.get(actor, 0) + next(checks)])
-                checked[actor] = so_far
-                yield Settled(t=t, robot=actor, clock=clock, checks=so_far)
-            else:
-                yield Decided(t=t, robot=actor, assignment=next(assignments), clock=clock)
-        if left:
+    def entries(self) -> list[JournalEntry]:
+        """Return all entries. Each kind is decoded by itself, with few calls per entry."""
+        kinds = self._block.kinds
+        decoded = map(iter, (self._sent(), self._received(), self._settled(), self._decided(), self._block.others))
+        return list(map(next, map([*decoded].__getitem__, kinds)))
+
+    def _columns(self, kind: int, *columns: Iterable[Any]) -> Iterator[tuple[Any, ...]]:
+        """Yield the rows of one kind of entries from columns of all timed entries."""
+        chosen = self._block.kinds.translate(_ONLY[kind], _OTHERS)
+        return zip(*(compress(column, chosen) for column in columns), strict=True)
+
+    def _messages(self, kind: int) -> tuple[list[str], list[tuple[str, tuple[str, ...]]]]:
+        """Return the other robots of messages of one kind, and their shapes."""
+        block = self._block
+        chosen = block.kinds.translate(_ONLY[kind], _NO_MESSAGES)
+        partners = [self._block.words[place] for place in compress(block.partners, chosen)]
+        return partners, [self._shapes[place] for place in compress(block.says, chosen)]
+
+    def _sent(self) -> list[JournalEntry]:
+        block = self._block
+        partners, shapes = self._messages(SENT)
+        if sum(len(fields) for _, fields in shapes) != len(block.values):
             raise ValueError("the number of values differs from the number of the messages' fields")
+        values = iter(block.values)
+        contents = [dict(zip(fields, values, strict=False)) for _, fields in shapes]  # `values` continues in the next
+        return [
+            Sent(t=t, sender=actor, receiver=partner, type=kind, content=content, bytes=size, clock=clock)
+            for (t, actor, clock), partner, (kind, _), content, size in zip(
+                self._columns(SENT, self._times, self._actors, self._clocks), partners, shapes, contents, block.sizes,
+                strict=True,
+            )
+        ]  # fmt: skip
+
+    def _received(self) -> list[JournalEntry]:
+        partners, shapes = self._messages(RECEIVED)
+        rows = self._columns(RECEIVED, self._times, self._actors, self._clocks)
+        return [
+            Received(t=t, sender=partner, receiver=actor, type=kind, clock=clock)
+            for (t, actor, clock), partner, (kind, _) in zip(rows, partners, shapes, strict=True)
+        ]
+
+    def _settled(self) -> list[JournalEntry]:
+        checked: dict[str, int] = {}
+        found: list[JournalEntry] = []
+        rows = self._columns(SETTLED, self._times, self._actors, self._clocks)
+        for (t, actor, clock), more in zip(rows, self._block.checks, strict=True):
+            checked[actor] = checks = checked.get(actor, 0) + more
+            found.append(Settled(t=t, robot=actor, clock=clock, checks=checks))
+            if not -_LARGEST <= checks < _LARGEST:
+                raise ValueError(_TOO_LARGE)
+        return found
+
+    def _decided(self) -> list[JournalEntry]:
+        rows = self._columns(DECIDED, self._times, self._actors, self._clocks)
+        return [
+            Decided(t=t, robot=actor, assignment=assignment, clock=clock)
+            for (t, actor, clock), assignment in zip(rows, self._block.assignments, strict=True)
+        ]
 
 
 def _fit(column: Sequence[object], count: int) -> None:
@@ -308,5 +339,5 @@ def _int64s(numbers: Iterable[int]) -> list[int]:
     """Return `numbers`. Raises `ValueError` if a number does not fit into 64 bits."""
     numbers = list(numbers)
     if numbers and not (min(numbers) >= -_LARGEST and max(numbers) < _LARGEST):
-        raise ValueError("a count is too large")
+        raise ValueError(_TOO_LARGE)
     return numbers

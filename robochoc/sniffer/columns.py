@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from array import array
+from bisect import bisect_right
 from collections.abc import Iterable
 from typing import Any, TypeAlias
 
@@ -52,30 +53,29 @@ class Contents:
 
     def __init__(self) -> None:
         self._pages: list[bytearray] = [bytearray()]
-        self._page: array[int] = longs()
+        self._first = [0]
+        """The first message of each page."""
         self._end: array[int] = longs()
         self._encode = msgspec.msgpack.Encoder().encode
         self._decode = msgspec.msgpack.Decoder().decode
 
-    def append(self, content: dict[str, Any]) -> None:
-        """Append the content of the next message."""
-        packed = self._packed(content)
-        page = self._pages[-1]
-        if len(page) + len(packed) > self._LARGEST and page:
-            page = bytearray()
-            self._pages.append(page)
-        page += packed
-        self._page.append(len(self._pages) - 1)
-        self._end.append(len(page))
+    def extend(self, contents: Iterable[dict[str, Any]]) -> None:
+        """Append the contents of the next messages."""
+        encode, page, ends = self._encode, self._pages[-1], self._end
+        for content in contents:
+            try:
+                packed = encode(content)
+            except (msgspec.MsgspecError, OverflowError, TypeError, ValueError, RecursionError):
+                packed = encode({name: str(value)[:1000] for name, value in content.items()})
+            if len(page) + len(packed) > self._LARGEST and page:
+                page = bytearray()
+                self._pages.append(page)
+                self._first.append(len(ends))
+            page += packed
+            ends.append(len(page))
 
     def __getitem__(self, number: int) -> dict[str, Any]:
-        page = self._page[number]
-        first = self._end[number - 1] if number and self._page[number - 1] == page else 0
-        content: dict[str, Any] = self._decode(memoryview(self._pages[page])[first : self._end[number]])
+        page = bisect_right(self._first, number) - 1
+        start = self._end[number - 1] if number > self._first[page] else 0
+        content: dict[str, Any] = self._decode(memoryview(self._pages[page])[start : self._end[number]])
         return content
-
-    def _packed(self, content: dict[str, Any]) -> bytes:
-        try:
-            return self._encode(content)
-        except (msgspec.MsgspecError, OverflowError, TypeError, ValueError, RecursionError):
-            return self._encode({name: str(value)[:1000] for name, value in content.items()})

@@ -3,6 +3,8 @@
 Robots report events in batches, so during a run the journal contains events in the order of their arrival. A trace
 accepts this order: its causes are correct, and the page can show it at once. If the complete journal is not sorted by
 time, it is read again in the order of time, which all other readers use. The resulting trace has the next generation.
+If nobody writes the journal any more, the first trace ends at the first event out of order, and the second one is shown
+while it grows.
 
 Entries are discarded after reading, so a file of any length needs only the memory for its trace.
 """
@@ -11,9 +13,13 @@ from __future__ import annotations
 
 import time
 from array import array
-from collections.abc import Callable, Iterable, Iterator
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from io import BufferedReader
+from itertools import pairwise
+from math import inf
 from mmap import ACCESS_READ, mmap
+from operator import attrgetter, gt
 
 import msgspec
 
@@ -32,6 +38,8 @@ TEXT = b'{"event":"Journal"'
 _AT_ONCE_S = 0.5
 """The maximum time for work before the first display, in seconds."""
 _EVENTS_AT_ONCE = 5_000
+MOST_PENDING = 100_000
+"""The maximum number of events that wait in memory for earlier ones."""
 _FORSAKEN_S = 30.0
 """The seconds without new entries after which the writer of an unfinished journal counts as ended."""
 
@@ -58,8 +66,8 @@ class LiveTrace:
         self._head = file.head
         self._generation += 1
         self.trace = None
-        self._last = float("-inf")
-        self._disordered = False
+        self._earliest = EarliestTimes()
+        self._sorted_only = False
         self._outcome: Outcome | None = None
         self._ordering: Iterator[None] | None = None
         self._done = False
@@ -128,17 +136,15 @@ class LiveTrace:
     def _add(self, lines: Iterable[JournalEntry]) -> None:
         events: list[AnyEvent] = []
         for line in lines:
-            match line:
-                case Header():
-                    self.trace = Trace(line, self._generation)
-                case Ended():
-                    self._outcome = line.complete_outcome
-                case _:
-                    if line.t < self._last and not isinstance(line, Began):
-                        self._disordered = True
-                    self._last = line.t
-                    events.append(line)
-        if self.trace is not None:  # the follower ensures that the header is the first entry
+            if isinstance(line, Header):
+                self.trace = Trace(line, self._generation)
+            elif isinstance(line, Ended):
+                self._outcome = line.complete_outcome
+            else:
+                events.append(line)
+        self._earliest.add(events)
+        self._sorted_only = self._sorted_only or (self._earliest.disordered and self._age_s() > _FORSAKEN_S)
+        if self.trace is not None and not self._sorted_only:  # the follower ensures that the header is the first entry
             self.trace.add(events)
         if self._outcome is not None:
             self._end()
@@ -146,7 +152,7 @@ class LiveTrace:
     def _end(self) -> None:
         if self.trace is None:
             raise JournalError("the journal has no header")
-        if self._disordered:  # the trace is not complete until it is sorted
+        if self._earliest.disordered:  # the trace is not complete until it is sorted
             self._ordering = self._in_order(self.trace.header)
         else:
             self.trace.end(self._outcome, self._follower.damage)
@@ -155,11 +161,13 @@ class LiveTrace:
     def _in_order(self, header: Header) -> Iterator[None]:
         """Build the trace again from the events sorted by time, and yield after each part."""
         trace = Trace(header, self._generation + 1)
-        for events in events_by_time(self._file):
+        self._generation += 1
+        for events in events_by_time(self._file, self._earliest):
             trace.add(events)
+            if self._sorted_only:
+                self.trace = trace
             yield
         trace.end(self._outcome, self._follower.damage)
-        self._generation += 1
         self.trace = trace
 
 
@@ -176,9 +184,9 @@ def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Journa
     return lines
 
 
-def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
+def events_by_time(file: GrowingFile, earliest: EarliestTimes | None = None) -> Iterator[list[AnyEvent]]:
     """Yield the events up to the current end of `file`, sorted by time within each run. See `sorted_by_time`."""
-    return sorted_by_time(entries_of(file))
+    return sorted_by_time(entries_of(file), earliest)
 
 
 def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
@@ -189,27 +197,90 @@ def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
         yield lines
 
 
-def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[AnyEvent]]:
+class EarliestTimes:
+    """The earliest times of consecutive pieces of a journal's events, from which it follows when events can be yielded.
+
+    `disordered`: whether an event is earlier than its predecessor in the same run.
+    """
+
+    def __init__(self) -> None:
+        self.disordered = False
+        self._last = -inf
+        self._count = 0
+        self._starts: list[int] = []
+        self._minima: list[float] = []
+        self._begins: list[bool] = []
+
+    def add(self, events: Sequence[AnyEvent]) -> None:
+        """Add the next events."""
+        begun = [place for place, event in enumerate(events) if type(event) is Began]
+        for first, end in pairwise([0, *begun, len(events)]):
+            if first < end:
+                self._add_piece([event.t for event in events[first:end]], begins=type(events[first]) is Began)
+
+    def _add_piece(self, times: Sequence[float], *, begins: bool) -> None:
+        self._starts.append(self._count)
+        self._minima.append(min(times))
+        self._begins.append(begins)
+        before = [-inf if begins else self._last, *times]
+        self.disordered = self.disordered or any(map(gt, before, times))
+        self._last = times[-1]
+        self._count += len(times)
+
+    def of_rest(self) -> Callable[[int], float]:
+        """Return a function from a number of events to the earliest time of the events after these in their run."""
+        rest, minima = inf, array("d")
+        for minimum, begins in zip(reversed(self._minima), reversed(self._begins), strict=True):
+            rest = min(rest, minimum)
+            minima.append(rest)
+            rest = inf if begins else rest
+        minima.reverse()
+        return lambda count: minima[bisect_right(self._starts, count) - 1] if count < self._count else inf
+
+
+def sorted_by_time(
+    pieces: Iterable[Iterable[JournalEntry]], earliest: EarliestTimes | None = None
+) -> Iterator[list[AnyEvent]]:
     """Yield lists of the events in `pieces`, sorted by time within each run.
 
     A list may be empty, so that the caller can do other work in between. Events with equal times stay in their order.
-    The events of a run are stored in an unnamed temporary file until the run ends; only their times and positions are
-    in memory.
+    With the `earliest` times of the same events, an event is yielded as soon as no earlier one can follow. Otherwise,
+    and for events far out of order, the events of a run are stored in an unnamed temporary file until the run ends;
+    only their times and positions are in memory.
     """
-    stored = _StoredEvents()
+    earliest_after = earliest.of_rest() if earliest else None
+    count = 0
+    stored: _StoredEvents | None = None
+    pending: list[AnyEvent] = []
     try:
         for lines in pieces:
-            for line in lines:
-                if isinstance(line, Header | Ended):
-                    continue
-                if isinstance(line, Began):
-                    yield from stored.sorted()
+            events = [line for line in lines if not isinstance(line, Header | Ended)]
+            begun = [place for place, event in enumerate(events) if type(event) is Began]
+            for first, end in pairwise([0, *begun, len(events)]):
+                if first in begun:
+                    yield from stored.sorted() if stored else [sorted(pending, key=_time)]
+                    stored, pending = None, []
+                pending += events[first:end]
+                count += end - first
+                if stored is None and (earliest_after is None or len(pending) > MOST_PENDING):
                     stored = _StoredEvents()
-                stored.add(line)
-            yield []
-        yield from stored.sorted()
+                if stored:
+                    stored.add(pending)
+                    pending = []
+            if not stored and earliest_after:
+                pending.sort(key=_time)
+                ready = bisect_right(pending, earliest_after(count), key=_time)
+                yield pending[:ready]
+                del pending[:ready]
+            else:
+                yield []
+        yield from stored.sorted() if stored else [sorted(pending, key=_time)]
     finally:
-        stored.close()
+        if stored:
+            stored.close()
+
+
+_time = attrgetter("t")
 
 
 class _StoredEvents:
@@ -225,9 +296,10 @@ class _StoredEvents:
     def close(self) -> None:
         self._file.close()
 
-    def add(self, event: AnyEvent) -> None:
-        self._times.append(event.t)
-        self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
+    def add(self, events: Iterable[AnyEvent]) -> None:
+        for event in events:
+            self._times.append(event.t)
+            self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
 
     def sorted(self) -> Iterator[list[AnyEvent]]:
         """Yield lists of the events sorted by time, then delete the file."""

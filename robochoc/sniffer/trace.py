@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import heapq
 from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, Self
 
 import msgspec
@@ -158,10 +158,12 @@ class PendingStep:
 
     def is_complete(self) -> bool:
         """Move known received messages to the step's packet. Return whether all received messages are known."""
-        while self.received:
-            if not self.received[0].in_transit:
+        received, packet = self.received, self.packet
+        while received:
+            if not (in_transit := received[0].in_transit):
                 return False
-            self.packet.append(self.received.popleft().in_transit.popleft())
+            packet.append(in_transit.popleft())
+            received.popleft()
         return True
 
 
@@ -194,8 +196,8 @@ class Trace:
         self.outdated = False
         """True if the sending of an unseen message was recorded later: a rebuilt trace would be more complete."""
         self._contents = Contents()
-        self._number_of_robot: dict[str, int] = {}
-        self._number_of_kind: dict[str, int] = {}
+        self._number_of_robot = _Numbers(self.robots)
+        self._number_of_kind = _Numbers(self.kinds)
         self._reset_run()
 
     @classmethod
@@ -208,17 +210,22 @@ class Trace:
 
     def add(self, events: Iterable[AnyEvent]) -> None:
         """Add `events`, in which each robot's events are in order. Raises `TraceTooLargeError`."""
+        opened, channels = self._open, self._channels
         for event in events:
-            match event:
-                case Sent():
-                    self._open_step(event.sender, event).sent.append(event)
-                case Received():
-                    channel = self._channel(event.sender, event.receiver)
-                    self._open_step(event.receiver, event).received.append(channel)
-                case Settled():
-                    self._settle(event)
-                case _:
-                    self._add_rare(event)
+            if isinstance(event, Sent):
+                step = opened.get(event.sender) or self._open_step(event.sender, event)
+                step.t, step.clock = event.t, event.clock
+                step.sent.append(event)
+            elif isinstance(event, Received):
+                step = opened.get(event.receiver) or self._open_step(event.receiver, event)
+                step.t, step.clock = event.t, event.clock
+                edge = event.sender, event.receiver
+                step.received.append(channels.get(edge) or self._channel(*edge))
+            elif isinstance(event, Settled):
+                self._settle(event)
+            else:
+                self._add_rare(event)
+                opened, channels = self._open, self._channels  # both are new in a new run
 
     def flush(self) -> None:
         """Stop waiting: count received messages whose sending is not recorded as unseen."""
@@ -263,7 +270,7 @@ class Trace:
 
     def number_of(self, robot: str) -> int:
         """Return the number of a robot, which is assigned if the robot is new. Raises `TraceTooLargeError`."""
-        return _number(robot, self._number_of_robot, self.robots)
+        return self._number_of_robot[robot]
 
     # Runs
 
@@ -404,8 +411,8 @@ class Trace:
             self.decisions.append((number, step.decided))
             self.variables.setdefault(robot, {}).update(dict.fromkeys(step.decided))
         robot_number = self.number_of(robot)
-        for sent in step.sent:
-            self._write_message(sent, number, robot_number, run)
+        if step.sent:
+            self._write_messages(step.sent, number, robot_number, run)
         steps.t.append(step.t)
         steps.clock.append(_counted(step.clock))
         steps.checks.append(_counted(step.checks))
@@ -414,39 +421,51 @@ class Trace:
         steps.run.append(run)
         steps.said_end.append(len(self.messages.t))
 
-    def _write_message(self, sent: Sent, step: int, sender: int, run: int) -> None:
-        messages, number = self.messages, len(self.messages.t)
-        channel = self._channel(sent.sender, sent.receiver)
-        if channel.owed:
-            channel.owed -= 1
-            self.unseen -= 1
-            self.outdated = True
-        else:
-            channel.in_transit.append(number)
-        self._contents.append(sent.content)
-        messages.t.append(sent.t)
-        messages.clock.append(_counted(sent.clock))
-        messages.step.append(step)
-        messages.bytes.append(min(max(sent.bytes, 0), NOT_YET))
-        messages.sender.append(sender)
-        messages.receiver.append(self.number_of(sent.receiver))
-        messages.kind.append(_number(sent.type, self._number_of_kind, self.kinds))
-        messages.run.append(run)
-        messages.taken.append(NOT_YET)
-        self._sent_counts[sent.sender] = sequence = self._sent_counts.get(sent.sender, 0) + 1
-        messages.sequence.append(sequence)
+    def _write_messages(self, sent: Sequence[Sent], step: int, sender: int, run: int) -> None:
+        """Write the messages that `sender` sent in a step: each column at once, since a journal has millions."""
+        messages, first, count = self.messages, len(self.messages.t), len(sent)
+        name = sent[0].sender
+        for number, event in enumerate(sent, first):
+            channel = self._channels.get((name, event.receiver)) or self._channel(name, event.receiver)
+            if channel.owed:
+                channel.owed -= 1
+                self.unseen -= 1
+                self.outdated = True
+            else:
+                channel.in_transit.append(number)
+        self._contents.extend([event.content for event in sent])
+        robots, kinds = self._number_of_robot, self._number_of_kind
+        messages.t.extend([event.t for event in sent])
+        messages.clock.extend([_counted(event.clock) for event in sent])
+        messages.step.extend([step] * count)
+        messages.bytes.extend(
+            [size if 0 <= (size := event.bytes) <= NOT_YET else min(max(size, 0), NOT_YET) for event in sent]
+        )
+        messages.sender.extend([sender] * count)
+        messages.receiver.extend([robots[event.receiver] for event in sent])
+        messages.kind.extend([kinds[event.type] for event in sent])
+        messages.run.extend([run] * count)
+        messages.taken.extend([NOT_YET] * count)
+        before = self._sent_counts.get(name, 0)
+        messages.sequence.extend(range(before + 1, before + count + 1))
+        self._sent_counts[name] = before + count
 
 
-def _number(name: str, numbers: dict[str, int], names: list[str]) -> int:
-    number = numbers.get(name)
-    if number is None:
-        if len(names) == MOST_NAMES:
+class _Numbers(dict[str, int]):
+    """The numbers of `names`. A new name gets the next number. Raises `TraceTooLargeError`."""
+
+    def __init__(self, names: list[str]) -> None:
+        super().__init__()
+        self._names = names
+
+    def __missing__(self, name: str) -> int:
+        if len(self) == MOST_NAMES:
             raise TraceTooLargeError(f"the journal has more than {MOST_NAMES} robots or types of messages")
-        number = numbers[name] = len(names)
-        names.append(name)
-    return number
+        self[name] = number = len(self)
+        self._names.append(name)
+        return number
 
 
 def _counted(number: int) -> int:
     """Return a count clamped to integers that a float represents exactly, since a journal may contain any number."""
-    return min(max(number, 0), MOST_COUNTED)
+    return number if 0 <= number <= MOST_COUNTED else min(max(number, 0), MOST_COUNTED)

@@ -5,14 +5,15 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from robochoc.journal.events import AnyEvent, Began, Event
-from robochoc.journal.journal import JournalError, read_journal
+from robochoc.journal.events import AnyEvent, Began, Event, Settled
+from robochoc.journal.journal import JournalError, read_journal, sorted_by_time
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer import live_trace
 from robochoc.sniffer.cache import Cache
@@ -56,20 +57,32 @@ def _who(event: Event) -> set[str]:
     return {getattr(event, name, "")}
 
 
-@given(piece=st.integers(500, 20_000), at_once=st.integers(50, 3000))
+@given(
+    piece=st.integers(500, 20_000),
+    at_once=st.integers(50, 3000),
+    pending=st.sampled_from([0, 100, 100_000]),
+    age_s=st.sampled_from([0.0, 60.0]),
+)
 @QUICK
 def test_in_pieces_as_in_whole(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, run: tuple[list[AnyEvent], Outcome], piece: int, at_once: int
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    run: tuple[list[AnyEvent], Outcome],
+    piece: int,
+    at_once: int,
+    pending: int,
+    age_s: float,
 ) -> None:
+    monkeypatch.setattr(live_trace, "MOST_PENDING", pending)
     monkeypatch.setattr(live_trace, "PIECE_BYTES", piece)
     monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", at_once)
     content = journal_of(late(run[0], "Robot1.1"), run[1], header("processes"))
     whole = Trace.of(read_journal(content))
     before = 0
     with opened(tmp_path / "run.journal", content) as window:
-        follows = LiveTrace(window)
+        follows = LiveTrace(window, lambda: age_s)
         while follows.advance():
-            assert follows.trace is None or follows.trace.generation == before or follows.settled
+            assert follows.trace is None or follows.trace.generation == before or follows.settled or age_s
         assert follows.trace is not None
         assert numbers(follows.trace) == numbers(whole)
         assert (follows.trace.over, follows.trace.outcome, follows.loaded) == (True, whole.outcome, 1)
@@ -81,6 +94,34 @@ def test_events_by_time_are_the_journals(tmp_path: Path, run: tuple[list[AnyEven
         window.widen(len(content))
         events = [event for some in events_by_time(window) for event in some]
     assert tuple(events) == read_journal(content).events
+
+
+@given(
+    times=st.lists(st.lists(st.integers(0, 9), max_size=30), min_size=1, max_size=3),
+    cuts=st.lists(st.integers(0, 90), max_size=6),
+    again=st.lists(st.integers(0, 90), max_size=6),
+    pending=st.sampled_from([0, 3, 100]),
+)
+@examples(200, also_suppress=(HealthCheck.function_scoped_fixture,))
+def test_events_are_yielded_in_order_as_soon_as_possible(
+    monkeypatch: pytest.MonkeyPatch, times: list[list[int]], cuts: list[int], again: list[int], pending: int
+) -> None:
+    """In whatever pieces the journal is read the first and the second time, the order is that of `read_journal`."""
+    monkeypatch.setattr(live_trace, "MOST_PENDING", pending)
+    events: list[AnyEvent] = []
+    for run in times:
+        events.append(Began(t=0, protocol="ABT"))
+        events += [Settled(t=t, robot="a", clock=place, checks=0) for place, t in enumerate(run)]
+    floors = live_trace.EarliestTimes()
+    for piece in _pieces(events, cuts):
+        floors.add(piece)
+    lists = [*live_trace.sorted_by_time(_pieces(events, again), floors)]
+    assert [event for some in lists for event in some] == [*sorted_by_time(events)]
+    assert floors.disordered == any(run != sorted(run) for run in times)
+
+
+def _pieces(events: list[AnyEvent], cuts: list[int]) -> list[list[AnyEvent]]:
+    return [events[start:end] for start, end in pairwise([0, *sorted(cuts), len(events)])]
 
 
 def test_whoever_writes_is_not_disturbed(tmp_path: Path, run: tuple[list[AnyEvent], Outcome]) -> None:

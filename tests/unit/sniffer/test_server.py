@@ -304,8 +304,12 @@ def test_a_file_that_turns_out_to_be_none_is_told(tmp_path: Path) -> None:
         assert page.refusal("about")[0] == 400
 
 
-def test_numbers_that_no_machine_holds_are_told(tmp_path: Path, run: Run) -> None:
-    """In text they stand like any other; what cannot be put in order is no reason to keep a page waiting."""
+@pytest.mark.parametrize("most", [0, live_trace.MOST_PENDING])
+def test_events_with_large_numbers_are_sorted_or_refused(
+    tmp_path: Path, run: Run, monkeypatch: pytest.MonkeyPatch, most: int
+) -> None:
+    """In memory any number can be sorted. The temporary file has 64 bits for a number; the page shows the error."""
+    monkeypatch.setattr(live_trace, "MOST_PENDING", most)
     beginning, *_ = lines_of(read_journal(run.whole))
     said = [
         b'{"event":"Sent","t":%d,"sender":"a","receiver":"b","type":"X","content":{"x":%d},"bytes":1,"clock":0}\n' % one
@@ -315,7 +319,11 @@ def test_numbers_that_no_machine_holds_are_told(tmp_path: Path, run: Run) -> Non
     path.write_bytes(b"".join([beginning, *said]))
     os.utime(path, (0, 0))
     with sniffer_server(SnifferSession(path)) as page:
-        wait_until(lambda: page.refusal("about")[0] == 400, "nothing is said")
+        if most:
+            wait_until(lambda: page.json("about")["over"], "the journal is not sorted")
+            assert page.json("details?chunk=0")[0]["content"] == {"x": str(10**30)}
+        else:
+            wait_until(lambda: page.refusal("about")[0] == 400, "no error is shown")
 
 
 def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(
