@@ -12,12 +12,14 @@ from pathlib import Path
 from typing import NamedTuple
 
 from measure import ROBOCHOC
-from peer_problems import COLOURING, COSTS, FILES, LOCAL, RAVEN, TEAM, Family
+from peer_problems import COLOURING, COSTS, FILES, LOCAL, RAVEN, TABLES, TEAM, Family
 from peer_runs import Run
 
 PYTHON_OF_RAVEN = "ROBOCHOC_BENCH_RAVEN"
 PYTHON_OF_PYDCOP = "ROBOCHOC_BENCH_PYDCOP"
 FRODO = "ROBOCHOC_BENCH_FRODO"
+PYTHON_OF_PROPFLOW = "ROBOCHOC_BENCH_PROPFLOW"
+PYTHON_OF_CENTRAL = "ROBOCHOC_BENCH_CENTRAL"
 HERE = Path(__file__).parent
 CYCLES = 200
 FORBIDDEN = 10_000
@@ -54,7 +56,15 @@ class Contestant:
 
 def contestants(family: Family) -> list[Contestant]:
     """All that are to solve a family, those that are missing here among them."""
-    return [*_ours(family), *_frodos(family), *_pydcops(family), *_ravens(family), DCOPSOLVER]
+    return [
+        *_ours(family),
+        *_frodos(family),
+        *_pydcops(family),
+        *_ravens(family),
+        *_propflows(family),
+        *_centrals(family),
+        DCOPSOLVER,
+    ]
 
 
 # robochoc
@@ -251,6 +261,62 @@ def _raven(protocol: str, runtime: str) -> Contestant:
 def _of_raven(_folder: Path, run: Run) -> Answer:
     found = json.loads(run.output)
     return Answer("solution" if found["solved"] else "no-solution", found["messages"])
+
+
+# PropFlow
+
+
+def _propflows(family: Family) -> list[Contestant]:
+    if family is not LOCAL:
+        return []
+    python = os.environ.get(PYTHON_OF_PROPFLOW, "")
+    missing = "" if python else f"{PYTHON_OF_PROPFLOW} names no Python"
+    words = [str(HERE / "propflow_once.py"), str(CYCLES)]
+    return [
+        Contestant(
+            "PropFlow",
+            "damped Max-Sum",
+            "one loop",
+            lambda folder: [python, *words, str(folder / TABLES)],
+            _of_prices,
+            missing,
+        )
+    ]
+
+
+def _of_prices(_folder: Path, run: Run) -> Answer:
+    found = json.loads(run.output.splitlines()[-1])
+    return Answer("no-solution" if found["cost"] is None else f"{found['cost']:g}", found.get("messages"))
+
+
+# Central solvers
+
+
+def _centrals(family: Family) -> list[Contestant]:
+    """One process that knows the whole problem: the price of having no centre."""
+    if family is LOCAL:
+        return []
+    python = os.environ.get(PYTHON_OF_CENTRAL, "")
+    missing = "" if python else f"{PYTHON_OF_CENTRAL} names no Python"
+    whole = [_central(python, solver, missing) for solver in ("ortools", "toulbar2")]
+    cosoco = str(Path(python).parent / "cosoco")
+    no_costs = Contestant(
+        "cosoco", "central", "one process", lambda folder: [cosoco, str(folder / FILES["xcsp3"])], _of_cosoco, missing
+    )
+    return whole if family is COSTS else [*whole, no_costs]
+
+
+def _central(python: str, solver: str, missing: str) -> Contestant:
+    words = [python, str(HERE / "central_once.py"), solver]
+    name = {"ortools": "OR-Tools"}.get(solver, solver)
+    return Contestant(
+        name, "central", "one process", lambda folder: [*words, str(folder / TABLES)], _of_prices, missing
+    )
+
+
+def _of_cosoco(_folder: Path, run: Run) -> Answer:
+    said = [line[2:].strip() for line in run.output.splitlines() if line.startswith("s ")]
+    return Answer({"SATISFIABLE": "solution", "UNSATISFIABLE": "no-solution"}[said[-1]])
 
 
 # DCOPSolver

@@ -21,8 +21,9 @@ from robochoc.model.constraint import INFINITE, Constraint, Domain, Predicate, R
 from robochoc.model.problem import ProblemKind, Team
 
 TEAM = "team"
-FILES = {"frodo": "frodo.xml", "pydcop": "pydcop.yaml"}
+FILES = {"frodo": "frodo.xml", "pydcop": "pydcop.yaml", "xcsp3": "problem.xml"}
 RAVEN = "raven.json"
+TABLES = "tables.json"
 
 
 @dataclass(frozen=True)
@@ -94,6 +95,7 @@ def write_problem(team: Team, folder: Path) -> None:
     write_team(team, folder / TEAM)
     for name, file in FILES.items():
         (folder / file).write_bytes(_exported(in_tables(team), name))
+    (folder / TABLES).write_text(json.dumps(_in_prices(team)))
     if team.kind is ProblemKind.DISCSP:
         (folder / RAVEN).write_text(json.dumps(_for_raven(team)))
 
@@ -142,3 +144,17 @@ def _for_raven(team: Team) -> dict[str, Any]:
     domains = {name: variable.domain for name, variable in team.variables.items()}
     constraints = [(one.variables, list(_forbidden(one, domains))) for one in team.constraints()]
     return {"domains": {name: list(domain) for name, domain in domains.items()}, "constraints": constraints}
+
+
+def _in_prices(team: Team) -> dict[str, Any]:
+    """Domains, and for each constraint its variables and the price of each row of values, None if forbidden."""
+    domains = {name: variable.domain for name, variable in team.variables.items()}
+    constraints = [(one.variables, list(_prices(one, domains))) for one in team.constraints()]
+    return {"domains": {name: list(domain) for name, domain in domains.items()}, "constraints": constraints}
+
+
+def _prices(constraint: Constraint, domains: Mapping[str, Domain]) -> Iterator[float | None]:
+    scope = constraint.variables
+    for values in itertools.product(*(domains[name] for name in scope)):
+        price = constraint.price(dict(zip(scope, values, strict=True)))
+        yield None if price == INFINITE else int(price) if price == int(price) else price

@@ -17,7 +17,7 @@ from robochoc.generators.random_csp import random_csp
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
-VARIABLES = ("ROBOCHOC_BENCH_RAVEN", "ROBOCHOC_BENCH_PYDCOP", "ROBOCHOC_BENCH_FRODO")
+VARIABLES = tuple(f"ROBOCHOC_BENCH_{name}" for name in ("RAVEN", "PYDCOP", "FRODO", "PROPFLOW", "CENTRAL"))
 FAMILIES = ("COLOURING", "LOOSE", "TIGHT", "COSTS", "LOCAL")
 
 
@@ -153,7 +153,10 @@ def test_problems_are_written_for_all(load: Any, tmp_path: Path) -> None:  # noq
     assert [one.variables for one in tables.constraints()] == [one.variables for one in colouring.constraints()]
     assert {one.definition.tuples for one in tables.constraints()} == {((0, 0), (1, 1), (2, 2))}
     problems.write_problem(random_csp(3, 2, 1, 0, max_cost=5), tmp_path / "costs")
-    assert {path.name for path in (tmp_path / "costs").iterdir()} == {"team", "frodo.xml", "pydcop.yaml"}
+    files = {"team", "frodo.xml", "pydcop.yaml", "problem.xml", "tables.json"}
+    assert {path.name for path in (tmp_path / "costs").iterdir()} == files
+    told = json.loads((tmp_path / "hard" / "tables.json").read_text())
+    assert told["constraints"] == [[["V1", "V2"], [None, 0, 0, None]]]
 
 
 @pytest.mark.more
