@@ -75,7 +75,11 @@ class Contents:
             ends.append(len(page))
 
     def __getitem__(self, number: int) -> dict[str, Any]:
+        content: dict[str, Any] = self._decode(self.packed(number))
+        return content
+
+    def packed(self, number: int) -> bytes:
+        """Return the content of a message as msgpack."""
         page = bisect_right(self._first, number) - 1
         start = self._end[number - 1] if number > self._first[page] else 0
-        content: dict[str, Any] = self._decode(memoryview(self._pages[page])[start : self._end[number]])
-        return content
+        return bytes(self._pages[page][start : self._end[number]])

@@ -5,13 +5,15 @@
     steps       t, clock, checks (8), packet_end (4), the packets (4), robot, run (2)
     decisions   JSON: [[step, {variable: value}], ...]
     details     JSON: the contents of messages, in words and as FIPA ACL
+    search      JSON: the messages with a text, and the number of the first message that was not searched
 
 Steps and messages are numbered (`trace.py`). Each answer has a maximum number of rows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from typing import Any, assert_never
 
 import msgspec
@@ -41,6 +43,12 @@ MOST_NOTES = 1000
 """The maximum number of notes on improvements, and likewise of all other notes."""
 MOST_EPOCHS = 8
 """The maximum number of epochs whose results the verdict shows."""
+
+SEARCH_S = 0.2
+"""The time after which a search returns the hits so far: other requests are answered, and it can be cancelled."""
+_SEARCHED_AT_ONCE = 1024
+_MOST_SEARCHED = 100_000
+"""The maximum number of different messages whose results are cached during a search."""
 
 _OFTEN = {"heard", "improved"}
 
@@ -83,6 +91,8 @@ class PageData:
         self.protocols = RunProtocols(trace)
         self.names = TeamNames(trace, self.protocols)
         self.acl_messages = AclMessages(trace, self.protocols)
+        self._searched = ""
+        self._found: dict[tuple[int, int, int, int, bytes], bool] = {}
 
     def about(self) -> bytes:
         """Return the description of the run, the robots, and the progress, as JSON."""
@@ -163,6 +173,44 @@ class PageData:
             raise BadRequestError(f"chunk {chunk} of details does not exist")
         return _encode([self.detail(message) for message in range(first, min(first + DETAILS, count))])
 
+    def search(self, query: str, first: int, end: int, within_s: float = SEARCH_S) -> bytes:
+        """Return the messages from `first` with the text `query`, in any case, and the message where the search ended.
+
+        The text can be in the words, the names, the type, or the content. Equal messages are searched once.
+        """
+        _check(first, end, len(self.trace.messages.t), most=end)
+        if query != self._searched:
+            self._searched, self._found = query, {}
+        deadline = time.monotonic() + within_s
+        hits: list[int] = []
+        while first < end:
+            following = min(first + _SEARCHED_AT_ONCE, end)
+            hits += self._hits(query.lower(), first, following)
+            first = following
+            if time.monotonic() > deadline:
+                break
+        return _encode({"hits": hits, "to": first})
+
+    def _hits(self, query: str, first: int, end: int) -> Iterator[int]:
+        of, found, packed = self.trace.messages, self._found, self.trace.packed_content
+        columns = (column[first:end] for column in (of.run, of.sender, of.receiver, of.kind))
+        for message, said in enumerate(zip(*columns, map(packed, range(first, end)), strict=True), first):
+            hit = found.get(said)
+            if hit is None:
+                if len(found) >= _MOST_SEARCHED:
+                    found.clear()
+                hit = found[said] = query in self._searched_text(message)
+            if hit:
+                yield message
+
+    def _searched_text(self, message: int) -> str:
+        trace, of = self.trace, self.trace.messages
+        kind = trace.kinds[of.kind[message]]
+        names = f"{trace.robots[of.sender[message]]} {trace.robots[of.receiver[message]]}"
+        content = _encode(self.acl_messages.plain(message)).decode()
+        act = self.protocols.act_of_type(kind).performative
+        return f"{self.words(message)}\n{names}\n{kind} {act}\n{content}".lower()
+
     def detail(self, message: int) -> dict[str, Any]:
         """Return the content of a message: in fields, in words, and as FIPA ACL."""
         acl = self.acl_messages.acl_of(message)
@@ -186,11 +234,11 @@ class PageData:
         return {"name": name, "performative": str(act.performative), "why": act.why}
 
 
-def _check(first: int, end: int, count: int) -> None:
+def _check(first: int, end: int, count: int, most: int = MOST_ROWS) -> None:
     if not 0 <= first <= end <= count:
         raise BadRequestError(f"rows {first} to {end} do not exist; there are {count}")
-    if end - first > MOST_ROWS:
-        raise BadRequestError(f"{end - first} rows are too many for one request; the maximum is {MOST_ROWS}")
+    if end - first > most:
+        raise BadRequestError(f"{end - first} rows are too many for one request; the maximum is {most}")
 
 
 def _run(run: RunRecord) -> dict[str, Any]:

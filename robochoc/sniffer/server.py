@@ -159,7 +159,7 @@ class Server:
                 (r"/([^/]*)/", SecretPage, whole),
                 (r"/([^/]*)/news", _NewsSocket, known),
                 (r"/([^/]*)/journal", _JournalHandler, known),
-                (r"/([^/]*)/(about|columns|steps|decisions|details|states|scene)", _AnswerHandler, known),
+                (r"/([^/]*)/(about|columns|steps|decisions|details|search|states|scene)", _AnswerHandler, known),
             ],
             compress=True,
         )
@@ -199,6 +199,9 @@ class _AnswerHandler(_TokenHandler):
             case "details":
                 chunk = self._number("chunk")
                 return await server.read(lambda: session.details(chunk))
+            case "search":
+                text, first, end = self.get_query_argument("text", ""), self._number("from"), self._number("to")
+                return await server.read(lambda: session.search(text, first, end))
             case "states":
                 robot, chunk = self._number("robot"), self._number("chunk")
                 name = await server.read(lambda: session.robot(robot))

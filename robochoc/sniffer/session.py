@@ -151,6 +151,10 @@ class SnifferSession:
                 self._details.put(key, answer)
         return answer
 
+    def search(self, text: str, first: int, end: int) -> bytes:
+        """Return the first messages with `text`, as `PageData.search` does. Raises `BadRequestError`."""
+        return self._answers.search(text, first, end)
+
     def robot(self, number: int) -> str:
         """Return the name of a robot. Raises `BadRequestError`."""
         robots = self._trace.robots

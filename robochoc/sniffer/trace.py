@@ -250,6 +250,10 @@ class Trace:
         """Return the fields of a message, by name."""
         return self._contents[message]
 
+    def packed_content(self, message: int) -> bytes:
+        """Return the fields of a message as msgpack."""
+        return self._contents.packed(message)
+
     def packet(self, step: int) -> list[int]:
         """Return the messages received in a step, in order."""
         first = self.steps.packet_end[step - 1] if step else 0

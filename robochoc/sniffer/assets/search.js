@@ -1,6 +1,6 @@
 "use strict";
-/* Text search in the words of messages. The server computes words on request, a thousand messages at a time, so a
-   search runs in the background, from the first message, and can be cancelled. */
+/* Text search in the words, names and contents of messages. A search runs in the background, from the first message on,
+   part by part, and can be cancelled. A server searches by itself; an exported page searches the messages it contains. */
 (() => {
   const CHUNK = 1024;
 
@@ -19,7 +19,6 @@
       this.looked = 0;
       this.running = false;
       this.trouble = "";
-      this._searched = new Map(); // chunk -> the number of searched messages
       this._turn = (this._turn || 0) + 1;
     }
 
@@ -45,20 +44,16 @@
     }
 
     async _through(turn) {
-      const chunks = Math.ceil(this.model.messageCount / CHUNK);
-      for (let chunk = 0; chunk < chunks; chunk++) {
-        const there = Math.min(this.model.messageCount - chunk * CHUNK, CHUNK);
-        const before = this._searched.get(chunk) || 0;
-        if (before >= there) continue;
-        const details = await this.source.details(chunk, there);
+      const { model, source, query } = this;
+      while (this.looked < model.messageCount) {
+        const { hits, to } = await source.search(query, this.looked, model.messageCount, (...hit) => this._isHit(...hit));
         if (turn !== this._turn) return;
-        const found = [];
-        for (let at = before; at < details.length; at++)
-          if (this._isHit(chunk * CHUNK + at, details[at])) found.push(chunk * CHUNK + at);
-        this._searched.set(chunk, details.length);
-        this.looked += details.length - before;
-        this._keep(found);
-        this.changed(found.length > 0);
+        this.looked = to;
+        for (const message of hits) {
+          this.hits.push(message);
+          this.marks.add(message);
+        }
+        this.changed(hits.length > 0);
       }
     }
 
@@ -68,13 +63,6 @@
       const kind = model.kindOf(message);
       return `${detail.words}\n${names}\n${kind.name} ${kind.performative}\n${JSON.stringify(detail.content)}`
         .toLowerCase().includes(this.query);
-    }
-
-    _keep(found) {
-      if (!found.length) return;
-      for (const message of found) this.marks.add(message);
-      const at = Sniffer.lowerBound(this.hits, found[0]);
-      this.hits = this.hits.slice(0, at).concat(found, this.hits.slice(at));
     }
 
     /* The next hit after `message` (previous: `step` -1) that satisfies `shown`, cyclically; -1: none. */

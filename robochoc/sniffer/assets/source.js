@@ -80,6 +80,9 @@
     _states(robot, chunk) { return this._json(`states?robot=${robot}&chunk=${chunk}`); }
     scene(from = 0) { return this._json(`scene?from=${from}`); }
 
+    /* The messages with the text `query` from number `from` on, up to the message `to` or as far as a short search gets. */
+    search(query, from, to) { return this._json(`search?text=${encodeURIComponent(query)}&from=${from}&to=${to}`); }
+
     /* The address of the journal's file. */
     get journal() { return `${this.base}/journal`; }
 
@@ -130,6 +133,14 @@
     _details(chunk) { return this._json(`details:${chunk}`); }
     _states(robot, chunk) { return this._json(`states:${robot}:${chunk}`); }
     scene() { return this._json("scene"); }
+
+    /* As above; `isHit(message, detail)` decides. */
+    async search(query, from, to, isHit) {
+      const first = from - from % Sniffer.CHUNK;
+      const hits = (await this.details(first / Sniffer.CHUNK)).map((detail, at) => (isHit(first + at, detail) ? first + at : -1));
+      return { hits: hits.filter((message) => message >= from), to: Math.min(first + Sniffer.CHUNK, to) };
+    }
+
     get journal() { return null; }
     onNews() {}
   };

@@ -19,6 +19,7 @@ from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Constraint, Domain, Variable
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from robochoc.sniffer import page_data
 from robochoc.sniffer.acl import parse
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.export import embedded_answers
@@ -240,3 +241,34 @@ def test_decisions_and_words_have_the_names_of_symbols() -> None:
     assert {"x": "red"} in decided
     assert {"y": "green"} in decided
     assert b"x = red" in data.details(0)
+
+
+@pytest.mark.parametrize("most", [3, 100_000])
+@pytest.mark.parametrize("query", ["cannot", "robot1.1 robot", "nogood", "nowhere", '{"value":[2]}'])
+def test_a_search_in_parts_finds_the_messages_whose_details_contain_the_text(
+    monkeypatch: pytest.MonkeyPatch, query: str, most: int
+) -> None:
+    monkeypatch.setattr(page_data, "_SEARCHED_AT_ONCE", 100)
+    monkeypatch.setattr(page_data, "_MOST_SEARCHED", most)
+    data = feed_of("abt")
+    trace, count = data.trace, len(data.trace.messages.t)
+    hits: list[int] = []
+    first, parts = 0, 0
+    while first < count:
+        answer = told(data.search(query, first, count, within_s=0))
+        hits += answer["hits"]
+        assert first < answer["to"] <= count
+        first, parts = answer["to"], parts + 1
+    assert parts == -(-count // 100)
+    kinds = {kind["name"]: kind["performative"] for kind in told(data.about())["kinds"]}
+    expected = []
+    for message in range(count):
+        detail, kind = data.detail(message), trace.kinds[trace.messages.kind[message]]
+        sender, receiver = (
+            trace.robots[column[message]] for column in (trace.messages.sender, trace.messages.receiver)
+        )
+        content = json.dumps(detail["content"], separators=(",", ":"))
+        text = f"{detail['words']}\n{sender} {receiver}\n{kind} {kinds[kind]}\n{content}"
+        expected += [message] if query in text.lower() else []
+    assert hits == expected
+    assert bool(hits) == (query != "nowhere")

@@ -77,6 +77,8 @@ def test_every_answer_is_the_journals(page: SnifferServer, file: Path, run: Run)
     details = page.json("details?chunk=0")
     assert len(details) == min(messages, 1024)
     assert details[7]["content"] == run.trace.content(7)
+    found = page.json(f"search?text=Robot1.1%20Robot&from=0&to={messages}")
+    assert 0 < len(found["hits"]) < found["to"] <= messages
     assert page.get("journal") == file.read_bytes()
 
 
