@@ -27,6 +27,9 @@ from hatchling.metadata.plugin.interface import MetadataHookInterface
 NEEDED = ["msgspec>=0.18", "mypy[mypyc]>=1.13"]
 """mypyc sees the types of what is imported: without msgspec it would know nothing of messages."""
 NEXT = "A C compiler and Python's headers are needed. Without ROBOCHOC_COMPILE=1, a build without them is plain Python."
+KERNELS = "robochoc.communication.arrays._kernels"
+KERNELS_FLAGS = ["-O3", "-fwrapv", "-ffp-contract=off"]
+"""The flags of C compilers other than Microsoft's: unused sums may overflow, and floats are rounded as in numpy."""
 MYPY = ["--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
 
 ONLY_REPOSITORY = re.compile(r"<!-- repository -->.*?<!-- end -->\n*", re.DOTALL)
@@ -114,12 +117,14 @@ def _compiled(root: Path, folder: Path, modules: list[str]) -> str:
 
 
 def _compile_here(modules: list[str]) -> None:
-    """Compile the modules in this folder, each beside its source. Whatever goes wrong ends the process."""
+    """Compile the modules and the kernels in this folder, each beside its source. An error ends the process."""
     from mypyc.build import mypycify  # noqa: PLC0415 - where nothing is compiled it need not be there
-    from setuptools import Distribution  # noqa: PLC0415 - the same
+    from setuptools import Distribution, Extension  # noqa: PLC0415 - the same
 
     files = [f"{module.replace('.', '/')}.py" for module in modules]
     extensions = mypycify([*MYPY, *files], group_name="robochoc", debug_level="0")
+    flags = KERNELS_FLAGS if sys.platform != "win32" else []
+    extensions.append(Extension(KERNELS, [f"{KERNELS.replace('.', '/')}.c"], extra_compile_args=flags))
     command = Distribution({"ext_modules": extensions}).get_command_obj("build_ext")
     command.inplace = True
     command.ensure_finalized()

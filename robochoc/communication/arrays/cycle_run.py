@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
 from robochoc.communication.arrays.border import WHOLE_TEAM, Border
+from robochoc.communication.arrays.kernels import CycleAccount, Kernels, compiled_functions
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import MessageTally
 from robochoc.model.outcome import Metrics, Verdict
@@ -44,12 +45,12 @@ class Draws:
     def __init__(self, seed: int, names: Iterable[str], many: int) -> None:
         words = (word for name in names for word in key_and_step(seed, name))
         pairs = np.fromiter(words, np.uint64, 2 * many).reshape(many, 2)
-        self._states, self._steps = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+        self.states, self.steps = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
 
     def draw(self, robots: Index) -> NDArray[np.float64]:
         """Return the next random number of each robot in `robots`, which must not contain duplicates."""
-        bits = self._states[robots] + self._steps[robots]
-        self._states[robots] = bits
+        bits = self.states[robots] + self.steps[robots]
+        self.states[robots] = bits
         mixed = (bits ^ bits >> np.uint64(30)) * _FIRST
         mixed = (mixed ^ mixed >> np.uint64(27)) * _SECOND
         mixed ^= mixed >> np.uint64(31)
@@ -131,7 +132,7 @@ class CycleRun(ABC):
     def step(self) -> None:
         """Run one cycle."""
         self.border.exchange(self.values, self.clocks)
-        before = self.values.copy()
+        before = None if self.changes is None else self.values.copy()
         self._step()
         if self.verdict is not None:
             return
@@ -181,15 +182,16 @@ class CycleRun(ABC):
 
     def value_costs(self) -> list[Integers]:
         """Return the cost of each value of robots with neighbours, by group. Record the cost of the current values."""
-        found, sums = [], _Sums()
+        if self.kernels is not None:
+            compiled, account = self.kernels.value_costs(self.values)
+            self.note_account(account)
+            return compiled
+        found, sums = [], self._settled_sums()
         for group, firsts in zip(self.layout.groups, self._firsts, strict=True):
             own = group.values(self.values)
             total = _fixed(group)
             chosen = total.ravel().take(firsts + own[: group.active])
             sums.add(self.layout, chosen, 1)
-            if group.fixed is not None and group.active < group.many:
-                alone = np.arange(group.active, group.many)
-                sums.add(self.layout, group.fixed[alone, own[alone]], 1)
             for block in group.blocks:
                 for column in block.columns:
                     total[column.lists] += block.rows.take(column.rows(self.values), axis=0)
@@ -205,6 +207,30 @@ class CycleRun(ABC):
         if cost < self._lowest or cost == INFINITE == self._lowest:
             self.best, self._lowest = self.values.copy(), cost
         self.costs.append(cost)
+
+    def note_account(self, account: CycleAccount) -> None:
+        """Record the cost of the current values, as computed by compiled functions."""
+        sums = self._settled_sums()
+        for times, (broken, paid) in enumerate(account.sums, start=1):
+            sums.add_sum(broken, paid, times)
+        self.note(sums.cost(self.border))
+
+    def _settled_sums(self) -> _Sums:
+        """Return the cost of the values of robots without neighbours."""
+        sums = _Sums()
+        for group in self.layout.groups:
+            if group.fixed is not None and group.active < group.many:
+                alone = np.arange(group.active, group.many)
+                sums.add(self.layout, group.fixed[alone, group.values(self.values)[alone]], 1)
+        return sums
+
+    @cached_property
+    def kernels(self) -> Kernels | None:
+        """The compiled functions. None: numpy computes the cycles."""
+        functions = compiled_functions()
+        if functions is None or self.layout.index != np.int32:
+            return None
+        return Kernels(functions, self.layout, self.draws.states, self.draws.steps, self.all_checks)
 
     def present(self, number: int, value_costs: Integers) -> Integers:
         """Return the costs of the current values of robots with neighbours in the group `number`."""
@@ -229,7 +255,9 @@ class CycleRun(ABC):
 
     def receive(self) -> None:
         """Receive a message from each neighbour: advance each clock to the neighbours' clocks."""
-        if self.clocks is not None:
+        if self.clocks is not None and self.kernels is not None:
+            self.clocks = self.kernels.receive(self.clocks, checking=False)
+        elif self.clocks is not None:
             self.clocks = self.greatest(self.clocks, self.clocks.copy())
 
     def greatest(self, numbers: Integers, largest: Integers) -> Integers:
@@ -268,8 +296,12 @@ class _Sums:
     def add(self, layout: ArrayLayout, costs: Integers, times: int) -> None:
         """Add `costs`, each of which is counted by `times` robots."""
         broken = int(layout.costs.broken(costs).sum())
+        self.add_sum(broken, layout.costs.sum(costs) - (broken << layout.costs.bits), times)
+
+    def add_sum(self, broken: int, paid: int, times: int) -> None:
+        """Add the number of violated constraints and the other costs, each of which is counted by `times` robots."""
         self._broken[times] = self._broken.get(times, 0) + broken
-        self._paid[times] = self._paid.get(times, 0) + layout.costs.sum(costs) - (broken << layout.costs.bits)
+        self._paid[times] = self._paid.get(times, 0) + paid
 
     def cost(self, border: Border) -> float:
         """Return the resulting sum, including the robots beyond the border."""

@@ -21,11 +21,15 @@ class ArrayDSA(CycleRun):
 
     def _step(self) -> None:
         """Move or stay (`StochasticSearch.choice`)."""
-        found = self.value_costs()
+        if self.kernels is not None:
+            values, account = self.kernels.dsa(self.values, *self._chances())
+            self.note_account(account)
+            self.values = values
+        else:
+            for number, (group, value_costs) in enumerate(zip(self.layout.groups, self.value_costs(), strict=True)):
+                self._choose(number, group, value_costs)
         self.receive()
         self.count_checks(self.all_checks)
-        for number, (group, value_costs) in enumerate(zip(self.layout.groups, found, strict=True)):
-            self._choose(number, group, value_costs)
         if self.cycle + 1 < self.settings.cycles:
             self.send_values()
 
@@ -44,6 +48,12 @@ class ArrayDSA(CycleRun):
         choices[np.arange(len(moving)), own[moving]] = False
         chosen = self.draws.choose(moving + group.first, others[moving])
         own[moving] = nth(choices, chosen).astype(own.dtype)
+
+    def _chances(self) -> tuple[int, float, float]:
+        """Return the code in C of moves without a gain, their probability, and the probability of other moves."""
+        settings = cast("DSASettings", self.settings)
+        sideways = 0 if settings.variant == "A" else 1 if settings.variant in "CE" else 2
+        return sideways, settings.probability, 1.0 if settings.variant in "DE" else settings.probability
 
     def _probability(self, gains: Flags) -> Floats | float:
         """Return the probability that each robot moves. `gains` marks robots whose move is a gain."""

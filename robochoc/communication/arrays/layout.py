@@ -20,6 +20,8 @@ from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import check_exact
 from robochoc.system.lazy_dataclass import dataclass
 
+ROWS_PADDING = 3
+"""The number of unused entries after tables, which `_kernels.c` may read."""
 _SIGNED_BITS = 63
 _LOW_BITS = 31
 _LOW = (1 << _LOW_BITS) - 1
@@ -99,11 +101,36 @@ class Column:
 
 @dataclass(frozen=True)
 class ConstraintBlock:
-    """Constraints with one shape, known by robots in one group: a row of costs per combination of others' values."""
+    """Constraints with one shape, known by robots in one group, robot by robot.
+
+    Attributes:
+        held: The constraints in the order of the description.
+        rows: A row of costs per combination of others' values.
+        lengths: The number of constraints of each robot.
+        bases: The index of the first row of each constraint's table. None: there is one table.
+        others: The rows of the other robots in each scope.
+        strides: The factors of their values in the index of a row.
+    """
 
     held: KnownConstraints
     rows: Integers
-    columns: tuple[Column, ...]
+    lengths: Integers
+    bases: Integers | None
+    others: Integers
+    strides: tuple[int, ...]
+
+    @cached_property
+    def columns(self) -> list[Column]:
+        """The constraints, column by column."""
+        return [
+            Column(
+                lists,
+                0 if self.bases is None else self.bases[places],
+                tuple(np.ascontiguousarray(self.others[places].T)),
+                self.strides,
+            )
+            for lists, places in columns(self.lengths)
+        ]
 
 
 @dataclass
@@ -248,7 +275,9 @@ class ArrayLayout:
         for one in held:
             own = self.places[one.owners] - group.first
             group.checks += np.bincount(own, minlength=group.many) * group.size
-            rows = self.costs.of(one.tables).reshape(-1, group.size)
+            padded = np.zeros(one.tables.size + ROWS_PADDING, self.costs.kind)
+            padded[: one.tables.size] = self.costs.of(one.tables).ravel()
+            rows = padded[: one.tables.size].reshape(-1, group.size)
             if one.others.shape[1]:
                 group.blocks.append(self._block(group, one, own, rows))
             else:
@@ -260,14 +289,10 @@ class ArrayLayout:
         order = np.argsort(own, kind="stable")
         shape = held.tables.shape[1:-1]
         strides = tuple(int(np.prod(shape[place + 1 :])) for place in range(len(shape)))
-        others = self.places[held.others].astype(self.index)
         per_table = int(np.prod(shape))
-        found = []
-        for lists, places in columns(np.bincount(own, minlength=group.many)):
-            chosen = order[places]
-            base: Integers | int = (held.which[chosen] * per_table).astype(self.index) if len(held.tables) > 1 else 0
-            found.append(Column(lists, base, tuple(np.ascontiguousarray(others[chosen].T)), strides))
-        return ConstraintBlock(held, rows, tuple(found))
+        bases = (held.which[order] * per_table).astype(self.index) if len(held.tables) > 1 else None
+        others = self.places.astype(self.index)[held.others[order]]
+        return ConstraintBlock(held, rows, np.bincount(own, minlength=group.many), bases, others, strides)
 
 
 def cost_form(description: Description) -> IntegerCosts:

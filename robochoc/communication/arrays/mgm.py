@@ -6,6 +6,7 @@ import numpy as np
 
 from robochoc.communication.arrays.array_types import Flags, Integers
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
+from robochoc.communication.arrays.kernels import Kernels
 from robochoc.communication.arrays.tally import integer_bytes
 from robochoc.protocols.local_search.mgm import Gain
 from robochoc.protocols.message import encode
@@ -63,12 +64,25 @@ class ArrayMGM(ArrayGainers):
 
     def _step(self) -> None:
         """Compute the moves, send gains, and move the robots that gain most (`MGM._send_gain`, `MGM._move`)."""
-        found = self.value_costs()
-        self.receive()
-        self.count_checks(self.all_checks)
-        targets, gains = self.best_unilateral(found)
-        self.send_gains(gains)
-        self.receive()
-        self.values = np.where(self.wins(gains), targets, self.values)
+        if self.kernels is not None:
+            self._step_compiled(self.kernels)
+        else:
+            found = self.value_costs()
+            self.receive()
+            self.count_checks(self.all_checks)
+            targets, gains = self.best_unilateral(found)
+            self.send_gains(gains)
+            self.receive()
+            self.values = np.where(self.wins(gains), targets, self.values)
         if self.cycle + 1 < self.settings.cycles:
             self.send_values()
+
+    def _step_compiled(self, kernels: Kernels) -> None:
+        targets, gains, account = kernels.best_unilateral(self.values, _REST)
+        self.note_account(account)
+        self.receive()
+        self.count_checks(self.all_checks)
+        self.tally.count(Gain.__name__, int(self.layout.degrees.sum()), account.bytes, account.largest)
+        self.border.exchange(gains, self.clocks)
+        self.receive()
+        kernels.move_winners(self.values, targets, gains)

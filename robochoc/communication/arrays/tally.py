@@ -25,10 +25,15 @@ class MessageTally:
         many = int(np.sum(copies))
         if not many:
             return
-        self.messages[kind] = self.messages.get(kind, 0) + many
-        self.bytes += int(np.sum(sizes * copies)) if isinstance(sizes, np.ndarray) else sizes * many
         sent = sizes[np.asarray(copies) > 0] if isinstance(sizes, np.ndarray) and np.ndim(copies) else sizes
-        self.largest = max(self.largest, int(np.max(sent)))
+        total = int(np.sum(sizes * copies)) if isinstance(sizes, np.ndarray) else sizes * many
+        self.count(kind, many, total, int(np.max(sent)))
+
+    def count(self, kind: str, many: int, total: int, largest: int) -> None:
+        """Count `many` messages of type `kind` with `total` bytes."""
+        self.messages[kind] = self.messages.get(kind, 0) + many
+        self.bytes += total
+        self.largest = max(self.largest, largest)
 
 
 def integer_bytes(numbers: Integers) -> Integers:
