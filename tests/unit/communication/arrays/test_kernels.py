@@ -40,7 +40,7 @@ def functions(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     compiler = shlex.split(sysconfig.get_config_var("CC") or "cc")
     headers = sysconfig.get_path("include")
     words = [*compiler, *KERNELS_FLAGS, "-Wall", "-Werror", "-shared", "-fPIC", f"-I{headers}"]
-    subprocess.run([*words, "-o", str(library), str(SOURCE)], check=True, timeout=300)
+    subprocess.run([*words, "-o", str(library), str(SOURCE)], check=True)
     return ctypes.CDLL(str(library))
 
 
