@@ -7,8 +7,6 @@ messages. When the parent closes the pipe, the robot ends.
 
 from __future__ import annotations
 
-import pickle
-
 import msgspec
 
 from robochoc.journal.events import AnyEvent
@@ -154,8 +152,15 @@ class GoOn(_Control, frozen=True):
     """The order to continue without the messages that a robot waits for, since no message is in transit any more."""
 
 
+def prepare_changes() -> None:
+    """Import what changes need, once for all robots, before the fork."""
+    import pickle  # noqa: F401, PLC0415 - start-up: most problems do not change
+
+
 def pack_change(part: AgentProblem, invalidated: Invalidated) -> bytes:
     """Return the content of an `EpochChange`."""
+    import pickle  # noqa: PLC0415 - as above
+
     return pickle.dumps((part, invalidated))
 
 
@@ -164,6 +169,8 @@ def unpack_change(change: bytes) -> tuple[AgentProblem, Invalidated]:
 
     Processes are started by the same means (`multiprocessing`). Protocol messages are never unpickled.
     """
+    import pickle  # noqa: PLC0415 - as above
+
     part, invalidated = pickle.loads(change)  # noqa: S301 - written by our parent process
     return part, invalidated
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,6 +12,8 @@ from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from robochoc.formats.dialects.dialect import ConversionNote
 
 
@@ -32,6 +33,15 @@ class ReadProblem(NamedTuple):
     foreign: bool
     notes: tuple[ConversionNote, ...] = ()
     bound: Fraction | None = None
+
+
+def is_foreign(place: Path) -> bool:
+    """Return whether `place` is a file of another tool. Raises `InvalidInputError` if the file's format is unknown."""
+    if place.is_dir():
+        return False
+    from robochoc.formats.dialects.registry import recognise_or_raise  # noqa: PLC0415 - start-up
+
+    return recognise_or_raise(place) is not None
 
 
 def read_problem(
@@ -55,11 +65,12 @@ def read_problem(
     Raises:
         InvalidInputError: if the files have errors, or if such options are specified for a folder.
     """
-    from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
-    from robochoc.formats.dialects.registry import read_foreign, recognise, recognise_or_raise  # noqa: PLC0415 - as above
-    from robochoc.formats.names_file import original_names  # noqa: PLC0415 - as above
+    from robochoc.formats.names_file import original_names  # noqa: PLC0415 - start-up
 
-    if place.is_file() and (dialect or more or recognise_or_raise(place)):
+    if place.is_file() and (dialect or more or is_foreign(place)):
+        from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - as above
+        from robochoc.formats.dialects.registry import read_foreign  # noqa: PLC0415 - as above
+
         options = ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code)
         imported = read_foreign([place, *more], options, dialect)
         check_team(imported.team)
@@ -74,6 +85,8 @@ def read_problem(
     try:
         return ReadProblem(read_team(place), original_names(place), foreign=False)
     except InvalidInputError as invalid:
+        from robochoc.formats.dialects.registry import recognise  # noqa: PLC0415 - as above
+
         first = next(iter(invalid.diagnostics), None)
         found = recognise(Path(first.file)) if first else None
         if found is None or first is None:

@@ -19,6 +19,8 @@ from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.model.symbols import with_table_everywhere
 from robochoc.system.garbage import collection_paused
 
+GROUND_FILE = "map.json"
+"""The file in a team's folder with the robots' positions on a map, and blocked cells: `robochoc fly --map`."""
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
 
 

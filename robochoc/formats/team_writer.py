@@ -12,14 +12,13 @@ from robochoc.formats.names_file import NAMES_FILE
 from robochoc.formats.robot_reader import robot_in
 from robochoc.formats.scenario_reader import SCENARIO
 from robochoc.formats.scenario_writer import team_files
+from robochoc.formats.team_reader import GROUND_FILE
 from robochoc.formats.validation import check_writable
 from robochoc.model.problem import Team
 from robochoc.system.files import errors_naming, resolved
 
 SKETCH_FILE = "sketch.json"
 """The file in a team's folder where `robochoc app` saves the drawing of the team."""
-GROUND_FILE = "map.json"
-"""The file in a team's folder with the robots' positions on a map, and blocked cells: `robochoc fly --map`."""
 _ALWAYS_READABLE = 1024 * 1024
 """The file size in bytes up to which a valid robot's file is certainly within the limits of its reader."""
 

@@ -14,7 +14,7 @@ from dataclasses import replace
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.formats import InvalidInputError, robot_in, robot_xml
+from robochoc.formats import InvalidInputError, robot_in
 from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
 from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
@@ -78,6 +78,8 @@ class TeamWriter:
         """Return the robot's file. If the robot has not changed, the previous file is reused."""
         if self._robots.get(robot.name) == robot:
             return self._files[robot.name]
+        from robochoc.formats import robot_xml  # noqa: PLC0415 - start-up: most runs have no journal
+
         try:
             return robot_xml(_writable(robot)).decode()
         except ValueError as error:

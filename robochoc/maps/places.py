@@ -8,10 +8,13 @@ the robot's other variables if all their values are places of some robot's waypo
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
-from robochoc.maps.ground_map import GroundMap
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate, names
 from robochoc.model.problem import Robot, Team
+
+if TYPE_CHECKING:
+    from robochoc.maps.ground_map import GroundMap
 
 Place = tuple[float, ...]
 """The x and y of a place, and the z on a three-dimensional map, in metres."""

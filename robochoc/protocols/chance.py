@@ -13,8 +13,9 @@ Secrets must not depend on this generator: see `key_stream.py`.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from hashlib import blake2b
 from typing import Final, TypeVar
+
+from robochoc.system.blake2 import blake2b
 
 T = TypeVar("T")
 

@@ -10,8 +10,9 @@ keys.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from hashlib import blake2b
 from typing import TypeVar
+
+from robochoc.system.blake2 import blake2b
 
 T = TypeVar("T")
 _BLOCK = 64

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
 from decimal import Decimal
-from fractions import Fraction
 from typing import assert_never
 
 from robochoc.model.absence import restated
@@ -84,6 +83,8 @@ def check_user_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
     if cost is None:
         return
     places = max(robot.costs.places for robot in team.robots)
+    from fractions import Fraction  # noqa: PLC0415 - start-up: many problems have no costs
+
     total = Fraction(0)
     absent = {name for name in team.variables if team.owner[name] in without}
     for robot in team.robots:

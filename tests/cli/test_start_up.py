@@ -11,11 +11,12 @@ import pytest
 from tests.support.program import ROOT, unmeasured
 
 HEAVY = {
-    "numpy", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
+    "hashlib", "pickle", "shutil", "fractions", "numpy", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3",
+    "jpype", "importlib.metadata", "tomllib",
     "robochoc.solver.ace", "robochoc.solver.central", "robochoc.verification.second_opinion",
     "robochoc.communication.simulator.channel", "robochoc.sniffer", "robochoc.flight",
     "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.robots",
-    "robochoc.vehicles", "robochoc.replay",
+    "robochoc.vehicles", "robochoc.replay", "robochoc.formats.dialects", "robochoc.formats.team_writer",
 }  # fmt: skip
 """What a run of ABT in a pipe has no use for."""
 HERE = {**unmeasured(), "PYTHONPATH": str(ROOT)}

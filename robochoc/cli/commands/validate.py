@@ -14,7 +14,7 @@ from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInputError
-    from robochoc.formats.dialects.dialect import ConversionNote
+    from robochoc.formats.dialects.dialect import ConversionNote, Dialect
     from robochoc.model.problem import Robot
 
 
@@ -58,13 +58,15 @@ def validate(
 def _report(place: Path, reading: Mapping[str, Any]) -> dict[str, Any]:
     """Return the report on one team, or on one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
-    from robochoc.formats.dialects.registry import find_dialect, recognise_or_raise
     from robochoc.formats.problems import read_problem
 
     notes: tuple[ConversionNote, ...] = ()
+    dialect: Dialect | None = None
     try:
-        named = find_dialect(reading["dialect"] or "") if place.is_file() else None
-        dialect = named or recognise_or_raise(place)
+        if place.is_file():
+            from robochoc.formats.dialects.registry import find_dialect, recognise_or_raise
+
+            dialect = find_dialect(reading["dialect"] or "") or recognise_or_raise(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
@@ -117,7 +119,6 @@ def _print_json(report: dict[str, Any]) -> None:
 def _print(report: dict[str, Any]) -> None:
     from robochoc.cli.reports.notes import difference_lines
     from robochoc.formats import on_one_line
-    from robochoc.formats.dialects.dialect import ConversionNote
 
     path = on_one_line(report["path"])
     if report["valid"]:
@@ -129,6 +130,8 @@ def _print(report: dict[str, Any]) -> None:
         alone = "" if Path(report["path"]).is_dir() or "format" in report else " by itself"
         click.echo(f"{path}: {counts}: ok{alone}")
         if "format" in report:
+            from robochoc.formats.dialects.dialect import ConversionNote
+
             click.echo(
                 f"  this is {report['title']}: 'robochoc solve' reads it, 'robochoc import' converts it to a team"
             )

@@ -84,7 +84,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     If `make` raises `ValueError` for inconsistent numbers, this is a usage error.
     """
     from robochoc.formats import InvalidInputError, write_team
-    from robochoc.formats.team_writer import GROUND_FILE
+    from robochoc.formats.team_reader import GROUND_FILE
 
     try:
         with elapsed_time("generate", "drawing the problem"):

@@ -28,9 +28,10 @@ def order_for(team: Team, order: str | Path | None, names: Mapping[str, str] = {
     Raises:
         InvalidInputError: if a file does not list exactly the team's robots.
     """
-    from robochoc.formats.order_file import read_order
+    if isinstance(order, Path):
+        from robochoc.formats.order_file import read_order
+
+        return read_order(order, team, names)
     from robochoc.model.orders import Order
 
-    if isinstance(order, Path):
-        return read_order(order, team, names)
     return None if order is None else Order(order)

@@ -146,13 +146,13 @@ def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | Non
     Raises `Failure`, which lists every path without a team.
     """
     from robochoc.formats import InvalidInputError, find_teams
-    from robochoc.formats.dialects.registry import recognise_or_raise
+    from robochoc.formats.problems import is_foreign
 
     folders: dict[Path, None] = {}
     errors = []
     for path in paths:
         try:
-            if foreign and ((dialect and path.is_file()) or recognise_or_raise(path)):
+            if foreign and ((dialect and path.is_file()) or is_foreign(path)):
                 folders[path] = None
             else:
                 folders.update(dict.fromkeys(find_teams(path)))

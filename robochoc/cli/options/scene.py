@@ -42,13 +42,14 @@ map_option = click.option(
 def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
     """Return the map in `file`, or in the team's `folder` if no file is given, or None. Raises `Failure`."""
     from robochoc.formats import on_one_line
-    from robochoc.formats.team_writer import GROUND_FILE
-    from robochoc.maps.ground_map import MAX_BYTES, read_ground_map
+    from robochoc.formats.team_reader import GROUND_FILE
 
     if file is None and folder and (folder / GROUND_FILE).is_file():
         file = folder / GROUND_FILE
     if file is None:
         return None
+    from robochoc.maps.ground_map import MAX_BYTES, read_ground_map
+
     try:
         with file.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)

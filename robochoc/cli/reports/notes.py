@@ -36,6 +36,9 @@ def note_lines(notes: Iterable[ConversionNote], more: str) -> Iterator[str]:
 
 def difference_lines(notes: Iterable[ConversionNote]) -> Iterator[str]:
     """Yield a line for each note about a difference between the team and the file."""
+    notes = list(notes)
+    if not notes:
+        return iter(())
     from robochoc.formats.dialects.dialect import OTHER_PROBLEM
 
     return note_lines((note for note in notes if note.kind in OTHER_PROBLEM), "'robochoc import --report' lists them")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.headline import describe_outcome
-from robochoc.maps.ground_map import GroundMap
 from robochoc.maps.places import MapPlaces, Place
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import Cost, cost_shown
@@ -18,6 +18,9 @@ from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome,
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.system.plain_text import counted
+
+if TYPE_CHECKING:
+    from robochoc.maps.ground_map import GroundMap
 
 WIDTH = 100
 _LARGE = 1 << 16

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
 import threading
 import time
@@ -49,6 +48,8 @@ def progress_line(team: str) -> Iterator[Callable[[Progress], None] | None]:
             return
         last = time.monotonic()
         stage = progress.stage or f"{progress.messages:,} messages"
+        import shutil
+
         line = on_one_line(f"{team}: {stage}, {progress.elapsed_s:.1f} s")[: shutil.get_terminal_size().columns - 1]
         click.echo(f"{_ERASE}{click.style(line, dim=True)}", nl=False, err=True)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import sys
 import unicodedata
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -29,6 +28,8 @@ def print_table(
         prose: The heading of the column that may be wrapped.
     """
     terminal = sys.stdout.isatty()
+    import shutil
+
     width = shutil.get_terminal_size().columns if terminal else None
     for number, line in enumerate(table_lines(headings, rows, right=right, prose=prose, width=width)):
         click.echo(click.style(line, bold=True) if terminal and number == 0 else line)

@@ -28,6 +28,7 @@ from robochoc.communication.control import (
     Ready,
     RobotFailed,
     pack_change,
+    prepare_changes,
 )
 from robochoc.communication.host import message_decoder
 from robochoc.communication.master_loop import TICK_S, MasterLoop
@@ -177,6 +178,8 @@ class ProcessesRun(Session, MasterLoop):
         self._pool.make_room(robots)
         self.check_s = min(max(TICK_S, robots * CHECK_S), LONGEST_STEP_S)
         message_decoder(self._protocol.messages)  # once for all robots, before the fork
+        if self.compiled.team.dynamic:
+            prepare_changes()
         if robots >= CROWD:
             rehearse(self._protocol, unstarted.values())
         with garbage_frozen():

@@ -62,7 +62,7 @@ def scenario(
     robochoc generate scenario out/random --events 10 --rate 0.05 --kinds add-constraint --kinds remove-constraint
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.formats import read_team, write_team
-    from robochoc.formats.team_writer import GROUND_FILE
+    from robochoc.formats.team_reader import GROUND_FILE
     from robochoc.generators.scenario import random_scenario
 
     try:
