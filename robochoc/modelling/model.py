@@ -383,7 +383,9 @@ class Model(Solvable):
             InvalidInputError: if the files cannot express the model, or the folder exists and `replace` is false.
             OSError: if the folder cannot be written.
         """
-        team = build_team(self, saved_order(self.team))
+        team, order = self.team, saved_order(self.team)
+        if team.order != order:
+            team = build_team(self, order)
         if not replace and Path(folder).exists():
             hint = "choose another folder, or replace this one: save(folder, replace=True)"
             raise InvalidInputError([Diagnostic(encodable(str(folder)), 0, "the folder exists already", hint)])

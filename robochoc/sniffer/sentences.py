@@ -7,6 +7,7 @@ installed, the message is shown by its type, FIPA act and fields, so that any jo
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, overload
 
 import msgspec
@@ -15,6 +16,7 @@ from robochoc.formats import InvalidInputError
 from robochoc.journal.entries import Header, JournalEntry
 from robochoc.journal.events import Began, Given, Sent
 from robochoc.journal.team_events import GivenProblemError, TeamReader
+from robochoc.model.problem import Team
 from robochoc.protocols.acts import INFORM
 from robochoc.protocols.message import Message
 from robochoc.protocols.wording import Wording
@@ -29,11 +31,14 @@ ValueLabel = Callable[[str, int], str]
 class JournalSentences:
     """Follows a journal entry by entry, and returns its messages in words. Only names are stored.
 
-    `called` returns the names for values. None: values are shown as in the journal, and symbols by their names.
+    `called` returns the names for values. None: values are shown as in the journal, and symbols by their names. `team`
+    is the first team of the journal, if it is known: then its files are not parsed.
     """
 
-    def __init__(self, called: ValueLabel | None = None) -> None:
+    def __init__(self, called: ValueLabel | None = None, team: Team | None = None) -> None:
         self._called = called
+        self._known = team
+        self._unread: list[Given] = []
         self._reader = TeamReader()
         self._requested = self._protocol = ""
         self._types: Mapping[str, type[Message]] = {}
@@ -68,10 +73,21 @@ class JournalSentences:
 
     def _given(self, given: Given) -> None:
         try:
-            names = run_names(self._reader.team(given), on_tree=self._on_tree)
+            names = run_names(self._team(given), on_tree=self._on_tree)
         except (GivenProblemError, InvalidInputError, ValueError):
             names = RunNames()
         self._names = names if self._called is None else names._replace(symbols=_SymbolNames(self._called))
+
+    def _team(self, given: Given) -> Team:
+        known, self._known = self._known, None
+        # Another order has other links, which determine the tree.
+        if known and (given.order == known.order if self._on_tree else sorted(given.order) == sorted(known.order)):
+            self._unread.append(given)  # a later event has only the files that differ
+            return replace(known, robots=tuple(known[name] for name in given.order))
+        for earlier in self._unread:
+            self._reader.team(earlier)
+        self._unread.clear()
+        return self._reader.team(given)
 
 
 class _SymbolNames(Mapping[str, Sequence[str]]):

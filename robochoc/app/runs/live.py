@@ -6,15 +6,17 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable
 from dataclasses import field
+from operator import attrgetter
 from pathlib import Path
 from typing import BinaryIO
 
 from robochoc.app.runs.tape import MessageWords, in_words
 from robochoc.app.sketch.sketch import Value
 from robochoc.journal.entries import JournalError
-from robochoc.journal.events import Began, Bounded, Decided, Heard, Sent
+from robochoc.journal.events import Began, Bounded, Decided, Heard, Received, Sent, Settled
 from robochoc.journal.reader import Follower
 from robochoc.model.cost_units import Cost
+from robochoc.model.problem import Team
 from robochoc.run.known_costs import KnownCosts
 from robochoc.sniffer.sentences import JournalSentences, ValueLabel
 from robochoc.system.lazy_dataclass import dataclass
@@ -32,6 +34,9 @@ LAST = 8
 """The number of last messages available in words."""
 MOST_COSTS = 300
 """The maximum number of points on the cost curve."""
+_SEPARATE = frozenset({Sent, Received, Settled})
+"""The most frequent entries, which are counted together or ignored."""
+_LINK: Callable[[Sent], tuple[str, str]] = attrgetter("sender", "receiver")
 
 
 @dataclass
@@ -72,6 +77,7 @@ class LiveReader:
         label: Converts a variable's code to the user's value.
         objective: The cost function of assignments. None: nothing is minimised, or the problem changes.
         called: Returns the names for values in messages.
+        team: The team of the journal, if it is known.
     """
 
     def __init__(
@@ -81,6 +87,7 @@ class LiveReader:
         label: Callable[[str, int], Value],
         objective: Objective | None = None,
         called: ValueLabel | None = None,
+        team: Team | None = None,
     ) -> None:
         self._file = file
         self._live = live
@@ -88,7 +95,7 @@ class LiveReader:
         self._known = KnownCosts(objective) if objective else None
         self._robots = frozenset(objective.interfaces) if objective else None
         self._minimised = objective is not None and objective.in_user_units(0) < objective.in_user_units(1)
-        self._spoken = JournalSentences(called)
+        self._spoken = JournalSentences(called, team)
         self._open: BinaryIO | None = None
         self._follower: Follower | None = None
         self._began = time.monotonic()
@@ -114,13 +121,11 @@ class LiveReader:
         except JournalError:  # the header is incomplete: the run reports the error
             return False
         now = time.monotonic()
-        bunch: Counter[tuple[str, str]] = Counter()
-        last: deque[Sent] = deque(maxlen=LAST)
+        sent = [entry for entry in entries if type(entry) is Sent]
         for entry in entries:
+            if type(entry) in _SEPARATE:
+                continue
             match entry:
-                case Sent():
-                    bunch[entry.sender, entry.receiver] += 1
-                    last.append(entry)
                 case Decided():
                     self._decided(entry, now)
                 case Heard() | Bounded():
@@ -132,10 +137,10 @@ class LiveReader:
                     self._spoken.follow(entry)
                 case _:
                     self._spoken.follow(entry)
-        if bunch:
-            self._live.messages += bunch.total()
-            self._bunches.append((now, bunch))
-            last_messages = [in_words(sent, self._spoken) for sent in reversed(last)]
+        if sent:
+            self._live.messages += len(sent)
+            self._bunches.append((now, Counter(map(_LINK, sent))))
+            last_messages = [in_words(one, self._spoken) for one in reversed(sent[-LAST:])]
             self._live.last_messages = (*last_messages, *self._live.last_messages)[:LAST]
         return bool(entries)
 

@@ -226,10 +226,11 @@ def _reader(run: Run, prepare: Callable[[Run], PreparedTeam]) -> LiveReader:
     """Write the team's files, and return the reader for the journal."""
     ready = prepare(run)
     # with withdrawals, the objective includes the price of a withdrawal, which is not one of the user's costs
-    objective = None if run.record.options.withdraw else objective_to_record(ready.team, Options())
+    team = None if run.record.options.withdraw else ready.team
+    objective = objective_to_record(team, Options()) if team else None
     run.record.labels = ready.labels
     weighed = objective() if objective else None
-    return LiveReader(run.folder / JOURNAL, run.live, ready.label, weighed, ready.called)
+    return LiveReader(run.folder / JOURNAL, run.live, ready.label, weighed, ready.called, team)
 
 
 def _command(run: Run) -> Command:

@@ -13,6 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
+from robochoc.journal.events import Sent
+from robochoc.model.orders import Order
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
@@ -22,7 +24,7 @@ from robochoc.protocols.wording import Wording
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named
 from robochoc.sniffer.page_data import PageData
-from robochoc.sniffer.sentences import sentence
+from robochoc.sniffer.sentences import JournalSentences, sentence
 from robochoc.sniffer.trace import Trace
 from robochoc.system.plain_text import listed
 from tests.support.acl_conversations import BUNDLED_PROTOCOLS, types_of
@@ -134,6 +136,25 @@ def test_names_follow_the_team_through_its_epochs() -> None:
 
 ORDER = ("Robot1.1", "Robot2.1")
 TWO = Wording("Robot2.1", "Robot1.1", ORDER, {"Robot1.1": ("V", "W"), "Robot2.1": ("V2.1",)}, ORDER)
+
+
+def test_names_from_a_known_team_are_those_from_its_files() -> None:
+    """Also with changes, with other orders, and on a tree."""
+    compared = 0
+    for seed in range(30):
+        random = Random(seed)
+        team = random_changing_team(random) if seed % 2 else random_complex_team(random)
+        order = random.choice([*Order])
+        protocol = "dpop" if seed % 3 == 0 else "abt"
+        journal = record(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False, order=order))
+        known, read = JournalSentences(team=team), JournalSentences()
+        for entry in (journal.header, *journal.events):
+            known.follow(entry)
+            read.follow(entry)
+            if isinstance(entry, Sent):
+                assert known.sentence(entry) == read.sentence(entry)
+                compared += 1
+    assert compared > 100
 
 
 def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
