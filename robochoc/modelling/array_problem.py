@@ -135,7 +135,7 @@ class ArrayProblem:
             protocol: The protocol: dsa, mgm, mgm2 or maxsum.
             seed: The seed of the robots' random numbers.
             timeout: A time limit in seconds, checked after each cycle.
-            ncccs: True to count NCCCs, which takes up to a fifth of the time.
+            ncccs: True to count NCCCs, which takes up to a fifth of the time of mgm2 and maxsum.
             **settings: The protocol's settings, such as `cycles` or `variant`.
 
         Returns:

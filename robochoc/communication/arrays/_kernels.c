@@ -38,7 +38,7 @@ typedef struct {
     int64_t bits; /* the number of low bits of a cost: `IntegerCosts` */
     uint64_t *states;
     const uint64_t *steps;
-    const int64_t *starts, *degrees, *robots, *checks;
+    const int64_t *starts, *degrees, *robots;
     const int32_t *neighbours;
 } Team;
 
@@ -77,34 +77,21 @@ static int64_t integer_bytes(int64_t number) { /* tally.py */
     return number < 128 ? 1 : number < 256 ? 2 : number < 65536 ? 3 : number < 4294967296LL ? 5 : 9;
 }
 
-/* Raise the clock of each robot to the largest among its neighbours, and add the robot's checks if `checking`. */
-EXPORT int receive(
-    const Team *team, const int64_t *clocks, int64_t *after, int64_t checking, Account *account, int64_t from,
-    int64_t to
-) {
-    (void)account;
-    for (int64_t row = from; row < to; row++) {
-        int64_t largest = clocks[row];
-        const int32_t *one = team->neighbours + team->starts[row], *end = one + team->degrees[row];
-        for (; one < end; one++) largest = clocks[*one] > largest ? clocks[*one] : largest;
-        after[row] = checking ? largest + team->checks[row] : largest;
-    }
-    return 0;
-}
-
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_kernels", NULL, -1, NULL, NULL, NULL, NULL, NULL};
 PyMODINIT_FUNC PyInit__kernels(void) { return PyModule_Create(&module); }
 
 #define JOINED(name, cost, value) name##_##cost##_##value
 #define NAMED(name, cost, value) JOINED(name, cost, value)
 #define OF(name) NAMED(name, COST, VALUE)
+#define FOR_LANES(function, ...) \
+    if (group->size <= LANES) return OF(function)(__VA_ARGS__, LANES); \
+    if (group->size <= 2 * LANES) return OF(function)(__VA_ARGS__, 2 * LANES); \
+    return OF(function)(__VA_ARGS__, (group->size + LANES - 1) / LANES * LANES)
 
 #define COST int32_t
 #define VALUE int8_t
 #include "_kernels.c"
 #define VALUE int16_t
-#include "_kernels.c"
-#define VALUE int32_t
 #include "_kernels.c"
 #undef COST
 #define COST int64_t
@@ -112,46 +99,32 @@ PyMODINIT_FUNC PyInit__kernels(void) { return PyModule_Create(&module); }
 #include "_kernels.c"
 #define VALUE int16_t
 #include "_kernels.c"
-#define VALUE int32_t
-#include "_kernels.c"
 
 #else
 
-/* Add the costs of one robot's constraints in a block. Up to three more entries are added up, and not used. */
-INLINE void OF(add)(const Block *block, const VALUE *values, int64_t row, int64_t size, COST *total, int64_t lanes) {
-    const COST *rows = block->rows;
-    for (int64_t one = block->starts[row]; one < block->starts[row + 1]; one++) {
-        int64_t place = block->bases ? block->bases[one] : 0;
-        if (block->arity == 1) place += values[block->others[one]];
-        else
-            for (int64_t axis = 0; axis < block->arity; axis++)
-                place += values[block->others[one * block->arity + axis]] * block->strides[axis];
-        const COST *costs = rows + place * size;
-        for (int64_t value = 0; value < lanes; value += LANES)
-            for (int lane = 0; lane < LANES; lane++) total[value + lane] += costs[value + lane];
-    }
-}
-
-INLINE void OF(add_few)(const Block *block, const VALUE *values, int64_t row, int64_t size, COST *total, int64_t lanes) {
-    COST sums[3 * LANES];
-    for (int64_t value = 0; value < lanes; value++) sums[value] = total[value];
-    OF(add)(block, values, row, size, sums, lanes);
-    for (int64_t value = 0; value < lanes; value++) total[value] = sums[value];
-}
-
-/* Compute the costs of all values of one robot, and add the cost of its value to `sums`. */
-INLINE void OF(add_up)(const Team *team, const Group *group, const VALUE *values, int64_t row, COST *total, Sum *sums) {
-    int64_t size = group->size, lanes = (size + LANES - 1) / LANES * LANES, own = values[group->first + row];
-    memset(total, 0, lanes * sizeof(COST));
-    if (group->fixed) memcpy(total, (const COST *)group->fixed + row * size, size * sizeof(COST));
+/* Compute the costs of all values of one robot, and add the cost of its value to `sums`. Up to three more entries are
+ * added up, and not used. Constant `lanes` make loops fast. */
+INLINE void OF(add_up)(
+    const Team *team, const Group *group, const VALUE *values, int64_t row, COST *total, Sum *sums, int64_t lanes
+) {
+    int64_t size = group->size, own = values[group->first + row];
+    for (int64_t value = 0; value < lanes; value++) total[value] = 0;
+    if (group->fixed)
+        for (int64_t value = 0; value < size; value++) total[value] = ((const COST *)group->fixed)[row * size + value];
     COST before = total[own];
     if (group->fixed) add_to(sums, before, team->bits);
-    for (int64_t number = 0; number < group->blocks_count; number++) {
-        const Block *block = group->blocks + number;
-        if (lanes == LANES) OF(add_few)(block, values, row, size, total, LANES);
-        else if (lanes == 2 * LANES) OF(add_few)(block, values, row, size, total, 2 * LANES);
-        else if (lanes == 3 * LANES) OF(add_few)(block, values, row, size, total, 3 * LANES);
-        else OF(add)(block, values, row, size, total, lanes);
+    for (const Block *block = group->blocks; block < group->blocks + group->blocks_count; block++) {
+        const COST *rows = block->rows;
+        for (int64_t one = block->starts[row]; one < block->starts[row + 1]; one++) {
+            int64_t place = block->bases ? block->bases[one] : 0;
+            if (block->arity == 1) place += values[block->others[one]];
+            else
+                for (int64_t axis = 0; axis < block->arity; axis++)
+                    place += values[block->others[one * block->arity + axis]] * block->strides[axis];
+            const COST *costs = rows + place * size;
+            for (int64_t value = 0; value < lanes; value += LANES)
+                for (int lane = 0; lane < LANES; lane++) total[value + lane] += costs[value + lane];
+        }
         add_to(sums + block->arity, total[own] - before, team->bits);
         before = total[own];
     }
@@ -177,28 +150,34 @@ INLINE COST *OF(space)(int64_t size, COST *few) {
 }
 
 /* `CycleRun.value_costs` */
-EXPORT int OF(value_costs)(
-    const Team *team, const Group *group, const VALUE *values, COST *found, Account *account, int64_t from, int64_t to
+INLINE int OF(value_costs_rows)(
+    const Team *team, const Group *group, const VALUE *values, COST *found, Account *account, int64_t from, int64_t to, int64_t lanes
 ) {
     COST few[FEW], *total = OF(space)(group->size, few);
     if (!total) return 1;
     for (int64_t row = from; row < to; row++) {
-        OF(add_up)(team, group, values, row, total, account->sums);
+        OF(add_up)(team, group, values, row, total, account->sums, lanes);
         memcpy(found + row * group->size, total, group->size * sizeof(COST));
     }
     if (total != few) free(total);
     return 0;
 }
 
+EXPORT int OF(value_costs)(
+    const Team *team, const Group *group, const VALUE *values, COST *found, Account *account, int64_t from, int64_t to
+) {
+    FOR_LANES(value_costs_rows, team, group, values, found, account, from, to);
+}
+
 /* `ArrayDSA._choose` */
-EXPORT int OF(dsa)(
+INLINE int OF(dsa_rows)(
     const Team *team, const Group *group, const VALUE *values, VALUE *next, int64_t sideways, double probability,
-    double probability_of_gain, Account *account, int64_t from, int64_t to
+    double probability_of_gain, Account *account, int64_t from, int64_t to, int64_t lanes
 ) {
     COST few[FEW], *total = OF(space)(group->size, few), lowest;
     if (!total) return 1;
     for (int64_t row = from; row < to; row++) {
-        OF(add_up)(team, group, values, row, total, account->sums);
+        OF(add_up)(team, group, values, row, total, account->sums, lanes);
         int64_t place = group->first + row, own = values[place];
         int64_t others = OF(cheapest)(total, group->size, &lowest);
         int gains = total[own] > lowest;
@@ -216,15 +195,22 @@ EXPORT int OF(dsa)(
     return 0;
 }
 
+EXPORT int OF(dsa)(
+    const Team *team, const Group *group, const VALUE *values, VALUE *next, int64_t sideways, double probability,
+    double probability_of_gain, Account *account, int64_t from, int64_t to
+) {
+    FOR_LANES(dsa_rows, team, group, values, next, sideways, probability, probability_of_gain, account, from, to);
+}
+
 /* `ArrayGainers.best_unilateral`, and the sizes of the messages with the gains: `rest` bytes and two numbers */
-EXPORT int OF(best_unilateral)(
+INLINE int OF(best_unilateral_rows)(
     const Team *team, const Group *group, const VALUE *values, VALUE *targets, COST *gains, int64_t rest,
-    Account *account, int64_t from, int64_t to
+    Account *account, int64_t from, int64_t to, int64_t lanes
 ) {
     COST few[FEW], *total = OF(space)(group->size, few), lowest;
     if (!total) return 1;
     for (int64_t row = from; row < to; row++) {
-        OF(add_up)(team, group, values, row, total, account->sums);
+        OF(add_up)(team, group, values, row, total, account->sums, lanes);
         int64_t place = group->first + row, own = values[place];
         int64_t many = OF(cheapest)(total, group->size, &lowest);
         int64_t gain = total[own] - lowest, broken = (gain + ((int64_t)1 << team->bits >> 1)) >> team->bits;
@@ -236,6 +222,13 @@ EXPORT int OF(best_unilateral)(
     }
     if (total != few) free(total);
     return 0;
+}
+
+EXPORT int OF(best_unilateral)(
+    const Team *team, const Group *group, const VALUE *values, VALUE *targets, COST *gains, int64_t rest,
+    Account *account, int64_t from, int64_t to
+) {
+    FOR_LANES(best_unilateral_rows, team, group, values, targets, gains, rest, account, from, to);
 }
 
 /* Move the robots that gain most: `ArrayGainers.wins`. */

@@ -9,14 +9,14 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import NamedTuple, TypeVar, cast
+from typing import ClassVar, NamedTuple, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
 from robochoc.communication.arrays.border import WHOLE_TEAM, Border
-from robochoc.communication.arrays.kernels import CycleAccount, Kernels, compiled_functions
+from robochoc.communication.arrays.kernels import LARGEST_VALUE_SIZE, CycleAccount, Kernels, compiled_functions
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import MessageTally
 from robochoc.model.outcome import Metrics, Verdict
@@ -76,11 +76,12 @@ class CycleRun(ABC):
         verdict: Set when the robot `witness` has proven that there is no solution.
         tally: The counts of sent messages.
         checks: The constraint checks of all robots together.
-        clocks: The NCCC clock of each row; None if clocks are not computed.
         border: The connection to the robots in other processes.
     """
 
     settings: CycleCount
+    clocks_depend_on_values: ClassVar[bool] = True
+    """False if each robot makes equal checks in each cycle: clocks of a block then follow from its own robots."""
 
     def __init__(
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
@@ -99,7 +100,10 @@ class CycleRun(ABC):
         self.witness: int | None = None
         self.tally = MessageTally()
         self.checks = 0
-        self.clocks: Integers | None = np.zeros(layout.many, np.int64) if clocks else None
+        self._clocks: Integers | None = np.zeros(layout.many, np.int64) if clocks else None
+        self._late_clocks: list[Integers | None] = []
+        """For each message from all neighbours that `clocks` do not include, the checks after that message."""
+        self._started_clocks = False
         self.border: Border = WHOLE_TEAM
         names = layout.description.names
         self.draws = Draws(seed, (names[robot] for robot in layout.robots.tolist()), layout.many)
@@ -131,7 +135,7 @@ class CycleRun(ABC):
 
     def step(self) -> None:
         """Run one cycle."""
-        self.border.exchange(self.values, self.clocks)
+        self.border.exchange(self.values, self.clocks if self.clocks_depend_on_values else None)
         before = None if self.changes is None else self.values.copy()
         self._step()
         if self.verdict is not None:
@@ -153,7 +157,7 @@ class CycleRun(ABC):
         return Metrics(
             messages=dict(sorted(self.tally.messages.items())),
             bytes=self.tally.bytes,
-            ncccs=0 if self.clocks is None else int(self.clocks.max(initial=0)),
+            ncccs=self._ncccs(),
             checks=self.checks,
             wall_s=wall_s,
             largest=self.tally.largest,
@@ -228,9 +232,9 @@ class CycleRun(ABC):
     def kernels(self) -> Kernels | None:
         """The compiled functions. None: numpy computes the cycles."""
         functions = compiled_functions()
-        if functions is None or self.layout.index != np.int32:
+        if functions is None or self.layout.index != np.int32 or self.layout.kind.itemsize > LARGEST_VALUE_SIZE:
             return None
-        return Kernels(functions, self.layout, self.draws.states, self.draws.steps, self.all_checks)
+        return Kernels(functions, self.layout, self.draws.states, self.draws.steps)
 
     def present(self, number: int, value_costs: Integers) -> Integers:
         """Return the costs of the current values of robots with neighbours in the group `number`."""
@@ -242,10 +246,16 @@ class CycleRun(ABC):
 
     def send_values(self) -> None:
         """Send the values of all robots to their neighbours."""
-        lengths = self.layout.description.value_bytes
+        lengths = self._value_bytes
         if isinstance(lengths, np.ndarray):
-            lengths = lengths[self._first_entries + self.values]
-        self.tally.add(Value.__name__, lengths, self.layout.degrees)
+            self.tally.add(Value.__name__, lengths[self._first_entries + self.values], self.layout.degrees)
+        else:
+            self.tally.add(Value.__name__, lengths, self.links)
+
+    def receive_values(self) -> None:
+        """Receive a message from each neighbour, and count the checks for the costs of all values."""
+        self.checks += self._checks_of_cycle
+        self._late_clocks.append(self.all_checks)
 
     def count_checks(self, checks: Integers, times: int = 1) -> None:
         """Count `checks` constraint checks for each row. They are made at the same time."""
@@ -255,10 +265,36 @@ class CycleRun(ABC):
 
     def receive(self) -> None:
         """Receive a message from each neighbour: advance each clock to the neighbours' clocks."""
-        if self.clocks is not None and self.kernels is not None:
-            self.clocks = self.kernels.receive(self.clocks, checking=False)
-        elif self.clocks is not None:
-            self.clocks = self.greatest(self.clocks, self.clocks.copy())
+        self._late_clocks.append(None)
+
+    @property
+    def clocks(self) -> Integers | None:
+        """The NCCC clock of each row; None if clocks are not computed. They are computed on demand."""
+        late, self._late_clocks = self._late_clocks, []
+        if self._clocks is not None and late:
+            self._started_clocks = True
+            for checks in late:
+                self._clocks = self.greatest(self._clocks, self._clocks.copy())
+                self._clocks += 0 if checks is None else checks
+        return self._clocks
+
+    @clocks.setter
+    def clocks(self, clocks: Integers) -> None:
+        self._clocks = clocks
+
+    def _ncccs(self) -> int:
+        """Return the largest clock.
+
+        If all clocks have only been advanced by `receive` and `receive_values` from 0 on, the largest clock is that of
+        the robots with the most checks, so no clocks need to be computed.
+        """
+        if self._clocks is None:
+            return 0
+        if self._started_clocks or not self._late_clocks:
+            clocks = self.clocks
+            return 0 if clocks is None else int(clocks.max(initial=0))
+        times = sum(checks is not None for checks in self._late_clocks)
+        return max(int(self._clocks.max(initial=0)), times * int(self.all_checks.max(initial=0)))
 
     def greatest(self, numbers: Integers, largest: Integers) -> Integers:
         """Raise `largest` in each row to the largest of its neighbours' `numbers`, and return it."""
@@ -279,6 +315,23 @@ class CycleRun(ABC):
         self.checks += int(checks.sum())
         if self.clocks is not None:
             self.clocks[alone] = checks
+
+    @cached_property
+    def links(self) -> int:
+        """The number of pairs of a robot and a neighbour, which is the number of messages if each robot sends one."""
+        return int(self.layout.degrees.sum())
+
+    @cached_property
+    def _checks_of_cycle(self) -> int:
+        return int(self.all_checks.sum())
+
+    @cached_property
+    def _value_bytes(self) -> Integers | int:
+        """The size of the message with each value. A single number if all are equal."""
+        lengths = self.layout.description.value_bytes
+        if isinstance(lengths, np.ndarray) and lengths.size and lengths.min() == lengths.max():
+            return int(lengths[0])
+        return lengths
 
     @cached_property
     def _first_entries(self) -> Integers:

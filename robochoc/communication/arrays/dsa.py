@@ -15,6 +15,8 @@ from robochoc.protocols.local_search.dsa import DSASettings
 class ArrayDSA(CycleRun):
     """A run of DSA."""
 
+    clocks_depend_on_values = False
+
     def _start_active(self) -> None:
         self.choose_random_values()
         self.send_values()
@@ -28,8 +30,7 @@ class ArrayDSA(CycleRun):
         else:
             for number, (group, value_costs) in enumerate(zip(self.layout.groups, self.value_costs(), strict=True)):
                 self._choose(number, group, value_costs)
-        self.receive()
-        self.count_checks(self.all_checks)
+        self.receive_values()
         if self.cycle + 1 < self.settings.cycles:
             self.send_values()
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from importlib.util import find_spec
@@ -18,6 +19,8 @@ from numpy.typing import NDArray
 from robochoc.communication.arrays.array_types import Integers
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 
+LARGEST_VALUE_SIZE = 2
+"""The largest size in bytes of values for which there are compiled functions."""
 ROWS_PER_THREAD = 50_000
 """The fewest rows for which another thread saves time."""
 _MODULE = "robochoc.communication.arrays._kernels"
@@ -31,7 +34,7 @@ def _structure(fields: str) -> type[ctypes.Structure]:
 
 _Block = _structure("arity starts bases others strides rows")
 _Group = _structure("first size blocks_count blocks fixed charges")
-_Team = _structure("bits states steps starts degrees robots checks neighbours")
+_Team = _structure("bits states steps starts degrees robots neighbours")
 
 
 @cache
@@ -79,28 +82,27 @@ class Kernels:
     """The compiled functions for one run.
 
     Args:
-        functions: The functions in C.
+        library: The functions in C.
         layout: The team.
         states: The states of the robots' random numbers, which are changed.
         steps: The steps of the robots' random numbers.
-        checks: The constraint checks of each robot in a cycle.
     """
 
     def __init__(
         self,
-        functions: ctypes.CDLL,
+        library: ctypes.CDLL,
         layout: ArrayLayout,
         states: NDArray[np.uint64],
         steps: NDArray[np.uint64],
-        checks: Integers,
     ) -> None:
-        self._functions = functions
+        self._library = library
+        self._functions: dict[str, Callable[..., int]] = {}
         self._layout = layout
         self._in_use: list[object] = []
         """The arrays and structures whose addresses are stored."""
         self._types = f"_{layout.costs.kind}_t_{layout.kind}_t"
         self._groups = [self._group(group) for group in layout.groups]
-        arrays = (states, steps, layout.starts, layout.degrees, layout.robots, checks, layout.neighbours)
+        arrays = (states, steps, layout.starts, layout.degrees, layout.robots, layout.neighbours)
         team = _Team(layout.costs.bits, *map(self._address, arrays))
         self._in_use.append(team)
         self._team = ctypes.addressof(team)
@@ -108,6 +110,7 @@ class Kernels:
         self._most_arity = max(arities, default=0)
         self._threads = max(1, min(usable_processors(), layout.many // ROWS_PER_THREAD))
         self._pool = ThreadPoolExecutor(self._threads) if self._threads > 1 else None
+        self._unused = self._account()
 
     def value_costs(self, values: Integers) -> tuple[list[Integers], CycleAccount]:
         """Return the cost of each value of robots with neighbours, by group, and the cost of the current values."""
@@ -143,33 +146,30 @@ class Kernels:
     def move_winners(self, values: Integers, targets: Integers, gains: Integers) -> None:
         """Set the robots that gain most among their neighbours to their `targets`."""
         addresses = (_start(values), _start(targets), _start(gains))
-        self._call("move_winners", self._layout.many, self._account(), *addresses)
-
-    def receive(self, clocks: Integers, *, checking: bool) -> Integers:
-        """Return `clocks` after a message from each neighbour, and after the checks of a cycle if `checking`."""
-        after = np.empty_like(clocks)
-        self._call("receive", self._layout.many, self._account(), _start(clocks), _start(after), int(checking))
-        return after
+        self._call("move_winners", self._layout.many, self._unused, *addresses)
 
     def _account(self) -> CycleAccount:
         return CycleAccount(self._threads, self._most_arity)
 
     def _call(self, name: str, many: int, account: CycleAccount, *words: float) -> None:
         """Call the function `name` for `many` rows, with the rows shared by the threads."""
-        function = getattr(self._functions, name if name == "receive" else name + self._types)
-        common = [ctypes.c_int64(word) if isinstance(word, int) else ctypes.c_double(word) for word in words]
-
-        def call(part: tuple[int, int, int]) -> None:
-            if function(ctypes.c_int64(self._team), *common, *map(ctypes.c_int64, part)):
-                raise MemoryError
-
+        function = self._functions.get(name)
+        if function is None:
+            function = self._functions[name] = getattr(self._library, name + self._types)
+            kinds = [ctypes.c_int64 if isinstance(word, int) else ctypes.c_double for word in words]
+            function.argtypes = [ctypes.c_int64, *kinds, *[ctypes.c_int64] * 3]
         if self._pool is None:
-            call((_start(account.rows), 0, many))
+            self._check(function(self._team, *words, _start(account.rows), 0, many))
             return
         bounds = (many * number // self._threads for number in range(self._threads + 1))
-        rows = map(_start, account.rows)
-        for _ in self._pool.map(call, [(row, *part) for row, part in zip(rows, pairwise(bounds), strict=True)]):
-            pass
+        parts = zip(map(_start, account.rows), pairwise(bounds), strict=True)
+        for failed in self._pool.map(lambda part: function(self._team, *words, part[0], *part[1]), parts):
+            self._check(failed)
+
+    @staticmethod
+    def _check(failed: int) -> None:
+        if failed:
+            raise MemoryError
 
     def _group(self, group: RobotGroup) -> int:
         """Return the address of the structure of a group."""

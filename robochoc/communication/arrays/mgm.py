@@ -41,7 +41,7 @@ class ArrayGainers(CycleRun):
         costs = self.layout.costs
         lengths = _REST + integer_bytes(costs.broken(gains)) + integer_bytes(costs.paid(gains))
         self.tally.add(Gain.__name__, lengths, self.layout.degrees)
-        self.border.exchange(gains, self.clocks)
+        self.border.exchange(gains, self.clocks if self.clocks_depend_on_values else None)
 
     def wins(self, gains: Integers, partners: Integers | None = None) -> Flags:
         """Return the robots that gain most among their neighbours except `partners`. The highest wins ties."""
@@ -58,6 +58,8 @@ class ArrayGainers(CycleRun):
 class ArrayMGM(ArrayGainers):
     """A run of MGM."""
 
+    clocks_depend_on_values = False
+
     def _start_active(self) -> None:
         self.choose_random_values()
         self.send_values()
@@ -68,8 +70,7 @@ class ArrayMGM(ArrayGainers):
             self._step_compiled(self.kernels)
         else:
             found = self.value_costs()
-            self.receive()
-            self.count_checks(self.all_checks)
+            self.receive_values()
             targets, gains = self.best_unilateral(found)
             self.send_gains(gains)
             self.receive()
@@ -80,9 +81,8 @@ class ArrayMGM(ArrayGainers):
     def _step_compiled(self, kernels: Kernels) -> None:
         targets, gains, account = kernels.best_unilateral(self.values, _REST)
         self.note_account(account)
-        self.receive()
-        self.count_checks(self.all_checks)
-        self.tally.count(Gain.__name__, int(self.layout.degrees.sum()), account.bytes, account.largest)
-        self.border.exchange(gains, self.clocks)
+        self.receive_values()
+        self.tally.count(Gain.__name__, self.links, account.bytes, account.largest)
+        self.border.exchange(gains)
         self.receive()
         kernels.move_winners(self.values, targets, gains)
