@@ -20,6 +20,7 @@ from msgspec import Meta
 from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Decided, Received, Sent, Settled
 from robochoc.system.errors import RobochocError
+from robochoc.system.garbage import collection_paused
 
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
 """The kinds of entries in `_Block.kinds`."""
@@ -212,9 +213,10 @@ def entries_of(content: bytes) -> list[JournalEntry]:
         BlockError: if `content` does not have the form written by `columns_of`.
     """
     try:
-        block = _decode(content)
-        _json(block.values)  # msgpack may contain what messages cannot: keys that are not texts, and extensions
-        return _EntryDecoder(block).entries()
+        with collection_paused():
+            block = _decode(content)
+            _json(block.values)  # msgpack may contain what messages cannot: keys that are not texts, and extensions
+            return _EntryDecoder(block).entries()
     except (msgspec.MsgspecError, TypeError, ValueError, OverflowError, RecursionError, LookupError) as error:
         raise BlockError(str(error)) from error
 

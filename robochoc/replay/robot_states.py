@@ -75,21 +75,43 @@ def states_of(
     Raises:
         CannotReplayError: if there is nothing to replay, or the installed protocol is not the recorded one.
     """
-    if isinstance(journal, Journal):
-        header, events = journal.header, journal.events
-    else:
-        events = tuple(journal)
-    for alone in (True, False):
-        if not alone and everything is not None:
-            events = tuple(everything())
-        player = _Player(header, robot, options or ReplayOptions(), teams, alone=alone)
+    return StateReplay(journal, robot, options, header=header, since=since, everything=everything, teams=teams)
+
+
+class StateReplay(Iterator[RobotState]):
+    """The iterator of `states_of`. `since` can be increased during the replay, in order to skip states."""
+
+    def __init__(
+        self,
+        journal: Journal | Iterable[AnyEvent],
+        robot: str,
+        options: ReplayOptions | None = None,
+        *,
+        header: Header | None = None,
+        since: int = 0,
+        everything: Callable[[], Iterable[AnyEvent]] | None = None,
+        teams: RecordedTeams | None = None,
+    ) -> None:
+        self.since = since
+        if isinstance(journal, Journal):
+            header, journal = journal.header, journal.events
+        self._states = self._replayed(
+            journal, _Player(header, robot, options or ReplayOptions(), teams, self), everything
+        )
+
+    def __next__(self) -> RobotState:
+        return next(self._states)
+
+    def _replayed(
+        self, events: Iterable[AnyEvent], player: _Player, everything: Callable[[], Iterable[AnyEvent]] | None
+    ) -> Iterator[RobotState]:
+        events = tuple(events)
         try:
-            for state in player.states(events, since):
+            for state in player.states(events, alone=True):
                 yield state
-                since = state.step + 1
+                self.since = max(self.since, state.step + 1)
         except _MissingContentError:
-            continue
-        return
+            yield from player.states(tuple(everything()) if everything else events, alone=False)
 
 
 class TeamStates:
@@ -125,50 +147,58 @@ class _MissingContentError(Exception):
 
 
 class _Player:
-    """Replays the robot's steps, and inspects the robot after each step; `alone`, or with all other robots."""
+    """Replays the robot's steps, `alone` or with all other robots, and inspects it after those since `replay.since`."""
 
     def __init__(
-        self, header: Header | None, robot: str, options: ReplayOptions, teams: RecordedTeams | None, *, alone: bool
+        self,
+        header: Header | None,
+        robot: str,
+        options: ReplayOptions,
+        teams: RecordedTeams | None,
+        replay: StateReplay,
     ) -> None:
-        self._rebuilder = Rebuilder(header, options, {robot} if alone else None, teams)
         self._header = header
         self._robot = robot
-        self._alone = alone
+        self._options = options
+        self._teams = teams
+        self._replay = replay
         self._step = 0
 
-    def states(self, events: Sequence[AnyEvent], since: int) -> Iterator[RobotState]:
+    def states(self, events: Sequence[AnyEvent], *, alone: bool) -> Iterator[RobotState]:
+        self._step = 0
+        rebuilder = Rebuilder(self._header, self._options, {self._robot} if alone else None, self._teams)
         gone: set[str] = set()
         for run in runs_of(events):
-            robots = self._rebuilder.robots_of(run)
+            robots = rebuilder.robots_of(run)
             if self._robot not in robots.hosts:
                 continue
             replay = RunReplay(run, robots, self._header)
             inspector = Inspector(robots.parts[self._robot])
             gone.intersection_update(robots.continuing)
             for step in steps_of(run.events):
-                if self._alone and step.robot != self._robot:
+                if alone and step.robot != self._robot:
                     continue
                 if step.robot in gone:
                     self._step += step.robot == self._robot
                     continue
                 try:
-                    state = self._play_step(replay, inspector, step, since)
+                    state = self._play_step(replay, inspector, step)
                 except ReplayStopsError as stops:
-                    if stops.needs_sender and self._alone:
+                    if stops.needs_sender and alone:
                         raise _MissingContentError from stops
                     gone.add(step.robot)
-                    state = self._last(step, str(stops), since)
+                    state = self._last(step, str(stops))
                 if state is not None:
                     yield state
 
-    def _play_step(self, replay: RunReplay, inspector: Inspector, step: RecordedStep, since: int) -> RobotState | None:
+    def _play_step(self, replay: RunReplay, inspector: Inspector, step: RecordedStep) -> RobotState | None:
         """Return the state after `step`; None if the step is another robot's, partial, or before `since`."""
         if step.robot != self._robot:
             replay.play(step, 0)
             return None
         number, protocol = self._step, replay.robots.hosts[self._robot].protocol
         self._step += 1
-        wanted = step.is_complete and number >= since
+        wanted = step.is_complete and number >= self._replay.since
         reasons = Reasons(inspector, protocol) if wanted else None
         difference = replay.play(step, number, reasons.record_sent) if reasons else replay.play(step, number)
         if difference is not None:
@@ -188,9 +218,13 @@ class _Player:
             why=safely(lambda: reasons.lines(received, step), []),
         )
 
-    def _last(self, step: RecordedStep, why: str, since: int) -> RobotState | None:
+    def _last(self, step: RecordedStep, why: str) -> RobotState | None:
         """Return a last state that contains only the reason why the replay ends."""
         if step.robot != self._robot:
             return None
         self._step += 1
-        return RobotState(step=self._step - 1, more={"replay": f"ends here: {why}"}) if self._step > since else None
+        return (
+            RobotState(step=self._step - 1, more={"replay": f"ends here: {why}"})
+            if self._step > self._replay.since
+            else None
+        )

@@ -1,37 +1,86 @@
 """The states of robots after each of their steps, computed in chunks by replaying the journal's file.
 
-A robot is replayed with the messages that it received. Its events are read from the file on request; the events of
-other robots are only read if the replay needs them.
+A robot is replayed with the messages that it received. Its events are read from the file on request, and kept until
+another robot is requested; the events of other robots are only read if the replay needs them.
+
+Steps before a requested chunk are replayed without a look at the robot's state, which takes longer than the replay.
+Several replays of the robot, at different steps, are kept. Each continues to later steps; no replay can go back,
+because protocols cannot be copied.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from io import BufferedReader
 from itertools import islice
-from typing import NamedTuple
+from operator import attrgetter
 
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Concluded, Decided, Given, Heard, Received, Sent, Settled
-from robochoc.journal.journal import Ended, Follower, Header
+from robochoc.journal.journal import Ended, Follower, Header, JournalEntry, sorted_by_time
 from robochoc.replay import CannotReplayError
-from robochoc.replay.robot_states import RobotState, states_of
+from robochoc.replay.rebuild import RecordedTeams
+from robochoc.replay.robot_states import RobotState, StateReplay
 from robochoc.sniffer.cache import Cache
 from robochoc.sniffer.growing_file import GrowingFile
-from robochoc.sniffer.live_trace import next_entries
+from robochoc.sniffer.live_trace import entries_of, next_entries
 from robochoc.sniffer.page_data import STATES, BadRequestError
 
 MOST_EVENTS = 1_000_000
 """The maximum number of events of one robot, which need some hundred MB."""
 _KEPT_BYTES = 1 << 26
+_MOST_PLAYING = 4
+"""The maximum number of replays of one robot that are kept."""
+_BEFORE, _SHARE_BEFORE = 4, 8
+"""States before a requested chunk are cached as well: of 4 chunks, or of an eighth of the chunks before, if more."""
 
 
-class _Playing(NamedTuple):
-    robot: str
-    size: int
-    """The length of the file at the start of the replay."""
-    states: Iterator[RobotState]
+class _Playing:
+    """A replay of a robot. `chunk`: the chunk of its next state."""
+
+    def __init__(self, states: StateReplay) -> None:
+        self.chunk = 0
+        self._states = states
+
+    def skip_to(self, chunk: int) -> None:
+        """Continue with `chunk`, which must not be before the current one."""
+        self._states.since = chunk * STATES
+        self.chunk = chunk
+
+    def next_states(self) -> list[RobotState]:
+        """Return the states in the next chunk. Raises `BadRequestError`."""
+        self.chunk += 1
+        try:
+            return list(islice(self._states, STATES))
+        except CannotReplayError as reason:
+            raise BadRequestError(str(reason)) from reason
+
+
+class _RobotEvents:
+    """The events of `robot` in `file`, with the robots' problems. In a growing file, only new entries are read."""
+
+    def __init__(self, file: GrowingFile, robot: str) -> None:
+        self.robot = robot
+        self.size = 0
+        self._here = file.again()
+        self._follower = Follower(BufferedReader(self._here))
+        self._read: list[AnyEvent] = []
+        self.header: Header | None = None
+        self.teams = RecordedTeams(None)
+        self.events: Sequence[AnyEvent] = ()
+
+    def read_to(self, end: int, is_stopped: Callable[[], bool]) -> None:
+        """Read up to the position `end`. Raises `BadRequestError`."""
+        while not is_stopped() and (lines := next_entries(self._follower, self._here, end)):
+            if self.header is None and isinstance(lines[0], Header):
+                self.header = lines[0]
+                self.teams = RecordedTeams(self.header)
+            self._read += _events_of(lines, self.robot)
+            _check_number(len(self._read), f"the states of {self.robot}")
+        self.events = tuple(sorted_by_time(self._read))
+        self.size = end
 
 
 class RobotStates:
@@ -39,8 +88,8 @@ class RobotStates:
 
     def __init__(self) -> None:
         self._cache = Cache(_KEPT_BYTES)
-        self._playing: _Playing | None = None
-        self._next = 0
+        self._events: _RobotEvents | None = None
+        self._playing: list[_Playing] = []
         self.stopped = False
 
     def chunk(self, file: GrowingFile, robot: str, number: int, *, final: bool) -> bytes:
@@ -55,82 +104,68 @@ class RobotStates:
         kept = self._cache.get((robot, number))
         if kept is not None:
             return kept
-        playing = self._playing
-        if playing is None or playing.robot != robot or number < self._next or playing.size != file.end:
-            playing = _Playing(robot, file.end, self._states(file, robot))
-            self._playing, self._next = playing, 0
+        playing = self._playing_before(file, robot, number)
+        playing.skip_to(max(playing.chunk, number - (max(_BEFORE, number // _SHARE_BEFORE) if final else 0)))
         answer = b"[]"
-        while self._next <= number and not self.stopped:
-            states = self._next_states(playing)
+        while playing.chunk <= number and not self.stopped:
+            chunk = playing.chunk
+            states = playing.next_states()
             answer = msgspec.json.encode(states)
-            if len(states) < STATES:
-                self._playing = None
-                return answer if self._next == number else b"[]"
             if final:
-                self._cache.put((robot, self._next), answer)
-            self._next += 1
+                self._cache.put((robot, chunk), answer)
+            if len(states) < STATES:
+                return answer if chunk == number else b"[]"
+        self._playing.append(playing)
         return answer
 
-    def _next_states(self, playing: _Playing) -> list[RobotState]:
-        """Return the states in the next chunk. Raises `BadRequestError`."""
-        try:
-            return list(islice(playing.states, STATES))
-        except CannotReplayError as reason:
-            self._playing = None
-            raise BadRequestError(str(reason)) from reason
-        except BadRequestError:
-            self._playing = None
-            raise
-
-    def _states(self, file: GrowingFile, robot: str) -> Iterator[RobotState]:
-        return states_of(
-            self._events(file, robot),
-            robot,
-            header=_header(file),
-            everything=lambda: self._events(file),
+    def _playing_before(self, file: GrowingFile, robot: str, number: int) -> _Playing:
+        """Remove and return the last replay that has not passed chunk `number`, or return a new one."""
+        events = self._events
+        if events is None or events.robot != robot or events.size > file.end:
+            events = self._events = _RobotEvents(file, robot)
+        if events.size != file.end:
+            self._playing.clear()
+            events.read_to(file.end, lambda: self.stopped)
+        suitable = [playing for playing in self._playing if playing.chunk <= number]
+        if suitable:
+            playing = max(suitable, key=attrgetter("chunk"))
+            self._playing.remove(playing)
+            return playing
+        del self._playing[: -_MOST_PLAYING + 1]
+        everything = partial(self._all_events, file)
+        return _Playing(
+            StateReplay(events.events, robot, header=events.header, everything=everything, teams=events.teams)
         )
 
-    def _events(self, file: GrowingFile, robot: str | None = None) -> Iterator[AnyEvent]:
-        """Yield the events of `robot`, or of all robots, sorted by time within each run."""
-        whose = f"the states of {robot}" if robot else "all robots together"
-        here = file.again()
-        follower = Follower(BufferedReader(here))
-        run: list[AnyEvent] = []
-        count = 0
-        while not self.stopped and (lines := next_entries(follower, here, file.end)):
-            for line in lines:
-                if isinstance(line, Header | Ended) or not _concerns(line, robot):
-                    continue
-                count += 1
-                if count > MOST_EVENTS:
-                    raise BadRequestError(
-                        f"{whose} have more than {MOST_EVENTS:,} events, too many for a replay in the page: use"
-                        " 'robochoc replay'"
-                    )
-                if isinstance(line, Began):
-                    yield from sorted(run, key=_time)
-                    run.clear()
-                run.append(line)
-        yield from sorted(run, key=_time)
+    def _all_events(self, file: GrowingFile) -> Iterator[AnyEvent]:
+        """Return the events of all robots, sorted by time within each run."""
+        read: list[AnyEvent] = []
+        for lines in entries_of(file):
+            if self.stopped:
+                break
+            read += (line for line in lines if not isinstance(line, Header | Ended))
+            _check_number(len(read), "all robots together")
+        return sorted_by_time(read)
 
 
-def _time(event: AnyEvent) -> float:
-    return event.t
+def _check_number(events: int, whose: str) -> None:
+    if events > MOST_EVENTS:
+        raise BadRequestError(
+            f"{whose} have more than {MOST_EVENTS:,} events, too many for a replay in the page: use 'robochoc replay'"
+        )
 
 
-def _header(file: GrowingFile) -> Header | None:
-    here = file.again()
-    lines = next_entries(Follower(BufferedReader(here)), here, file.end)
-    return lines[0] if lines and isinstance(lines[0], Header) else None
-
-
-def _concerns(event: AnyEvent, robot: str | None) -> bool:
-    match event:
-        case Sent():
-            return robot in {None, event.sender, event.receiver}
-        case Received():
-            return robot in {None, event.receiver}
-        case Decided() | Heard() | Settled() | Concluded():
-            return robot in {None, event.robot}
-        case _:
-            return isinstance(event, Began | Given)
+def _events_of(lines: Sequence[JournalEntry], robot: str) -> Iterator[AnyEvent]:
+    """Yield the events in `lines` that the replay of `robot` needs."""
+    for line in lines:
+        if isinstance(line, Sent):
+            if robot in (line.receiver, line.sender):
+                yield line
+        elif isinstance(line, Received):
+            if line.receiver == robot:
+                yield line
+        elif isinstance(line, Settled | Decided | Heard | Concluded):
+            if line.robot == robot:
+                yield line
+        elif isinstance(line, Began | Given):
+            yield line
