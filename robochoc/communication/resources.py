@@ -44,6 +44,15 @@ def own_memory() -> int:
     return sum(int(line.split()[1]) for line in lines if line.startswith("Private_")) * 1024
 
 
+def resident_memory() -> int:
+    """Return the size of this process's memory in bytes, without files but with pages shared with its parent.
+
+    It is 0 if the system does not report it. Unlike `own_memory`, the system need not visit each page.
+    """
+    pages = read_text("/proc/self/statm").split()
+    return (int(pages[1]) - int(pages[2])) * resource.getpagesize() if pages else 0
+
+
 def read_text(path: str) -> str:
     """Return the text in a small system file; empty if it cannot be read. Using a `Path` takes four times as long."""
     try:

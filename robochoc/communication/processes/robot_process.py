@@ -39,7 +39,7 @@ from robochoc.communication.control import (
 from robochoc.communication.host import Host
 from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queues import LARGEST_BODY, QueueReader, QueueWriter
-from robochoc.communication.resources import own_memory
+from robochoc.communication.resources import own_memory, resident_memory
 from robochoc.communication.robot_loop import IDLE_S, RobotLoop
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
@@ -63,8 +63,8 @@ class QueueRobot(RobotLoop):
 
     One loop waits for all events: messages, orders from the parent, a full pipe that is writable again, the end of the
     parent. All messages waiting when the loop wakes up form one packet. The robot ends when the pipe ends, or when one
-    of the descriptors in `parent` is readable. If `measured`, the robot reports its private memory. Every message is
-    stamped with its epoch; outdated messages are dropped.
+    of the descriptors in `parent` is readable. If `measured`, or if it has grown, the robot reports its private memory.
+    Every message is stamped with its epoch; outdated messages are dropped.
     """
 
     bundle_bytes = LARGEST_BODY // 4
@@ -83,6 +83,7 @@ class QueueRobot(RobotLoop):
         super().__init__(epoch, observed=observed, bounds=bounds)
         self._name = host.name
         self._measured = measured
+        self._memory_before = resident_memory()
         self._link = link
         self._readers: dict[str, QueueReader] = {}
         self._writers: dict[str, QueueWriter] = {}
@@ -192,7 +193,7 @@ class QueueRobot(RobotLoop):
         if self._host is not None:
             assignment, findings = self._known_to_master(self._host)
             metrics = self._host.metrics()
-            if self._measured:
+            if self._measured or resident_memory() - self._memory_before > GROWTH:
                 metrics = replace(metrics, memory=own_memory())
             self._send_to_master(EpochReport(self.epoch, assignment, metrics, findings))
 
@@ -276,8 +277,10 @@ class DescriptorWatch:
 
 
 LOWEST_NICE = 19
-MEASURED = 128
-"""The maximum number of robots that measure their memory, spread evenly over the order. A measurement takes 1 ms."""
+MEASURED = 8
+"""The maximum number of robots that always measure their memory, spread evenly over the order: it takes 1 ms."""
+GROWTH = 1 << 20
+"""The other robots measure their memory if it has grown by more than this number of bytes."""
 REHEARSED = 32
 """The maximum number of robots in a rehearsal. Python 3.11 specializes a function at its 8th call and later."""
 REHEARSAL_S = 0.05
