@@ -28,6 +28,10 @@ class RobotsLostError(RobochocError):
         self.robots = dict(robots)
 
 
+class ClusterLostError(RobochocError):
+    """The cluster that computes the run, or one of its workers, is lost."""
+
+
 class Progress(NamedTuple):
     """The progress of a run: the number of messages sent so far, and the seconds since the start.
 

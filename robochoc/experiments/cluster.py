@@ -15,19 +15,14 @@ from typing import Self
 
 import msgspec
 from distributed import CancelledError, Client, as_completed
-from distributed.comm import resolve_address
 from distributed.scheduler import KilledWorker
 
+from robochoc.communication.cluster_client import SchedulerLostError, connect
 from robochoc.experiments.remote_task import files_of, run_one
 from robochoc.experiments.task import Row, Status, Task
-from robochoc.system.errors import RobochocError
 
 AT_ONCE = 1000
 """The maximum number of tasks at the scheduler."""
-
-
-class SchedulerLostError(RobochocError):
-    """The scheduler cannot be reached, or the connection to it was lost."""
 
 
 class ClusterWorkers:
@@ -53,13 +48,7 @@ class ClusterWorkers:
 
     def __enter__(self) -> Self:
         """Connect to the scheduler. Raises `SchedulerLostError` if it cannot be reached."""
-        try:
-            address = _address_in(self._file) if self._file else self._address
-            resolve_address(address)  # Dask reports an invalid address late, and in several lines
-            self._client = Client(address, set_as_default=False, name="robochoc experiment")
-        except (OSError, ValueError) as error:
-            text = f"the scheduler at {self._file or self._address} cannot be reached: {error}"
-            raise SchedulerLostError(text) from None
+        self._client = connect(self._address, self._file, "robochoc experiment")
         if self._notice and not self._client.scheduler_info()["workers"]:
             self._notice(f"the cluster at {self._file or self._address} has no workers yet; runs wait for them")
         return self
@@ -88,20 +77,6 @@ class ClusterWorkers:
     def _submit(self, client: Client, task: Task) -> object:
         content = msgspec.json.encode(task)
         return client.submit(run_one, content, files_of(task), key=f"robochoc-{task.key}", pure=False)
-
-
-class _SchedulerFile(msgspec.Struct):
-    """The relevant part of a Dask scheduler's JSON file."""
-
-    address: str
-
-
-def _address_in(file: Path) -> str:
-    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError` if the file contains no address."""
-    try:
-        return msgspec.json.decode(file.read_bytes(), type=_SchedulerFile).address
-    except msgspec.MsgspecError as wrong:
-        raise ValueError(f"it is not a scheduler's file: {wrong}") from None
 
 
 def _row(future: object) -> Row:

@@ -10,6 +10,7 @@ import re
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 from typing import Any
 
@@ -18,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.array_types import Floats, Integers
+from robochoc.communication.arrays.blocks import BlockReport, Limits, RunBlock, run_on_cluster
 from robochoc.communication.arrays.cycle_run import CycleRun, cycles_of, exact_sum
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import ArrayLayout
@@ -27,7 +29,7 @@ from robochoc.modelling.option_names import errors_in_python
 from robochoc.modelling.solving import ARGUMENTS
 from robochoc.protocols.message import encode
 from robochoc.protocols.settings import read_settings
-from robochoc.protocols.shared.cycles import CycleProtocol, Domain, Value
+from robochoc.protocols.shared.cycles import CycleCount, CycleProtocol, Domain, Value
 from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.option_values import texts_by_name
 from robochoc.run.options import Options
@@ -127,6 +129,7 @@ class ArrayProblem:
         seed: int = 0,
         timeout: float | None = None,
         ncccs: bool = True,
+        cluster: str | None = None,
         **settings: object,
     ) -> ArraySolution:
         """Solve the problem by a protocol that supports arrays, and check the cost of the answer.
@@ -136,6 +139,8 @@ class ArrayProblem:
             seed: The seed of the robots' random numbers.
             timeout: A time limit in seconds, checked after each cycle.
             ncccs: True to count NCCCs, which takes up to a fifth of the time of mgm2 and maxsum.
+            cluster: The address of a Dask scheduler, or the path of its file. Its workers compute one block of robots
+                each, with the same results. None: this process computes all robots.
             **settings: The protocol's settings, such as `cycles` or `variant`.
 
         Returns:
@@ -144,34 +149,30 @@ class ArrayProblem:
         Raises:
             UnknownProtocolError: if no such protocol is installed.
             UnsupportedError: if the protocol does not support arrays, a setting is not allowed, or costs are too large.
+            ClusterLostError: if a worker, or the cluster's scheduler, is lost.
             RefutedError: if the cost of the answer differs from the cost that the run reported.
             ValueError: if the value of an option is not allowed.
             TypeError: if the value of an option has the wrong type.
         """
         limit_s = Options(timeout=timeout).timeout
         began = time.monotonic()
+        if cluster is not None:
+            with _errors_in_python():
+                how = RunBlock(*_how(protocol, seed, settings, cluster=True), Limits(limit_s), ncccs)
+                report = run_on_cluster(cluster, self._described(), how)
+            return self._solution(report, report.robots, replace(report.metrics, wall_s=time.monotonic() - began))
         run = self.run(protocol, seed=seed, ncccs=ncccs, **settings)
         for _ in cycles_of(run):
             if limit_s is not None and time.monotonic() - began > limit_s and not run.is_over:
                 run.end()
                 break
-        return self._solution(run, time.monotonic() - began)
+        return self._solution(run, run.layout.robots, run.metrics(time.monotonic() - began))
 
     def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
         """Return an unstarted run, for callers that need each cycle (`cycles_of`). See `solve` for the arguments."""
-        kind = protocol_named(Options(protocol=protocol).protocol)
-        for name in settings:
-            if name in ARGUMENTS and not hasattr(kind.settings, name):
-                raise OptionTypeError(f"ArrayProblem has no option {name!r}: it runs as arrays; robochoc.Model has it")
-        options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
-        with errors_in_python(("settings", "runtime")), _without_runtimes():
-            refuse_settings(options.protocol, kind, options.settings)
-            form = array_run_for(kind)
-            if not issubclass(kind, CycleProtocol):
-                raise UnsupportedError(f"{options.protocol} does not work in cycles")
-            known = read_settings(kind, options.settings)
-            chosen = known if isinstance(known, type(kind.settings)) else kind.settings
-            return form(self.layout, chosen, options.seed, clocks=ncccs)
+        with _errors_in_python():
+            form, chosen, seed = _how(protocol, seed, settings)
+            return form(self.layout, chosen, seed, clocks=ncccs)
 
     def cost(self, values: ArrayLike) -> float:
         """Return the cost of an assignment to all robots. Raises `ValueError` if a value is missing or invalid."""
@@ -221,18 +222,19 @@ class ArrayProblem:
         tables: Floats = self.tables if alike else np.concatenate([self.tables, turned])
         return KnownConstraints(owners, others[:, None], tables, which, np.arange(len(owners)))
 
-    def _solution(self, run: CycleRun, wall_s: float) -> ArraySolution:
+    def _solution(self, run: CycleRun | BlockReport, robots: Integers, metrics: Metrics) -> ArraySolution:
+        """Return the checked solution. `robots` are the robots in the rows of the run's values."""
         last = not run.costs or run.costs[-1] <= min(run.costs)
         rows = run.values if last else run.best
         values = np.zeros(self.robots, rows.dtype)
-        values[run.layout.robots] = rows
+        values[robots] = rows
         cost = min(run.costs, default=INFINITE)
         if run.costs and self.cost(values) != cost:
             raise RefutedError(f"the answer costs {self.cost(values):g}, but the run reported {cost:g}")
         found = cost < INFINITE and run.verdict is None
         verdict = run.verdict or (Verdict.SOLUTION if found else Verdict.UNKNOWN)
         return ArraySolution(
-            verdict, values if found else None, int(cost) if found else None, tuple(run.costs), run.metrics(wall_s)
+            verdict, values if found else None, int(cost) if found else None, tuple(run.costs), metrics
         )
 
     def _tables_of_edges(self, which: ArrayLike | None) -> Integers:
@@ -273,14 +275,32 @@ class ArrayProblem:
         )
 
 
+def _how(
+    protocol: str, seed: int, settings: Mapping[str, object], *, cluster: bool = False
+) -> tuple[type[CycleRun], CycleCount, int]:
+    """Return the array form of the protocol, its settings, and the seed."""
+    kind = protocol_named(Options(protocol=protocol).protocol)
+    for name in settings:
+        if name in ARGUMENTS and not hasattr(kind.settings, name):
+            raise OptionTypeError(f"ArrayProblem has no option {name!r}: it runs as arrays; robochoc.Model has it")
+    options = Options(protocol=protocol, seed=seed, settings=texts_by_name("settings", settings))
+    refuse_settings(options.protocol, kind, options.settings)
+    form = array_run_for(kind, cluster=cluster)
+    if not issubclass(kind, CycleProtocol):
+        raise UnsupportedError(f"{options.protocol} does not work in cycles")
+    known = read_settings(kind, options.settings)
+    return form, known if isinstance(known, type(kind.settings)) else kind.settings, options.seed
+
+
 @contextmanager
-def _without_runtimes() -> Iterator[None]:
-    """Recommend `robochoc.Model` instead of another runtime, since array problems have no other runtime."""
-    try:
-        yield
-    except UnsupportedError as error:
-        text = re.sub(r"\b(add|use) --runtime simulator\b", "use robochoc.Model", str(error))
-        raise UnsupportedError(text) from None
+def _errors_in_python() -> Iterator[None]:
+    """Name arguments instead of options. Recommend `robochoc.Model` instead of another runtime."""
+    with errors_in_python(("settings", "runtime", "cluster")):
+        try:
+            yield
+        except UnsupportedError as error:
+            text = re.sub(r"\b(add|use) --runtime simulator\b", "use robochoc.Model", str(error))
+            raise UnsupportedError(text) from None
 
 
 def _refuse_first(faults: Mapping[str, bool]) -> None:

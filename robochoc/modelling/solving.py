@@ -86,6 +86,7 @@ class Solvable(ABC):
         filters: Sequence[str] = (),
         bounds: bool = False,
         preprocess: str | None = None,
+        cluster: str | None = None,
         journal: Path | str | None = None,
         html: Path | str | None = None,
         progress: Callable[[Progress], None] | None = None,
@@ -137,6 +138,8 @@ class Solvable(ABC):
             bounds: True if events report the proven lower bound of the cost (with processes and in the simulator).
             preprocess: The preprocessing before the protocol: `ac` makes domains arc consistent. None: no
                 preprocessing.
+            cluster: With arrays: the address of a Dask scheduler, or the path of its file. Its workers compute the run.
+                None: this process does.
             journal: The file to which the journal of the run is written: all messages and decisions.
             html: The file to which the page with the scene of the drones' flight is written.
             progress: Called with the number of messages and the elapsed time, about ten times a second.

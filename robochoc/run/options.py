@@ -131,6 +131,8 @@ class Options:
         filters: The names of the channel filters for messages on a network, in order of application.
         chosen: The reasons for a `protocol` or an `order` that was chosen for the user.
         preprocess: The preprocessing before the protocol (None: no preprocessing).
+        cluster: The Dask cluster on which arrays are computed: the address of its scheduler, or the path of the
+            scheduler's file (None: this process).
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
@@ -163,6 +165,7 @@ class Options:
     chosen: Mapping[str, str] = field(default_factory=dict)
     bounds: bool = False
     preprocess: Preprocess | None = None
+    cluster: str | None = None
 
     def __post_init__(self) -> None:
         for name, given in vars(self).copy().items():
@@ -237,6 +240,7 @@ _CONVERTERS = MappingProxyType(
         "chosen": texts_by_name,
         "bounds": flag,
         "preprocess": optional(one_of(Preprocess)),
+        "cluster": optional(text),
     }
 )
 """The converter for each field of `Options`. A field without a converter cannot be set."""

@@ -195,7 +195,10 @@ def open_arrays(request: SessionRequest) -> Session:
     """Open a session in which all robots are rows in arrays."""
     from robochoc.communication.arrays.session import ArraysRun  # noqa: PLC0415 - one runtime is enough
 
-    return ArraysRun(request.team, request.protocol, deadline=request.deadline, **request.common)
+    cluster = request.options.cluster
+    if cluster is not None and request.observer is not None:
+        raise UnsupportedError("an observer cannot be used with --cluster: remove one of them")
+    return ArraysRun(request.team, request.protocol, deadline=request.deadline, cluster=cluster, **request.common)
 
 
 def _schedule_of(options: Options) -> Schedule:

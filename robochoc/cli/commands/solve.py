@@ -31,6 +31,7 @@ from robochoc.cli.options.solve import (
     SolveCommand,
     TeamRequest,
     check_outputs,
+    cluster_option,
     deadline_option,
     filter_option,
     kill_option,
@@ -51,7 +52,9 @@ _SECTIONS: Sections = {
         "--protocol", "--runtime", "--timeout", "--deadline", "--withdraw", "--verify", "--seed",
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
-    "Search": ("--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with"),
+    "Search": (
+        "--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with", "--cluster",
+    ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
@@ -160,6 +163,7 @@ _SECTIONS: Sections = {
     metavar="[=N]",
     help="Restart up to N lost robots (1 without a number). Implies --on-loss withdraw.",
 )
+@cluster_option
 @kill_option
 @filter_option
 @click.option("--explain", is_flag=True, help="Print the reasons for the chosen protocol, and the pseudo-tree.")

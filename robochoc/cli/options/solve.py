@@ -80,6 +80,11 @@ preprocess_option = click.option(
     metavar="ac",
     help="Before the search, make domains arc consistent: ac.",
 )
+cluster_option = click.option(
+    "--cluster",
+    metavar="ADDRESS|FILE",
+    help="Arrays: the Dask cluster of this scheduler, or scheduler file.",
+)
 messages_option = click.option(
     "--messages",
     type=WholeNumber(1),
@@ -122,7 +127,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
-    "central_with",
+    "central_with", "cluster",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

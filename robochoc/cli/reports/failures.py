@@ -70,7 +70,7 @@ def errors_as_failures(place: object) -> Iterator[None]:
 
 def _status(error: Exception) -> int | None:
     """Return the exit status for `error`, or None for an unforeseen error."""
-    from robochoc.communication.search_result import RobotsLostError
+    from robochoc.communication.search_result import ClusterLostError, RobotsLostError
     from robochoc.formats import InvalidInputError
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError
@@ -82,6 +82,6 @@ def _status(error: Exception) -> int | None:
         INVALID: (InvalidInputError,),
         USAGE: (UnknownProtocolError, UnsupportedError, SolverMissingError),
         LIMIT: (TooManySolutionsError, CompileTimeoutError),
-        LOST: (RobotsLostError, CompileError, SolverLostError, RefutedError),
+        LOST: (RobotsLostError, ClusterLostError, CompileError, SolverLostError, RefutedError),
     }
     return next((status for status, kinds in statuses.items() if isinstance(error, kinds)), None)

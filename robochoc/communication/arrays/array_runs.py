@@ -21,12 +21,18 @@ _ARRAY_RUNS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType
 )
 
 
-def array_run_for(protocol: type[Protocol]) -> type[CycleRun]:
-    """Return the array implementation of `protocol`. Raises `UnsupportedError` if there is none."""
+def array_run_for(protocol: type[Protocol], *, cluster: bool = False) -> type[CycleRun]:
+    """Return the array implementation of `protocol`. Raises `UnsupportedError` if there is none.
+
+    `cluster`: true if it must be able to run in several blocks.
+    """
     form = _ARRAY_RUNS.get(protocol)
     if form is None:
         able = ", ".join(kind.__name__.lower() for kind in _ARRAY_RUNS)
         raise UnsupportedError(
             f"{protocol.__name__} has no array implementation; use --runtime simulator, or one of {able}"
         )
+    if cluster and not form.in_blocks:
+        able = ", ".join(kind.__name__.lower() for kind, one in _ARRAY_RUNS.items() if one.in_blocks)
+        raise UnsupportedError(f"{protocol.__name__} cannot run on a cluster; remove --cluster, or use one of {able}")
     return form

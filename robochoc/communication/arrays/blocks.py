@@ -11,7 +11,8 @@ from __future__ import annotations
 import json
 import time
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from importlib.util import find_spec
 from typing import Any, NamedTuple, Protocol
 
 import msgspec
@@ -23,17 +24,18 @@ from robochoc.communication.arrays.border import Border, Item
 from robochoc.communication.arrays.cycle_run import CycleChange, CycleRun, cycles_of
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import ArrayLayout, IntegerCosts, cost_form
+from robochoc.communication.search_result import ClusterLostError
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.shared.cycles import CycleCount
-from robochoc.system.errors import RobochocError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 
 MOST_LEVELS = 10_000
 """The number of breadth-first levels after which the remaining robots keep their order."""
 
 
-class BlockLostError(RobochocError):
-    """Another block of the team is lost, so this block cannot continue."""
+class BlockLostError(ClusterLostError):
+    """A block of the team is lost, so the other blocks cannot continue."""
 
 
 class Channel(Protocol):
@@ -79,6 +81,9 @@ class Limits(NamedTuple):
 
     timeout_s: float | None = None
     messages: int | None = None
+
+
+NO_LIMITS = Limits()
 
 
 @dataclass
@@ -262,29 +267,40 @@ class BlockBorder(Border):
         return [items[other] for other in sorted(items)]
 
 
-def run_block(
-    block: Block,
-    form: Callable[..., CycleRun],
-    settings: CycleCount,
-    seed: int,
-    channel: Channel,
-    limits: Limits,
-    *,
-    clocks: bool,
-    changes: bool,
-) -> BlockReport:
-    """Run a block to the end, together with the other blocks. Raises `BlockLostError` if one of them is lost."""
-    layout = ArrayLayout(block.description, block.costs)
-    run = form(layout, settings, seed, clocks=clocks, changes=changes)
-    border = run.border = BlockBorder(block, layout, channel)
-    began = time.monotonic()
-    is_over = True
-    for _ in cycles_of(run):
-        if limits != Limits() and not run.is_over and _reached(run, border, limits, time.monotonic() - began):
-            is_over = False
-            run.end()
-            break
-    return _report(block, run, time.monotonic() - began, is_over=is_over)
+@dataclass(frozen=True)
+class RunBlock:
+    """Runs a block to the end, together with the other blocks.
+
+    Attributes:
+        form: The array form of the protocol.
+        settings: The protocol's settings.
+        seed: The seed of the robots' random numbers.
+        limits: Limits on the run.
+        clocks: True if NCCC clocks are computed.
+        changes: True if changed values are recorded.
+    """
+
+    form: type[CycleRun]
+    settings: CycleCount
+    seed: int
+    limits: Limits = NO_LIMITS
+    clocks: bool = True
+    changes: bool = False
+
+    def __call__(self, block: Block, channel: Channel) -> BlockReport:
+        """Return the report of the block. Raises `BlockLostError` if another block is lost."""
+        layout = ArrayLayout(block.description, block.costs)
+        run = self.form(layout, self.settings, self.seed, clocks=self.clocks, changes=self.changes)
+        border = run.border = BlockBorder(block, layout, channel)
+        began = time.monotonic()
+        is_over = True
+        for _ in cycles_of(run):
+            elapsed_s = time.monotonic() - began
+            if self.limits != NO_LIMITS and not run.is_over and _reached(run, border, self.limits, elapsed_s):
+                is_over = False
+                run.end()
+                break
+        return _report(block, run, time.monotonic() - began, is_over=is_over)
 
 
 def _reached(run: CycleRun, border: Border, limits: Limits, elapsed_s: float) -> bool:
@@ -311,6 +327,15 @@ def _report(block: Block, run: CycleRun, wall_s: float, *, is_over: bool) -> Blo
         run.metrics(wall_s),
         changes,
     )
+
+
+def run_on_cluster(place: str, description: Description, run: RunBlock) -> BlockReport:
+    """See `cluster_blocks.run_on_cluster`. Raises `UnsupportedError` if Dask is not installed."""
+    if find_spec("distributed") is None:
+        raise UnsupportedError("--cluster requires Dask, which is not installed: pip install 'robochoc[cluster]'")
+    from robochoc.communication.arrays import cluster_blocks  # noqa: PLC0415 - an extra
+
+    return cluster_blocks.run_on_cluster(place, description, run)
 
 
 def joined(reports: Sequence[BlockReport]) -> BlockReport:

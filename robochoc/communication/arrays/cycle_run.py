@@ -82,6 +82,8 @@ class CycleRun(ABC):
     settings: CycleCount
     clocks_depend_on_values: ClassVar[bool] = True
     """False if each robot makes equal checks in each cycle: clocks of a block then follow from its own robots."""
+    in_blocks: ClassVar[bool] = False
+    """True if a team can run in several blocks (`blocks.py`)."""
 
     def __init__(
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False

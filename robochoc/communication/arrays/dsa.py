@@ -16,6 +16,7 @@ class ArrayDSA(CycleRun):
     """A run of DSA."""
 
     clocks_depend_on_values = False
+    in_blocks = True
 
     def _start_active(self) -> None:
         self.choose_random_values()

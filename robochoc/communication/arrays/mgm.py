@@ -59,6 +59,7 @@ class ArrayMGM(ArrayGainers):
     """A run of MGM."""
 
     clocks_depend_on_values = False
+    in_blocks = True
 
     def _start_active(self) -> None:
         self.choose_random_values()

@@ -8,7 +8,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from robochoc.communication.arrays.array_runs import array_run_for
-from robochoc.communication.arrays.cycle_run import cycles_of
+from robochoc.communication.arrays.blocks import Limits, RunBlock, run_on_cluster
+from robochoc.communication.arrays.cycle_run import CycleChange, cycles_of
 from robochoc.communication.arrays.description import describe_team
 from robochoc.communication.arrays.layout import ArrayLayout
 from robochoc.communication.search_result import Progress, SearchResult
@@ -40,6 +41,7 @@ class ArraysRun(Session):
         progress: Receives the message count after each cycle, before the decisions in the cycle.
         parameters: The robots' parameters besides the problem.
         deadline: The end of the run's time, on the monotonic clock. None: no limit.
+        cluster: See `Options.cluster`.
 
     Raises:
         UnsupportedError: if the protocol cannot run as arrays, or costs or tables are too large.
@@ -55,11 +57,14 @@ class ArraysRun(Session):
         progress: Callable[[Progress], None] | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
         deadline: float | None = None,
+        cluster: str | None = None,
     ) -> None:
         super().__init__(team)
+        self._cluster = cluster
+        self._seed = parameters.seed
         self._observer = observer
         self._progress = progress
-        form = array_run_for(protocol)
+        form = array_run_for(protocol, cluster=cluster is not None)
         assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
         given = read_settings(protocol, parameters.settings)
         settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
@@ -79,6 +84,8 @@ class ArraysRun(Session):
 
     def search(self, timeout: float | None = None, messages: int | None = None) -> SearchResult:
         """See `Session.search`. Limits are checked after each cycle."""
+        if self._cluster is not None:
+            return self._search_on(self._cluster, Limits(timeout, messages))
         began = time.monotonic()
         run = self._run
         verdict = Verdict.UNKNOWN
@@ -100,6 +107,21 @@ class ArraysRun(Session):
         metrics = run.metrics(time.monotonic() - began)
         return SearchResult(
             verdict, witness, self._assignments(), metrics, findings=self._findings(), cycle_costs=self.costs
+        )
+
+    def _search_on(self, cluster: str, limits: Limits) -> SearchResult:
+        """Search on a cluster. The observer receives nothing."""
+        run, rows = self._run, self._layout.places
+        report = run_on_cluster(
+            cluster, self._layout.description, RunBlock(type(run), run.settings, self._seed, limits, changes=True)
+        )
+        run.values[rows[report.robots]] = report.values
+        run.changes = [CycleChange(rows[robots], values) for robots, values in report.changes or ()]
+        run.cycle, run.costs, run.verdict, run.witness = report.cycle, report.costs, report.verdict, report.witness
+        verdict = run.verdict or (Verdict.SOLUTION if report.is_over else Verdict.UNKNOWN)
+        witness = None if run.witness is None else self._names[run.witness]
+        return SearchResult(
+            verdict, witness, self._assignments(), report.metrics, findings=self._findings(), cycle_costs=self.costs
         )
 
     def _watched(self) -> None:

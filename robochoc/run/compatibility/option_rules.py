@@ -168,6 +168,16 @@ OPTION_RULES = (
         "--spare restarts robots that died, and cannot be used with --on-loss fail",
     ),
     OptionRule(
+        lambda o: o.cluster is not None and o.runtime != Runtime.ARRAYS,
+        "--cluster is only for --runtime arrays",
+        "add --runtime arrays",
+    ),
+    OptionRule(
+        lambda o: o.cluster is not None and o.deadline,
+        "--deadline requires values during the search, which a cluster does not send",
+        "use --timeout",
+    ),
+    OptionRule(
         lambda o: o.withdraw is not None and o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS,
         "--withdraw cannot be used with --runtime arrays",
         "add --runtime simulator",

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from robochoc.communication.arrays.array_runs import array_run_for
-from robochoc.communication.arrays.blocks import Block, BlockReport, Channel, Limits, joined, run_block, split_team
+from robochoc.communication.arrays.blocks import BlockReport, Limits, RunBlock, joined, split_team
 from robochoc.communication.arrays.cycle_run import cycles_of
 from robochoc.communication.arrays.description import Description, describe_team
 from robochoc.communication.arrays.layout import ArrayLayout
@@ -35,9 +35,7 @@ def compare(
     chosen = read_settings(kind, settings)
     assert isinstance(chosen, type(kind.settings))
     form = array_run_for(kind)
-
-    def run(block: Block, channel: Channel) -> BlockReport:
-        return run_block(block, form, chosen, seed, channel, limits, clocks=True, changes=True)
+    run = RunBlock(form, chosen, seed, limits, changes=True)
 
     one, several = (joined(run_in_threads(split_team(description, blocks), run)) for blocks in (1, many))
     assert_same(one, several)
