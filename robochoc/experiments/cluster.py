@@ -17,7 +17,7 @@ import msgspec
 from distributed import CancelledError, Client, as_completed
 from distributed.scheduler import KilledWorker
 
-from robochoc.communication.cluster_client import SchedulerLostError, connect
+from robochoc.communication.arrays.cluster_client import SchedulerLostError, connect
 from robochoc.experiments.remote_task import files_of, run_one
 from robochoc.experiments.task import Row, Status, Task
 

@@ -278,7 +278,7 @@ def _cluster_loss_as_failure(workers: object) -> Iterator[None]:
         return
     import logging
 
-    from robochoc.communication.cluster_client import SchedulerLostError
+    from robochoc.communication.arrays.cluster_client import SchedulerLostError
 
     logging.disable(logging.CRITICAL)  # Dask would log the loss of a scheduler with a traceback
     try:

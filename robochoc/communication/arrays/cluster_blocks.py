@@ -18,8 +18,8 @@ from pathlib import Path
 from distributed import CancelledError, Client, Future, Worker, get_worker, wait
 
 from robochoc.communication.arrays.blocks import Block, BlockLostError, BlockReport, RunBlock, joined, split_team
+from robochoc.communication.arrays.cluster_client import SchedulerLostError, connect
 from robochoc.communication.arrays.description import Description
-from robochoc.communication.cluster_client import SchedulerLostError, connect
 from robochoc.communication.search_result import ClusterLostError
 from robochoc.system.stopping import stop_requested
 

@@ -86,7 +86,7 @@ def test_generated_problems_are_made_there() -> None:
 def test_what_is_no_file_of_a_scheduler_is_told(content: str, said: str, tmp_path: Path) -> None:
     cluster = pytest.importorskip("robochoc.experiments.cluster")
     (tmp_path / "cluster.json").write_text(content)
-    lost = pytest.importorskip("robochoc.communication.cluster_client").SchedulerLostError
+    lost = pytest.importorskip("robochoc.communication.arrays.cluster_client").SchedulerLostError
     with pytest.raises(lost, match=said), cluster.ClusterWorkers(None, tmp_path / "cluster.json"):
         pass
 
