@@ -25,6 +25,7 @@ import network
 import other_flight
 import own_studies
 import peers
+import scale
 import simulator
 import sniffer
 import solver
@@ -54,6 +55,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "app": app_pages.measured,
     "auctions": auctions.measured,
     "wide": wide_tables.measured,
+    "growth": scale.measured,
     "mujoco": other_flight.mujoco,
     "rotorpy": other_flight.rotorpy,
 }

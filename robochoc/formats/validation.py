@@ -30,6 +30,7 @@ from robochoc.model.change import ExcessiveChangeError, apply_changes
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, RemoveValue, Robot, ScenarioEvent, Team
 from robochoc.model.team_edits import ChangeError
+from robochoc.system.garbage import collection_paused
 
 _NO_CHANGES = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
@@ -38,6 +39,7 @@ _valid: dict[int, weakref.ref[Team]] = {}
 """The teams known to be valid, by `id`, since hashing a team would take as long as validating it."""
 
 
+@collection_paused()
 def check_team(team: Team) -> None:
     """Raise `InvalidInputError` with every error in `team`, unless it is valid (docs/reference/format.md).
 

@@ -16,6 +16,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import Codes, Network
 from robochoc.solver.errors import SolverLostError, SolverTimeoutError, UnsupportedError
 from robochoc.system.errors import RobochocError
+from robochoc.system.garbage import collection_paused
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
@@ -211,6 +212,7 @@ class TeamCompiler:
         self.deadline = deadline
         self._stage = stage
 
+    @collection_paused()
     def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
         """Return `team`, compiled.
 

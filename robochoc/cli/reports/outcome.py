@@ -17,6 +17,7 @@ from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Robot, Team
+from robochoc.system.garbage import collection_paused
 from robochoc.system.plain_text import counted
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ _ONLY, _NONE = "task", "none"
 """A robot with at most one task has one variable, whose first value means no task (`formats/dialects/tasks`)."""
 
 
+@collection_paused()
 def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None) -> str:
     """Return the verdict with its reason, the values, the withdrawn and lost robots, and the metrics, on a few lines.
 
