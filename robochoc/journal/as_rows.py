@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Bounded, Improved, Sent, actor
-from robochoc.journal.reader import Journal, read_journal
+from robochoc.journal.reader import read_journal
 
 COLUMNS = (
     *("run", "epoch", "event", "t", "robot", "other", "type", "content", "bytes", "clock", "checks", "cost"),
@@ -54,14 +55,14 @@ def by_column(path: Path | str) -> dict[str, list[Any]]:
     return {name: [row[name] for row in found] for name in COLUMNS}
 
 
-def cost_rows(journal: Journal) -> list[Row]:
+def cost_rows(events: Iterable[AnyEvent]) -> list[Row]:
     """Return a row for each improvement of the team's assignment: its time, the messages sent until then, the cost.
 
     `run` is the number of the run or epoch, from 1, as in other exports.
     """
     found: list[Row] = []
     run, messages = 0, 0
-    for event in journal.events:
+    for event in events:
         match event:
             case Began():
                 run, messages = run + 1, 0

@@ -93,12 +93,17 @@ def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
 
 def lines_of(journal: Journal) -> Iterator[bytes]:
     """Yield the text form of a journal: one JSON object per line."""
+    return text_lines(journal.header, journal.events, journal.outcome)
+
+
+def text_lines(header: Header, events: Iterable[AnyEvent], outcome: Outcome | None) -> Iterator[bytes]:
+    """Yield the text form of a journal with these entries."""
     encode = msgspec.json.Encoder(decimal_format="number").encode
-    yield encode(journal.header) + b"\n"
-    for event in journal.events:
+    yield encode(header) + b"\n"
+    for event in events:
         yield encode(event) + b"\n"
-    if journal.outcome is not None:
-        yield encode(Ended.from_outcome(journal.outcome)) + b"\n"
+    if outcome is not None:
+        yield encode(Ended.from_outcome(outcome)) + b"\n"
 
 
 class Follower:

@@ -82,6 +82,11 @@ class LiveTrace:
         """True if the complete journal has been read and sorted."""
         return self._done
 
+    def events(self) -> Iterator[AnyEvent]:
+        """Yield the events of the complete journal, sorted by time within each run."""
+        for events in events_by_time(self._file, self._earliest):
+            yield from events
+
     @property
     def _ended(self) -> bool:
         return self._done or self._ordering is not None

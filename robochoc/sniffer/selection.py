@@ -3,31 +3,21 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Iterator, Sequence
 
 from robochoc.journal.events import AnyEvent, Began, Received, Sent
-from robochoc.journal.journal import Journal
 from robochoc.sniffer.patterns import matching, unmatched
 from robochoc.sniffer.trace import Trace
 from robochoc.system.errors import RobochocError
 from robochoc.system.lazy_dataclass import dataclass
 
 
-def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
-    """Return `journal`, whose trace is `trace`, without the events of messages that are not in `messages`.
-
-    All other events remain.
-    """
-    return replace(journal, events=tuple(_selected_events(journal.events, trace, set(messages))))
-
-
-def _selected_events(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iterator[AnyEvent]:
-    """Yield the events, except those of messages that are not selected.
+def excerpt_of(events: Iterable[AnyEvent], trace: Trace, numbers: Sequence[int]) -> Iterator[AnyEvent]:
+    """Yield the events of `trace`, without those of messages that are not in `numbers`.
 
     In a run, a sender's messages have ascending numbers, and each receiver receives them in this order.
     """
-    of = trace.messages
+    messages, of = {*numbers}, trace.messages
     spoken: dict[tuple[int, str], list[int]] = defaultdict(list)
     for message, (run, sender) in enumerate(zip(of.run, of.sender, strict=True)):
         spoken[run, trace.robots[sender]].append(message)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import errno
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
@@ -113,8 +113,8 @@ class PendingFile:
         return self._named
 
 
-def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
-    """Write `content` to `path`. Readers see the old file or the complete new one.
+def write_atomically(path: Path, content: bytes | Iterable[bytes], mode: int = 0o666) -> None:
+    """Write `content`, which may come in pieces, to `path`. Readers see the old file or the complete new one.
 
     Devices, pipes, and targets of standard output or error (such as `/dev/stdout`) are written directly.
 
@@ -126,14 +126,15 @@ def write_atomically(path: Path, content: bytes, mode: int = 0o666) -> None:
     Raises:
         OSError: if the file cannot be written. No partial file remains.
     """
+    pieces = [content] if isinstance(content, bytes) else content
     if _is_stream(path):
         with errors_naming(path), os.fdopen(_open_stream(path), "wb") as stream:
-            stream.write(content)
+            stream.writelines(pieces)
         return
     file = PendingFile(path, mode)
     try:
         with errors_naming(path):
-            file.stream.write(content)
+            file.stream.writelines(pieces)
     except BaseException:
         file.discard()
         raise

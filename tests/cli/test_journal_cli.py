@@ -6,8 +6,10 @@ import base64
 import csv
 import io
 import json
+import os
 import re
 import shlex
+import threading
 import zlib
 from pathlib import Path
 
@@ -364,15 +366,34 @@ def test_an_export_that_finds_no_room_says_which(file: Path) -> None:
     assert result.output.startswith("/dev/full: the export cannot be written: No space left on device (")
 
 
-def test_a_journal_that_is_not_whole_is_exported_and_that_is_told(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_incomplete_journal_is_exported_with_a_warning(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-1])
     trace = trace_of(file)
-    trace.damage = "block 3 is broken"
-    monkeypatch.setattr(Trace, "of", lambda _: trace)
+    assert trace.damage
     result = journal("export", file, "--format", "csv")
     assert result.exit_code == 0
-    assert result.stderr == f"{file}: only a part of the journal can be read: block 3 is broken\n"
+    assert result.stderr == f"{file}: only a part of the journal can be read: {trace.damage}\n"
     assert len(result.stdout.splitlines()) == 1 + len(trace.messages.t)
-    assert journal("show", file).stdout.splitlines()[-1] == "complete   no: block 3 is broken"
+    assert journal("show", file).stdout.splitlines()[-1] == f"complete   no: {trace.damage}"
+
+
+def test_a_journal_in_a_pipe_is_shown_and_exported(file: Path) -> None:
+    """Each command reads the pipe once."""
+    content = file.read_bytes()
+    for arguments in (("show",), ("export", "--format", "jsonl"), ("export", "--format", "words")):
+        reading, writing = os.pipe()
+        writer = threading.Thread(target=_write_all, args=(writing, content))
+        writer.start()
+        piped = journal(arguments[0], f"/dev/fd/{reading}", *arguments[1:])
+        os.close(reading)
+        writer.join()
+        assert piped.exit_code == 0
+        assert piped.stdout == journal(arguments[0], file, *arguments[1:]).stdout
+
+
+def _write_all(descriptor: int, content: bytes) -> None:
+    with os.fdopen(descriptor, "wb") as stream:
+        stream.write(content)
 
 
 def test_what_is_no_journal_is_told(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 import zlib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
-from robochoc.cli.options.saved import saved_journal
+from robochoc.cli.options.saved import SavedTrace, saved_trace
 from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 from robochoc.system.errors import RobochocError
 
 if TYPE_CHECKING:
-    from robochoc.journal.journal import Journal
     from robochoc.sniffer.selection import Selection
-    from robochoc.sniffer.trace import Trace
 
 FORMATS = ("words", "jsonl", "acl", "csv", "mermaid", "html", "costs")
 MOST_IN_PAGE = 100_000
@@ -38,8 +36,9 @@ def show(file: Path) -> None:
     """Summarise a journal: run, robots, messages by type, outcome, and whether the file is complete."""
     from robochoc.cli.reports.journal import journal_report
 
-    for line in journal_report(_trace(saved_journal(file), file)):
-        click.echo(line)
+    with saved_trace(file) as saved:
+        for line in journal_report(saved.trace):
+            click.echo(line)
 
 
 @journal.command(short_help="Write messages for other programs, or as a page.")
@@ -81,40 +80,41 @@ def export(
 
     selection = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
     refuse_same_places({"-o": output}, {"the journal": file})
-    read = saved_journal(file)
-    if form == "costs":
-        if selection != Selection():
-            raise click.UsageError("--format costs exports no messages: remove --robots, --types, --from, --to, ...")
-        _export_costs(read, file, output)
-        return
-    trace = _trace(read, file)
-    try:
-        messages = selection.numbers_in(trace)
-    except NothingSelectedError as nothing:
-        raise click.UsageError(_one_line(str(nothing))) from nothing
-    if trace.damage:
-        click.echo(_one_line(f"{file}: only a part of the journal can be read: {trace.damage}"), err=True)
-    options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
-    try:
-        pieces = _pieces(form, read, trace, selection, messages)
-    except _TooManyError as many:
-        again = f"; for the first messages: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
-        raise Failure(USAGE, f"{many}{again}") from many
-    if output is None:
-        for piece in pieces:
-            click.echo(piece, nl=False)
-    else:
-        _write(output, b"".join(pieces), count=len(messages))
+    with saved_trace(file) as saved:
+        if form == "costs":
+            if selection != Selection():
+                raise click.UsageError(
+                    "--format costs exports no messages: remove --robots, --types, --from, --to, ..."
+                )
+            _export_costs(saved, file, output)
+            return
+        try:
+            messages = selection.numbers_in(saved.trace)
+        except NothingSelectedError as nothing:
+            raise click.UsageError(_one_line(str(nothing))) from nothing
+        if saved.trace.damage:
+            click.echo(_one_line(f"{file}: only a part of the journal can be read: {saved.trace.damage}"), err=True)
+        options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
+        try:
+            pieces = _pieces(form, saved, selection, messages)
+        except _TooManyError as many:
+            others = _command(file, form, {**options, "--to": many.last})
+            raise Failure(USAGE, f"{many}{f'; for the first messages: {others}' if many.last else ''}") from many
+        if output is None:
+            for piece in pieces:
+                click.echo(piece, nl=False)
+        else:
+            _write(output, pieces, count=len(messages))
 
 
-def _export_costs(read: Journal, file: Path, output: Path | None) -> None:
+def _export_costs(saved: SavedTrace, file: Path, output: Path | None) -> None:
     """Write the improvements of the team's cost as CSV."""
     import csv
     import io
 
     from robochoc.journal.as_rows import cost_rows
 
-    if not (found := cost_rows(read)):
+    if not (found := cost_rows(saved.events())):
         why = "there are no costs: the run minimised nothing, found no assignment, or was killed"
         raise Failure(INVALID, _one_line(f"{file}: {why} (journals of DCOPs have costs)"))
     table = io.StringIO()
@@ -124,36 +124,44 @@ def _export_costs(read: Journal, file: Path, output: Path | None) -> None:
     if output is None:
         click.echo(table.getvalue(), nl=False)
     else:
-        _write(output, table.getvalue().encode(), count=len(found), unit="cost")
+        _write(output, [table.getvalue().encode()], count=len(found), unit="cost")
 
 
-def _write(output: Path, content: bytes, *, count: int, unit: str = "message") -> None:
+def _write(output: Path, pieces: Iterable[bytes], *, count: int, unit: str = "message") -> None:
     """Write an export of `count` messages or costs to a file, and print the file's size."""
     from robochoc.system.files import write_atomically
 
+    size = 0
+
+    def counted() -> Iterator[bytes]:
+        nonlocal size
+        for piece in pieces:
+            size += len(piece)
+            yield piece
+
     try:
-        write_atomically(output, content)
+        write_atomically(output, counted())
     except OSError as error:
         why = f"{output}: the export cannot be written: {error.strerror} (free some space, or name another file)"
         raise Failure(INVALID, _one_line(why)) from error
-    click.echo(f"{output}: {count:,} {unit}{'s' * (count != 1)}, {len(content):,} bytes")
+    click.echo(f"{output}: {count:,} {unit}{'s' * (count != 1)}, {size:,} bytes")
 
 
-def _pieces(
-    form: str, read: Journal, trace: Trace, selection: Selection, messages: range | list[int]
-) -> Iterable[bytes]:
+def _pieces(form: str, saved: SavedTrace, selection: Selection, messages: range | list[int]) -> Iterable[bytes]:
     """Return the export piece by piece."""
-    from robochoc.journal.journal import lines_of
+    from robochoc.journal.reader import text_lines
     from robochoc.sniffer.export import TooMuchToDrawError, acl_texts, drawable, in_words, mermaid, table
     from robochoc.sniffer.page_data import PageData
     from robochoc.sniffer.selection import excerpt_of
 
+    trace, events = saved.trace, saved.events
     is_complete = len(messages) == len(trace.messages.t)
     match form:
         case "words":
-            return in_words(PageData(trace), read, messages)
+            return in_words(PageData(trace), saved.journal(), messages)
         case "jsonl":
-            return lines_of(read if is_complete else excerpt_of(read, trace, messages))
+            chosen = events() if is_complete else excerpt_of(events(), trace, messages)
+            return text_lines(trace.header, chosen, trace.outcome)
         case "acl":
             return acl_texts(PageData(trace), messages)
         case "csv":
@@ -166,7 +174,7 @@ def _pieces(
                 why = f"{much} (select fewer with --robots, --types, --from and --to)"
                 raise _TooManyError(why, drawable(data, messages)) from much
         case _:
-            return [_page(read, trace, selection)]
+            return [_page(saved, selection)]
 
 
 class _TooManyError(RobochocError):
@@ -183,10 +191,11 @@ def _command(file: Path, form: str, options: Mapping[str, object]) -> str:
     return shlex.join(["robochoc", "journal", "export", str(file), "--format", form, *given])
 
 
-def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
+def _page(saved: SavedTrace, selection: Selection) -> bytes:
     """Return a page with the complete run, since causes and effects of messages are in other messages."""
     from robochoc.sniffer.selection import Selection
 
+    trace = saved.trace
     if selection != replace(Selection(), robots=selection.robots):
         raise click.UsageError(
             "--format html exports all messages: remove --types, --from, --to and --run, and filter on the page"
@@ -204,17 +213,8 @@ def _page(read: Journal, trace: Trace, selection: Selection) -> bytes:
     from robochoc.sniffer.scene import complete_scene
 
     data = PageData(trace, chosen=selection.robots)
-    answers = {**embedded_answers(data, read), "scene": zlib.compress(complete_scene(trace))}
-    return sniffer_page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
-
-
-def _trace(read: Journal, file: Path) -> Trace:
-    from robochoc.sniffer.trace import Trace, TraceTooLargeError
-
-    try:
-        return Trace.of(read)
-    except TraceTooLargeError as large:
-        raise Failure(USAGE, f"{file}: {large}") from large
+    answers = {**embedded_answers(data, saved.journal()), "scene": zlib.compress(complete_scene(trace))}
+    return sniffer_page("embedded", answers, title=f"{trace.header.protocol} on {trace.header.team}")
 
 
 def _one_line(words: str) -> str:

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, BinaryIO, NamedTuple
 
 import click
 
 from robochoc.cli.options.paths import TeamFolder
-from robochoc.cli.reports.failures import INVALID, Failure
+from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
+    from robochoc.journal.events import AnyEvent
     from robochoc.journal.journal import Journal
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Robot, Team
+    from robochoc.sniffer.trace import Trace
 
 LARGEST_FILE = 1 << 30
 """The maximum size of a file: 1 GiB, a journal with hundreds of millions of messages, or millions as text."""
@@ -58,6 +63,51 @@ def saved_journal(file: Path) -> Journal:
         return read_journal(content)
     except JournalError as error:
         raise _failure(file, str(error), JOURNAL_STEP) from error
+
+
+class SavedTrace(NamedTuple):
+    """The trace of a journal, and its events and entries, which are read from the file on each call."""
+
+    trace: Trace
+    events: Callable[[], Iterable[AnyEvent]]
+    journal: Callable[[], Journal]
+
+
+@contextmanager
+def saved_trace(file: Path) -> Iterator[SavedTrace]:
+    """Provide the trace of the journal in `file`. Only a pipe is read into memory. Raises `Failure`."""
+    from robochoc.journal.journal import JournalError
+    from robochoc.sniffer.growing_file import NoFileError
+    from robochoc.sniffer.trace import Trace, TraceTooLargeError
+
+    with ExitStack() as stack:
+        try:
+            try:
+                saved = _read_trace(file, stack.enter_context(file.open("rb")))
+            except NoFileError:
+                journal = saved_journal(file)
+                saved = SavedTrace(Trace.of(journal), lambda: journal.events, lambda: journal)
+        except TraceTooLargeError as large:
+            raise Failure(USAGE, f"{file}: {large}") from large
+        except JournalError as error:
+            raise _failure(file, str(error), JOURNAL_STEP) from error
+        except OSError as error:
+            raise _failure(file, str(error.strerror or error), JOURNAL_STEP) from error
+        yield saved
+
+
+def _read_trace(file: Path, stream: BinaryIO) -> SavedTrace:
+    """Return the trace of the journal in `stream`, which must stay open. Raises `JournalError`, `OSError`."""
+    from robochoc.journal.journal import JournalError
+    from robochoc.sniffer.growing_file import GrowingFile
+    from robochoc.sniffer.live_trace import LiveTrace
+
+    live = LiveTrace(GrowingFile(stream.fileno()), lambda: inf)
+    while not live.settled:
+        live.advance()
+    if live.trace is None:
+        raise JournalError("the journal has no header")
+    return SavedTrace(live.trace, live.events, lambda: saved_journal(file))
 
 
 def saved_outcome(saved: Path) -> tuple[Outcome, Team | None]:
