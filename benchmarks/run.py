@@ -15,6 +15,7 @@ from pathlib import Path
 
 import app_pages
 import auctions
+import choice
 import command_time
 import crowd
 import flagship
@@ -54,6 +55,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "sniffer": sniffer.measured,
     "app": app_pages.measured,
     "auctions": auctions.measured,
+    "choice": choice.measured,
     "wide": wide_tables.measured,
     "growth": scale.measured,
     "mujoco": other_flight.mujoco,

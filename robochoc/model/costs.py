@@ -41,14 +41,27 @@ class UnboundedCostError(RobochocError, ValueError):
     """Raised if the cost of a function has no bounds, because the domain of a variable is unknown."""
 
 
+_NORMALIZED = "_normalized"
+"""The name under which a team stores its normalised form."""
+
+
 def normalized(team: Team) -> Team:
     """Return `team` with minimised integer costs of 0 or more, and with the user's units in `user_units`.
 
-    If the costs already have this form, `team` is returned unchanged.
+    If the costs already have this form, `team` is returned unchanged. The result is stored with `team`: the choice of a
+    protocol and the run both need it, and functions over many values take seconds.
 
     Raises:
         UnboundedCostError: if the cost of a function has no bounds.
     """
+    stored = vars(team)
+    if _NORMALIZED not in stored:
+        found = _normalized(team)
+        stored[_NORMALIZED] = None if found is team else found
+    return stored[_NORMALIZED] or team
+
+
+def _normalized(team: Team) -> Team:
     if not any(map(_needs_normalizing, [*team.robots, *_joining(team)])):
         return team
     units = common_units(robot.costs for robot in team.robots)

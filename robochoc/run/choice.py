@@ -44,13 +44,18 @@ class ProtocolChoice:
 
     Attributes:
         options: How to run, with the name of a protocol, and an order if one was chosen.
-        facts: The facts about the team, in words. Empty if the user named the protocol.
+        analysis: The facts about the team. None if the user named the protocol.
         rejected: The rejected protocols, with the reason for each rejection.
     """
 
     options: Options
-    facts: tuple[str, ...] = ()
+    analysis: Facts | None = None
     rejected: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def facts(self) -> tuple[str, ...]:
+        """The facts about the team, in words. Empty if the user named the protocol."""
+        return () if self.analysis is None else tuple(_in_words(self.analysis))
 
 
 def choose(team: Team, options: Options, *, environment: bool = False, ordered: bool = True) -> ProtocolChoice:
@@ -96,12 +101,13 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
         team = normalized(team)
     except UnboundedCostError:  # the run reports this error
         return ProtocolChoice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
-    facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss)
+    withdrawal = options.withdraw is not None
+    facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss, withdrawal)
     rejected: dict[str, list[str]] = {}
     for rule in RULES:
         against = rule.unmet(facts)
         if not against:
-            chosen = _chosen(facts, options, rule.protocol, rule.why)
+            chosen = _chosen(facts, options, rule.protocol, rule.why, rule.order)
             against = refusal(rule.protocol, team, chosen)
         if not against:
             return _choice(facts, chosen, rejected)
@@ -109,11 +115,11 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
             rejected.setdefault(rule.protocol, []).append(against)
     for name in _others(tolerating_loss=facts.loss > 0):
         if accepts(name, team, options):
-            return _choice(facts, _chosen(facts, options, name, ACCEPTS), rejected)
+            return _choice(facts, _chosen(facts, options, name, ACCEPTS, ORDERS.get(name)), rejected)
     usual = (
         DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL
     )  # the resulting error text names the protocols that accept the team
-    return _choice(facts, _chosen(facts, options, usual, NONE_ACCEPTS), {})
+    return _choice(facts, _chosen(facts, options, usual, NONE_ACCEPTS, ORDERS[usual]), {})
 
 
 def choose_for_private_team(team: Team, options: Options) -> ProtocolChoice:
@@ -169,22 +175,21 @@ def refusal(name: str, team: Team, options: Options) -> str:
 def _choice(facts: Facts, chosen: Options, rejected: Mapping[str, list[str]]) -> ProtocolChoice:
     others = ((name, whys) for name, whys in rejected.items() if name != chosen.protocol)
     against = tuple((name, "; ".join(dict.fromkeys(whys))) for name, whys in others)
-    return ProtocolChoice(chosen, tuple(_in_words(facts)), against)
+    return ProtocolChoice(chosen, facts, against)
 
 
 # Orders
 
 ORDERS = MappingProxyType(
-    {"sfb": Order.MIN_WIDTH, "afb": Order.MIN_WIDTH, "abt": Order.MAX_DEGREE, "afc-ng": Order.MAX_DEGREE}
+    {"sfb": Order.MAX_DEGREE, "afb": Order.MAX_DEGREE, "abt": Order.MAX_DEGREE, "afc-ng": Order.MAX_DEGREE}
 )
-"""The orders that suit the protocols. Protocols not listed here build trees, or use no order."""
+"""The orders of protocols that no rule suggests. Protocols not listed here build trees, or use no order."""
 
 ORDERS_TEXT = (
-    "order, if not given: max-degree for abt, afc-ng and afb; min-width for sfb (with costs max-degree, with",
-    "--withdraw dom-deg). The order of the files is kept for other protocols, and if constraints are partially known,",
-    "the problem changes, or --withdraw maximal decides by priority",
+    "order, if not given: as above; for sfb with --withdraw minimum dom-deg. The order of the files is kept for other",
+    "protocols, and if constraints are partially known, the problem changes, or --withdraw maximal decides by priority",
 )
-"""The rules of `_with_suitable_order` and `_with_order`, as lines for the user."""
+"""The rules of `_chosen`, as lines for the user."""
 
 STATIC = frozenset({"sbt", "abt", "afc", "afc-ng", "afc-tree", "disfc", "syncbb", "afb", "sfb"})
 """Protocols with a static order. A poor order slows these down most."""
@@ -202,13 +207,10 @@ def faster_order(team: Team, options: Options) -> Order | None:
     return Order.MAX_DEGREE
 
 
-def _chosen(facts: Facts, options: Options, protocol: str, why: str) -> Options:
-    """Return `options` with `protocol`, and with the order that suits it, if the order is to be chosen too."""
-    order = ORDERS.get(protocol)
+def _chosen(facts: Facts, options: Options, protocol: str, why: str, order: Order | None) -> Options:
+    """Return `options` with `protocol`, and with the `order` that suits it, if the order is to be chosen too."""
     if protocol == DEFAULT_COST_PROTOCOL and options.withdraw == Withdrawal.MINIMUM:
         order = Order.DOM_DEG  # robots that must withdraw are found soon
-    if order == Order.MIN_WIDTH and facts.has_costs:
-        order = Order.MAX_DEGREE
     if options.order is not None or order is None or _keeps_order(options, facts):
         return replace(options, protocol=protocol, chosen={"protocol": why})
     reasons = {"protocol": why, "order": f"{protocol} is usually fastest in it"}
@@ -250,5 +252,7 @@ def _in_words(facts: Facts) -> Iterator[str]:
     if facts.loss:
         yield f"messages are lost with a probability of {facts.loss:g} at most"
     yield f"{counted(facts.values, 'value')} in all, {facts.largest_domain:,} of a robot at most"
+    if not facts.has_costs:
+        yield f"a constrainedness of about {facts.constrainedness:.2f}"
     if facts.has_costs and facts.tree.cells <= LARGE:
         yield f"a pseudo-tree of induced width {facts.tree.width}, tables of {facts.tree.cells:,.0f} entries at most"

@@ -9,22 +9,39 @@ import math
 from collections.abc import Callable
 from typing import NamedTuple
 
+from robochoc.model.orders import Order
 from robochoc.run.facts import Facts
 from robochoc.solver.encoding import MAX_TUPLES
 from robochoc.solver.filters import MAX_FILTER_BITS
 
-NARROW_CELLS = 65_536
+NARROW_CELLS = 2_000_000
 """The largest number of entries of a table on a narrow pseudo-tree."""
-FEW_ROBOTS = 12
-"""Up to this number of robots, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
+FEW_ROBOTS = 6
+"""Up to this number of robots every protocol takes milliseconds, and `sfb` needs the fewest messages."""
 MOST_IN_A_TREE = 30_000
 """The largest team that uses a tree. The simulator needs half a minute for it (docs/guides/large-teams.md)."""
 MANY_ROBOTS = 300
-"""With more robots, SFB's messages become too long, and for problems with costs only local search ends in time."""
+"""With more robots, for problems with costs only local search ends in time."""
 MANY_COMBINATIONS = 100_000_000
 """Up to this many combinations of the values of all robots, `asym-pt-fb` takes seconds in the simulator."""
-SPARSE = 8
-"""The mean number of neighbours up to which a constraint graph is called sparse."""
+EASY = 0.48
+"""The constrainedness up to which robots that search at the same time find a solution after few changes."""
+HARD = 0.68
+"""The constrainedness from which `sfb` saves more messages than it takes time for each of them."""
+FREE = 0.5
+"""The constrainedness, of the problem without any costs, up to which such an assignment is likely."""
+NEARLY_ALL = 0.9
+"""The share of linked pairs from which only `sfb` backtracks early enough (queens)."""
+SMALL_TEAM = 12
+"""Up to this number of robots, the computations before the search count more than the search."""
+HARD_SMALL = 0.8
+"""The same as `HARD` for up to `SMALL_TEAM` robots."""
+LARGE_TEAM = 100
+"""With more robots, a search by one robot after the other takes longer than a search by all at the same time."""
+LARGE_DOMAIN = 16
+"""With more values, the messages of `sfb` take much longer to compute."""
+HARD_LARGE = 0.8
+"""The same as `HARD` for more than `LARGE_TEAM` robots or `LARGE_DOMAIN` values."""
 FEW_TO_BEGIN_ANEW = 25
 """Up to this many robots, `sfb` decides hard problems in the files' order, which dynamic problems keep."""
 TIGHT = 0.7
@@ -45,11 +62,15 @@ class Condition(NamedTuple):
 
 
 class Rule(NamedTuple):
-    """A rule of `auto`: a protocol, the conditions on the team, and the reason."""
+    """A rule of `auto`: a protocol, the conditions on the team, the reason, and the order that suits the protocol.
+
+    `order` is None if the order of the files is kept.
+    """
 
     protocol: str
     conditions: tuple[Condition, ...]
     why: str
+    order: Order | None = None
 
     def unmet(self, facts: Facts) -> str:
         """Return why the rule does not apply: the first condition that the team does not meet. Empty if it applies."""
@@ -71,14 +92,28 @@ LARGE_TABLE = Condition(
     f"a constraint of more than {MAX_TUPLES:,} combinations of values",
     f"no constraint has more than {MAX_TUPLES:,} combinations of values",
 )
+MORE_THAN_FEW = Condition(
+    lambda f: f.robots > FEW_ROBOTS, f"more than {FEW_ROBOTS} robots", f"there are {FEW_ROBOTS} robots or fewer"
+)
+NO_WITHDRAWAL = Condition(lambda f: not f.withdrawal, "no --withdraw", "robots may withdraw")
+NOT_COMPLETE = Condition(
+    lambda f: f.robots <= SMALL_TEAM or f.share_linked < NEARLY_ALL,
+    f"at most {SMALL_TEAM} robots, or less than {NEARLY_ALL:.0%} of all pairs linked",
+    f"{NEARLY_ALL:.0%} or more of all pairs of robots are linked",
+)
+ANY_SOLUTION = (NO_COSTS, NO_WITHDRAWAL, MORE_THAN_FEW, NOT_COMPLETE)
+NOT_HARD = Condition(
+    lambda f: (
+        f.constrainedness
+        < (HARD_LARGE if f.robots > LARGE_TEAM or max(f.declared_sizes.values()) > LARGE_DOMAIN else HARD)
+    ),
+    f"a constrainedness below {HARD} (more than {LARGE_TEAM} robots, or {LARGE_DOMAIN} values: {HARD_LARGE})",
+    f"the constrainedness is {HARD} or more (more than {LARGE_TEAM} robots, or {LARGE_DOMAIN} values: {HARD_LARGE})",
+)
 LOSSY = Condition(lambda f: f.loss > 0, "messages may be lost", "no message is lost")
 NEARLY_A_TREE = (
     COSTS,
-    Condition(
-        lambda f: f.robots > FEW_ROBOTS,
-        f"more than {FEW_ROBOTS} robots",
-        f"there are {FEW_ROBOTS} robots or fewer",
-    ),
+    MORE_THAN_FEW,
     Condition(
         lambda f: f.robots <= MOST_IN_A_TREE,
         f"at most {MOST_IN_A_TREE:,} robots",
@@ -198,9 +233,28 @@ RULES = (
         "costs change, and the constraint graph is nearly a tree: it keeps the tables that still hold",
     ),
     Rule(
+        "ncbb",
+        (
+            COSTS,
+            MORE_THAN_FEW,
+            Condition(lambda f: not f.changes, "a problem that does not change", "the problem changes"),
+            Condition(
+                lambda f: f.robots <= MANY_ROBOTS,
+                f"at most {MANY_ROBOTS} robots",
+                f"there are more than {MANY_ROBOTS} robots",
+            ),
+            Condition(
+                lambda f: f.cost_constrainedness < FREE,
+                f"a constrainedness below {FREE} if nothing may cost anything",
+                f"the constrainedness is {FREE} or more if nothing may cost anything",
+            ),
+        ),
+        "an assignment without costs is likely: the search ends with it",
+    ),
+    Rule(
         "dpop",
         NEARLY_A_TREE,
-        "the constraint graph is nearly a tree: tables are small, and messages few",
+        "its tables on a pseudo-tree are small, and its messages few",
     ),
     Rule(
         "dsa",
@@ -212,31 +266,87 @@ RULES = (
         "there are too many robots for a proof, and nothing is forbidden: local search ends, with a good answer",
     ),
     Rule(
-        "abt",
+        "sbt",
         (
-            NO_COSTS,
-            MANY,
+            *ANY_SOLUTION,
             Condition(
-                lambda f: 2 * f.links <= SPARSE * f.robots,
-                f"at most {SPARSE} neighbours each in the mean",
-                f"robots have more than {SPARSE} neighbours in the mean",
+                lambda f: f.needs_no_backtracking,
+                "parents that leave each robot a value, in the order of the files",
+                "in the order of the files, a robot's parents may leave it no value",
             ),
         ),
-        "there are many robots with few neighbours: they search at the same time, with short messages",
+        "in the order of the files, parents leave each robot a value: one robot after the other chooses, each once",
+    ),
+    Rule(
+        "abt",
+        (
+            *ANY_SOLUTION,
+            Condition(
+                lambda f: f.constrainedness < EASY,
+                f"a constrainedness below {EASY}",
+                f"the constrainedness is {EASY} or more",
+            ),
+            Condition(
+                lambda f: f.robots <= SMALL_TEAM or f.is_binary,
+                f"at most {SMALL_TEAM} robots, or no constraint over more than two",
+                f"there are more than {SMALL_TEAM} robots, and constraints over more than two",
+            ),
+        ),
+        "constraints exclude little: robots that search at the same time soon agree, also in the order of the files",
+    ),
+    Rule(
+        "sbt",
+        (
+            *ANY_SOLUTION,
+            Condition(
+                lambda f: f.robots <= SMALL_TEAM,
+                f"at most {SMALL_TEAM} robots",
+                f"there are more than {SMALL_TEAM} robots",
+            ),
+            Condition(
+                lambda f: f.constrainedness < HARD_SMALL,
+                f"a constrainedness below {HARD_SMALL}",
+                f"the constrainedness is {HARD_SMALL} or more",
+            ),
+        ),
+        "there are few robots, and constraints do not exclude much: nothing is computed before the search",
+        Order.MAX_DEGREE,
+    ),
+    Rule(
+        "afc-ng",
+        (
+            *ANY_SOLUTION,
+            NOT_HARD,
+            Condition(
+                lambda f: f.robots <= LARGE_TEAM,
+                f"at most {LARGE_TEAM} robots",
+                f"there are more than {LARGE_TEAM} robots",
+            ),
+        ),
+        "constraints do not exclude much: it sends few and short messages",
+        Order.MAX_DEGREE,
+    ),
+    Rule(
+        "abt",
+        (*ANY_SOLUTION, NOT_HARD),
+        "constraints do not exclude much, and there are many robots: they search at the same time, with short messages",
+        Order.MAX_DEGREE,
     ),
     Rule(
         "afc-ng",
         (
             NO_COSTS,
             Condition(
-                lambda f: f.values > LONG_ROW or f.largest_table > MAX_TUPLES,
+                lambda f: f.declared_values > LONG_ROW or f.declared_table > MAX_TUPLES,
                 f"more than {LONG_ROW:,} values in all, or {LARGE_TABLE.text}",
                 f"there are {LONG_ROW:,} values in all or fewer, and {LARGE_TABLE.otherwise}",
             ),
         ),
         "domains are large, and it needs no tables",
+        Order.MAX_DEGREE,
     ),
-    Rule("afb", (LARGE_TABLE,), "domains are large, and it needs no tables"),
-    Rule("sfb", (), "it needs few messages, on hard problems too"),
+    Rule("afb", (LARGE_TABLE,), "domains are large, and it needs no tables", Order.MAX_DEGREE),
+    Rule("sfb", (COSTS,), "it needs few messages, on hard problems too", Order.MAX_DEGREE),
+    Rule("sfb", (), "it needs few messages, on hard problems too", Order.MIN_WIDTH),
 )
 """The rules, in the order in which they are tried."""

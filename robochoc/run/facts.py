@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property
 from itertools import product
@@ -10,15 +11,21 @@ from random import Random
 
 from robochoc.model.change import team_after_events
 from robochoc.model.orders import Graph, constraint_graph
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Team
-from robochoc.solver.encoding import MAX_TUPLES, allows_function, is_soft
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
+from robochoc.solver.encoding import MAX_TUPLES, cost_function, is_soft
 from robochoc.system.lazy_dataclass import dataclass
 
 _TWO = 2
-LARGE = 1_000_000
+LARGE = 10_000_000
 """The analysis of a pseudo-tree stops when a table has more entries."""
-DRAWS = 100
+DRAWS = 16
 """The number of sampled value combinations for estimating a constraint's tightness."""
+MOST = sys.float_info.max
+"""The largest cost of a combination that is not forbidden."""
+MOST_EXAMINED = 400
+"""The number of value combinations up to which all combinations of a constraint are examined."""
+SAMPLED = 16
+"""The number of sampled constraints for estimating the constrainedness."""
 Sizes = Mapping[str, int]
 """The number of values of each robot. A value is one combination that the robot's neighbours see."""
 
@@ -33,12 +40,14 @@ class Facts:
         compiled_sizes: Returns the sizes of the robots' compiled domains; None if only the declared sizes are known. It
             is called only if the declared sizes are large.
         loss: The probability that a message is lost.
+        withdrawal: True if robots withdraw from a team without a solution.
     """
 
     team: Team
     environment: bool = False
     compiled_sizes: Callable[[], Sizes | None] = lambda: None
     loss: float = 0.0
+    withdrawal: bool = False
 
     @property
     def robots(self) -> int:
@@ -92,7 +101,7 @@ class Facts:
     @cached_property
     def sizes(self) -> Sizes:
         """The number of values of each robot: the declared number or, if it is large, the number after compilation."""
-        if self._largest_table(self.declared_sizes) <= MAX_TUPLES:
+        if self.declared_table <= MAX_TUPLES:
             return self.declared_sizes
         return self.compiled_sizes() or self.declared_sizes
 
@@ -102,6 +111,11 @@ class Facts:
         return sum(self.sizes.values())
 
     @property
+    def declared_values(self) -> int:
+        """The declared number of values of all robots together."""
+        return sum(self.declared_sizes.values())
+
+    @property
     def largest_domain(self) -> int:
         """The largest number of values of a robot."""
         return max(self.sizes.values(), default=0)
@@ -109,7 +123,12 @@ class Facts:
     @cached_property
     def largest_table(self) -> int:
         """The number of entries in the largest table of a single constraint, assuming that robots may withdraw."""
-        return self._largest_table(self.sizes)
+        return self.declared_table if self.sizes is self.declared_sizes else self._largest_table(self.sizes)
+
+    @property
+    def is_binary(self) -> bool:
+        """True if no constraint is over more than two robots."""
+        return max(map(len, self._scopes), default=0) <= _TWO
 
     @cached_property
     def forbids(self) -> bool:
@@ -121,38 +140,118 @@ class Facts:
         """The constrainedness of the problem. Problems with values around 1 are hardest.
 
         It is kappa of Gent, MacIntyre, Prosser, Walsh ("The constrainedness of search", AAAI 1996): the bits removed by
-        the constraints, divided by the bits of the domains. For a constraint with more than `DRAWS` combinations of
-        values, `DRAWS` combinations are sampled.
+        the constraints, divided by the bits of the domains. It is estimated from a sample of `SAMPLED` constraints, and
+        of `DRAWS` combinations of values for each of them.
         """
-        domains = {one.name: one.domain for robot in self.first.robots for one in robot.variables}
-        bits = sum(math.log2(max(1, len(domain))) for domain in domains.values())
+        return self._constrainedness(MOST)
+
+    @cached_property
+    def cost_constrainedness(self) -> float:
+        """The constrainedness of the problem to find an assignment without any costs."""
+        return self._constrainedness(0)
+
+    @cached_property
+    def _domains(self) -> Mapping[str, Collection[int]]:
+        return {one.name: one.domain for robot in self.first.robots for one in robot.variables}
+
+    @cached_property
+    def _sample(self) -> list[Constraint]:
+        constraints = list(self.first.constraints())
         chance = Random(0)  # noqa: S311 - a sample, no secret
-        taken = -sum(math.log2(_share_allowed(one, domains, chance)) for one in self.first.constraints())
-        return taken / bits if bits else 0.0
+        return constraints if len(constraints) <= SAMPLED else chance.sample(constraints, SAMPLED)
+
+    def _constrainedness(self, most: float) -> float:
+        """Return the constrainedness if no constraint may cost more than `most`."""
+        bits = math.log2(math.prod(max(1, len(domain)) for domain in self._domains.values()))
+        if not bits or not self._sample:
+            return 0.0
+        chance = Random(0)  # noqa: S311 - as above
+        taken = -sum(math.log2(_share_allowed(one, self._domains, chance, most)) for one in self._sample)
+        return taken * sum(1 for _ in self.first.constraints()) / len(self._sample) / bits
+
+    @property
+    def share_linked(self) -> float:
+        """The share of pairs of robots that are parent and child."""
+        robots = self.first.robots
+        return sum(len(robot.parents) for robot in robots) / max(len(robots) * (len(robots) - 1) / 2, 1)
+
+    @cached_property
+    def needs_no_backtracking(self) -> bool:
+        """True if a robot's parents leave it a value, whatever they choose, in the order of the files."""
+        parents = max((len(robot.parents) for robot in self.first.robots), default=0)
+        examined: dict[tuple[object, ...], float] = {}
+        for constraint in self.first.constraints():
+            places = (one if isinstance(one, int) else id(self._domains[one]) for one in constraint.parameters)
+            same = (id(constraint.definition), constraint.cost, *places)
+            if same not in examined:
+                examined[same] = _largest_share_excluded(constraint, self._domains)
+            if parents * examined[same] >= 1:
+                return False
+        return True
 
     @cached_property
     def tree(self) -> TreeTables:
         """The tables of dynamic programming on the robots' pseudo-tree. The analysis stops at a large table."""
         return tree_tables(self.graph, self.first.order, self.sizes, LARGE)
 
-    def _largest_table(self, sizes: Sizes) -> int:
+    @cached_property
+    def declared_table(self) -> int:
+        """The same as `largest_table`, with the declared sizes."""
+        return self._largest_table(self.declared_sizes)
+
+    @cached_property
+    def _scopes(self) -> set[frozenset[str]]:
+        """The robots of each shared constraint."""
         owner = self.first.owner
         shared = (one for robot in self.first.robots for one in robot.shared)
-        scopes = {frozenset([owner[name] for name in one.variables]) for one in shared}
-        return max((math.prod([sizes[name] + 1 for name in scope]) for scope in scopes), default=1)
+        return {frozenset([owner[name] for name in one.variables]) for one in shared}
+
+    def _largest_table(self, sizes: Sizes) -> int:
+        return max((math.prod([sizes[name] + 1 for name in scope]) for scope in self._scopes), default=1)
 
 
-def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> float:
-    """Return the share of value combinations that `constraint` allows. If none is allowed, count half a combination."""
-    columns = [list(domains[name]) for name in constraint.variables]
-    many = math.prod(map(len, columns))
+def _share_allowed(
+    constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random, most: float
+) -> float:
+    """Return the share of value combinations that cost at most `most`. If there are none, count half a combination."""
+    many = math.prod([len(domains[name]) for name in constraint.variables])
+    definition = constraint.definition
     if not many:
         return 1.0
-    whole = many <= DRAWS
-    sampled = product(*columns) if whole else (tuple(map(chance.choice, columns)) for _ in range(DRAWS))
-    allowed = allows_function(constraint, constraint.variables)
-    number = many if whole else DRAWS
-    return max(sum(map(allowed, sampled)), 1 / 2) / number
+    if isinstance(definition, Relation) and definition.arity == len(constraint.variables):
+        return min(max(_number_allowed(definition, many, most), 1 / 2), many) / many
+    columns = [list(domains[name]) for name in constraint.variables]
+    number = min(many, DRAWS)
+    sampled = product(*columns) if many <= DRAWS else (_drawn(columns, chance) for _ in range(DRAWS))
+    price = cost_function(constraint, constraint.variables)
+    return max(sum(price(values) <= most for values in sampled), 1 / 2) / number
+
+
+def _largest_share_excluded(constraint: Constraint, domains: Mapping[str, Collection[int]]) -> float:
+    """Return the largest share of one robot's values that a value of another robot excludes; 1 if it is not known."""
+    columns = [list(domains[name]) for name in constraint.variables]
+    if len(columns) != _TWO or not 0 < math.prod(map(len, columns)) <= MOST_EXAMINED:
+        return 1.0
+    price = cost_function(constraint, constraint.variables)
+    rows = [[price((one, other)) == INFINITE for other in columns[1]] for one in columns[0]]
+    largest: float = max(sum(row) / len(row) for row in (*rows, *zip(*rows, strict=True)))
+    return largest
+
+
+def _number_allowed(relation: Relation, many: int, most: float) -> int:
+    """Return the number of tuples among `many` that cost at most `most`, if all listed tuples are in the domains."""
+    match relation.semantics:
+        case Semantics.SUPPORTS:
+            return len(relation.tuples)
+        case Semantics.CONFLICTS:
+            return many - len(relation.tuples)
+        case Semantics.SOFT:
+            others = many - len(relation.tuples) if relation.default_cost <= most else 0
+            return others + sum(cost <= most for cost in relation.costs)
+
+
+def _drawn(columns: list[list[int]], chance: Random) -> tuple[int, ...]:
+    return tuple([column[int(chance.random() * len(column))] for column in columns])
 
 
 def _forbids(constraint: Constraint) -> bool:

@@ -36,7 +36,7 @@ def rules_text() -> str:
 
 def _rule_lines(rule: Rule) -> Iterator[str]:
     yield f"  {rule.protocol}: {'; '.join(one.text for one in rule.conditions) or 'all other teams'}"
-    yield f"      {rule.why}"
+    yield f"      {rule.why}{f'; order {rule.order}' if rule.order else ''}"
 
 
 class OrderNote:

@@ -11,8 +11,9 @@ from typing import Any
 
 import pytest
 
-from robochoc.generators.coloring import coloring
+from robochoc.generators.coloring import coloring, coloring_of
 from robochoc.generators.graphs import grid, tree
+from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp, random_on
 from robochoc.generators.scenario import random_scenario
 from robochoc.model.orders import Order
@@ -171,25 +172,35 @@ PART = pkc_part("AB", (0, 0))
 
 def test_what_is_chosen() -> None:
     chosen: list[tuple[Team, dict[str, Any], str, Order | None]] = [
-        (random_csp(10, 4, 0.5, 0.3), {}, "sfb", Order.MIN_WIDTH),
-        (random_csp(10, 4, 0.5, 0.3), {"order": Order.DFS}, "sfb", Order.DFS),
-        (random_csp(10, 4, 0.5, 0.3), {"order": Order.GIVEN}, "sfb", None),
+        (random_csp(10, 4, 0.5, 0.2), {}, "abt", None),
+        (random_csp(10, 4, 0.5, 0.2), {"order": Order.DFS}, "abt", Order.DFS),
+        (random_csp(10, 4, 0.5, 0.3), {}, "sbt", Order.MAX_DEGREE),
+        (random_csp(20, 5, 0.3, 0.25), {}, "afc-ng", Order.MAX_DEGREE),
+        (random_csp(20, 5, 0.3, 0.25), {"order": Order.GIVEN}, "afc-ng", None),
+        (random_csp(20, 5, 0.3, 0.6), {}, "sfb", Order.MIN_WIDTH),
+        (random_csp(20, 5, 0.3, 0.6), {"order": Order.GIVEN}, "sfb", None),
+        (coloring_of(grid(8, 8), 3, conflicts="hard"), {}, "sbt", None),
+        (coloring(200, 3, 3.5, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
+        (coloring(200, 3, 4.5, conflicts="hard"), {}, "sfb", Order.MIN_WIDTH),
         (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MINIMUM}, "sfb", Order.DOM_DEG),
         (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MAXIMAL}, "sfb", None),
-        (random_csp(10, 4, 0.5, 0, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
+        (random_csp(10, 4, 0.5, 0, max_cost=9), {}, "dpop", None),
+        (random_csp(14, 8, 0.9, 0, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
+        (coloring(30, 3, 2), {}, "ncbb", None),
         (random_on(tree(30), 4, 0, max_cost=9), {}, "dpop", None),
-        (random_on(tree(10), 4, 0, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
+        (random_on(tree(6), 4, 0, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
         (random_on(grid(20, 20), 4, 0, max_cost=9), {}, "dsa", None),
         (random_on(grid(20, 20), 4, 0.1, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
         (coloring(400, 3, 3, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
         (pkc_pair(PART, PART), {}, "disfc", None),
         (random_scenario(random_csp(12, 5, 0.5, 0.2), 2, 0.1), {}, "dynabt", None),
         (random_scenario(random_csp(20, 3, 0.15, 0, max_cost=9), 2, 0.1), {}, "s-dpop", None),
-        (random_scenario(random_csp(12, 3, 0.2, 0, max_cost=9), 2, 0.1), {}, "sfb", None),
+        (random_scenario(random_csp(6, 3, 0.2, 0, max_cost=9), 2, 0.1), {}, "sfb", None),
         (random_scenario(random_csp(12, 5, 0.5, 0.5), 2, 0.1), {}, "sfb", None),
         (random_scenario(random_csp(30, 5, 0.2, 0.5), 2, 0.1), {}, "dynabt", None),
         (team_of({"A": range(3000), "B": range(3000)}, []), {}, "sfb", Order.MIN_WIDTH),
-        (random_on(tree(300), 300, 0.00001), {}, "afc-ng", Order.MAX_DEGREE),
+        (coloring(300, 300, 3, conflicts="hard"), {}, "abt", None),
+        (queens3d(5, "full", "rows"), {}, "afc-ng", Order.MAX_DEGREE),
         (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.1}, "gdba", None),
         (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.2}, "dsa", None),
         (random_csp(10, 4, 0.5, 0, max_cost=9), {"message_loss": 0.1}, "maxsum", None),
