@@ -306,34 +306,35 @@ class Host:
         """Encode and count all messages in the outbox. A message sent to several robots in a row is encoded once."""
         found = []
         last: Message | None = None
-        content, kind = b"", ""
+        content, kind, size = b"", "", 0
         fields: dict[str, object] = {}
-        cache, observer = self.message_cache, self._observer
+        cache, observer, name, sent = self.message_cache, self._observer, self.name, self.sent
         for (receiver, message), clock, checks in zip(
             self.protocol.outbox, self._stamps, self.checks_at_send, strict=True
         ):
             if message is not last:
                 last, kind = message, type(message).__name__
                 content = cache.content(message) if cache is not None and message.shareable else encode(message)
-                self.largest = max(self.largest, len(content))
+                size = len(content)
+                if size > self.largest:  # noqa: PLR1730 - faster
+                    self.largest = size
                 if observer:
                     fields = msgspec.structs.asdict(message)
-            self.sent[kind] = self.sent.get(kind, 0) + 1
-            self.bytes += len(content)
-            envelope = Envelope(self.name, receiver, content, clock)
+            sent[kind] = sent.get(kind, 0) + 1
+            self.bytes += size
+            found.append(Envelope(name, receiver, content, clock))
             if observer:
                 observer(
                     Sent(
                         t=self._time(checks),
-                        sender=self.name,
+                        sender=name,
                         receiver=receiver,
                         type=kind,
                         content=fields,
-                        bytes=len(content),
+                        bytes=size,
                         clock=clock,
                     )
                 )
-            found.append(envelope)
         self._forget_said()
         return found
 

@@ -8,7 +8,7 @@ bytes from an unknown source can cause is a decoding error.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar
 
 import msgspec
 
@@ -55,8 +55,11 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
         return () if self.proves_nothing else None
 
 
-class Envelope(NamedTuple):
-    """A message in transit: its sender, its receiver, its encoded content, and the sender's NCCC clock."""
+class Envelope(msgspec.Struct, frozen=True, gc=False):
+    """A message in transit: its sender, its receiver, its encoded content, and the sender's NCCC clock.
+
+    Envelopes refer to no containers, so that Python's collector of cycles need not visit them.
+    """
 
     sender: str
     receiver: str

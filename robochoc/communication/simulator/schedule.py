@@ -95,7 +95,7 @@ class Concurrent(Schedule):
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
         """Send `envelope` with a random delay. It arrives no earlier than its predecessor in the same channel."""
-        sender, receiver, _, sent_at = envelope
+        receiver, sender, sent_at = envelope.receiver, envelope.sender, envelope.clock
         reader = self._readers.get(receiver)
         if reader is None:
             reader = self._readers[receiver] = _Reader(receiver)
@@ -105,7 +105,7 @@ class Concurrent(Schedule):
             arrival = before
         reader.last_arrival[sender] = arrival
         if arrival > sent_at:
-            envelope = envelope._replace(clock=arrival)
+            envelope = Envelope(sender, receiver, envelope.content, arrival)
         inbox = reader.inbox
         first = not inbox or arrival < inbox[0][0]
         self._said += 1

@@ -13,6 +13,8 @@ import random
 from collections.abc import Sequence
 from itertools import count
 
+import msgspec
+
 from robochoc.communication.simulator.channel import NS_PER_MS, NS_PER_S, ChannelModel
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.protocols.message import Envelope
@@ -55,7 +57,7 @@ class Timed(Schedule):
 
     def lose(self, envelope: Envelope, checks: int = 0) -> None:
         """Store `envelope` like `put`. It needs time on the air, but does not arrive."""
-        self.put(envelope._replace(receiver=""), checks)
+        self.put(msgspec.structs.replace(envelope, receiver=""), checks)
 
     def wait(self) -> None:
         """Advance to the first timeout in the channel after the last robot finished."""
