@@ -10,6 +10,7 @@ ROBOCHOC_COMPILE=1: a build that cannot compile fails. ROBOCHOC_COMPILE=0: nothi
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import shlex
@@ -34,6 +35,8 @@ MYPY = ["--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
 
 ONLY_REPOSITORY = re.compile(r"<!-- repository -->.*?<!-- end -->\n*", re.DOTALL)
 ONLY_PYPI = re.compile(r"<!-- PyPI: (.*?) -->")
+STRUCTS = "_structs"
+"""The end of the names of modules with structs that the build creates."""
 RELATIVE_LINK = r"\[([^\]]*)\]\((?![a-z]+:|#)([^)\s]+)\)"
 
 
@@ -84,6 +87,7 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
                 raise RuntimeError(f"mypyc or the C compiler has failed:\n{failure}\n{NEXT}")
             return
         places = [f"{folder}*.{suffix}" for folder in ("", "robochoc/**/") for suffix in ("so", "pyd")]
+        places.append(f"robochoc/**/*{STRUCTS}.py")
         made = [path for place in places for path in self._folder.glob(place)]
         build_data["force_include"].update({str(path): str(path.relative_to(self._folder)) for path in made})
         build_data.update(pure_python=False, infer_tag=True)
@@ -111,9 +115,64 @@ def _compiled(root: Path, folder: Path, modules: list[str]) -> str:
     shutil.copytree(
         root / "robochoc", folder / "robochoc", ignore=shutil.ignore_patterns("__pycache__", "*.so", "*.pyd")
     )
+    for module in modules:
+        _move_structs(folder.joinpath(*module.split(".")).with_suffix(".py"), module)
     words = [sys.executable, __file__, *modules]
     done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - ourselves
     return "" if done.returncode == 0 else done.stdout + done.stderr
+
+
+def _move_structs(path: Path, module: str) -> None:
+    """Move the structs of msgspec in a module (messages, settings) into a module that is not compiled.
+
+    mypyc cannot create them. The names at the top level that they use are moved, too. Lines keep their numbers.
+    """
+    text = path.read_text(encoding="utf-8")
+    kept, moved = split_structs(text, f"{module}{STRUCTS}")
+    if moved:
+        path.write_text(kept, encoding="utf-8")
+        path.with_name(f"{path.stem}{STRUCTS}.py").write_text(moved, encoding="utf-8")
+
+
+def split_structs(text: str, name: str) -> tuple[str, str]:
+    """Return the source `text` without its structs, which it imports from the module `name`, and that module's source.
+
+    A class is a struct if its statement has keywords, such as `frozen=True`. The second text is empty without structs.
+    """
+    body = ast.parse(text).body
+    defined = {name: one for one in body for name in _defined(one)}
+    structs = [one for one in body if isinstance(one, ast.ClassDef) and one.keywords]
+    moved: dict[str, ast.stmt] = {}
+    waiting = [one.name for one in structs]
+    while waiting:
+        one = moved[waiting[-1]] = defined[waiting[-1]]
+        used = {node.id for node in ast.walk(one) if isinstance(node, ast.Name)}
+        waiting = [*waiting[:-1], *(name for name in used if name in defined and name not in moved)]
+    lines = text.splitlines()
+    imports = [one for one in body if isinstance(one, ast.Import | ast.ImportFrom | ast.If)]
+    parts = [*imports, *sorted({id(one): one for one in moved.values()}.values(), key=lambda one: one.lineno)]
+    found = ["\n".join(lines[_first_line(one) - 1 : one.end_lineno]) for one in parts]
+    for one in parts[len(imports) :]:
+        for number in range(_first_line(one) - 1, one.end_lineno or 0):
+            lines[number] = ""
+    if not structs:
+        return text, ""
+    last = imports[-1].end_lineno or 0
+    lines[last] = f"from {name} import {', '.join(sorted(moved))}"
+    return "\n".join(lines) + "\n", "\n".join(found) + "\n"
+
+
+def _defined(one: ast.stmt) -> list[str]:
+    """Return the names that a statement at the top level defines."""
+    if isinstance(one, ast.ClassDef | ast.FunctionDef):
+        return [one.name]
+    targets = one.targets if isinstance(one, ast.Assign) else [one.target] if isinstance(one, ast.AnnAssign) else []
+    return [target.id for target in targets if isinstance(target, ast.Name)]
+
+
+def _first_line(one: ast.stmt) -> int:
+    decorators = one.decorator_list if isinstance(one, ast.ClassDef | ast.FunctionDef) else []
+    return min([one.lineno, *(decorator.lineno for decorator in decorators)])
 
 
 def _compile_here(modules: list[str]) -> None:
@@ -122,7 +181,7 @@ def _compile_here(modules: list[str]) -> None:
     from setuptools import Distribution, Extension  # noqa: PLC0415 - the same
 
     files = [f"{module.replace('.', '/')}.py" for module in modules]
-    extensions = mypycify([*MYPY, *files], group_name="robochoc", debug_level="0")
+    extensions = mypycify([*MYPY, *files], group_name="robochoc", opt_level="2", debug_level="0")
     flags = KERNELS_FLAGS if sys.platform != "win32" else []
     extensions.append(Extension(KERNELS, [f"{KERNELS.replace('.', '/')}.c"], extra_compile_args=flags))
     command = Distribution({"ext_modules": extensions}).get_command_obj("build_ext")

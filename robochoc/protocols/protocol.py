@@ -19,7 +19,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.local_problem import LocalProblem
-from robochoc.system.compiling import mypyc_attr
+from robochoc.system.compiling import mypyc_attr, separate_subclass_cache
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -41,6 +41,10 @@ class Protocol(ABC):
     """Draws a number of the given bit length, for keys (`protocols/key_stream.py`); set by the host before `start`."""
     numbered_values: ClassVar[bool] = False
     """True if robots never receive the values of other robots, only indices of assignments; `view` contains these."""
+
+    def __init_subclass__(cls, **options: Any) -> None:  # noqa: ANN401 - of any class
+        super().__init_subclass__(**options)
+        separate_subclass_cache(cls)
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem

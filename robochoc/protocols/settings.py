@@ -43,8 +43,7 @@ class HasSettings(typing.Protocol):
 def equip(protocol: HasSettings, given: Mapping[str, str]) -> None:
     """Apply the `given` settings to one robot's protocol. Raises `SettingsError`."""
     if given:
-        # mypyc treats settings as an attribute of the class, not of its objects. Protocols with settings are not
-        # compiled.
+        # mypyc treats settings as an attribute of the class: only `setattr` stores them on an object.
         setattr(protocol, "settings", read_settings(type(protocol), given))  # noqa: B010
 
 

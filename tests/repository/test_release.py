@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
 import re
+import sys
 import tomllib
 import zipfile
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
+import msgspec
 import pytest
 import yaml
 from hatchling.metadata.core import ProjectMetadata
 from hatchling.plugin.manager import PluginManager
 
-from hatch_build import long_description
+from hatch_build import long_description, split_structs
 from robochoc import __version__
 from tests.support.extra_imports import imports_of, modules_for
 from tests.support.program import ROOT
@@ -188,3 +193,33 @@ def test_a_wheel_that_has_grown_is_noticed(tmp_path: Path, monkeypatch: pytest.M
     wheel = wheel_with(PURE, __version__, tmp_path, "robochoc/__init__.py")
     assert [*too_large([wheel])] == []
     assert [*too_large([wheel_with(PURE, __version__, tmp_path, *"abcdefgh")])] != []
+
+
+@pytest.mark.parametrize("module", PROJECT["tool"]["hatch"]["build"]["targets"]["wheel"]["hooks"]["custom"]["modules"])
+def test_structs_of_compiled_modules_are_the_same_in_a_module_of_their_own(
+    module: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / module.replace(".", "/")).with_suffix(".py").read_text()
+    kept, moved = split_structs(text, f"{module}_structs")
+    alone = ModuleType(f"{module}_structs")
+    monkeypatch.setitem(sys.modules, alone.__name__, alone)
+    exec(moved, alone.__dict__)  # noqa: S102 - our own source
+    whole = importlib.import_module(module)
+    structs = {name: kind for name, kind in vars(whole).items() if _is_struct(kind) and kind.__module__ == module}
+    for name, kind in structs.items():
+        again = getattr(alone, name)
+        assert again.__struct_fields__ == kind.__struct_fields__
+        for option in ("frozen", "tag", "array_like", "order", "gc", "forbid_unknown_fields"):
+            assert getattr(again.__struct_config__, option) == getattr(kind.__struct_config__, option)
+        assert {field.name: str(field.type).replace("_structs.", ".") for field in msgspec.structs.fields(again)} == {
+            field.name: str(field.type) for field in msgspec.structs.fields(kind)
+        }
+    lines = {one.lineno: ast.dump(one) for one in ast.parse(text).body}
+    imports = [f"from {module}_structs import"] if structs else []
+    left = [one for one in ast.parse(kept).body if lines.get(one.lineno) != ast.dump(one)]
+    assert [ast.unparse(one).partition(" import")[0] + " import" for one in left] == imports
+    assert not any(isinstance(one, ast.ClassDef) and one.keywords for one in ast.parse(kept).body)
+
+
+def _is_struct(kind: object) -> bool:
+    return isinstance(kind, type) and issubclass(kind, msgspec.Struct)
