@@ -54,7 +54,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, ClassVar, TypeVar, assert_never, cast
+from typing import Annotated, Any, ClassVar, TypeVar, assert_never, cast
 
 import msgspec
 
@@ -88,6 +88,7 @@ from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted, listed
 from robochoc.system.stored_arrays import free_disk_bytes
 
@@ -278,6 +279,7 @@ Scope = tuple[str, ...]
 T = TypeVar("T")
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class DPOP(TreeProtocol):
     """One agent of DPOP.
 
@@ -289,8 +291,8 @@ class DPOP(TreeProtocol):
     - `optimum`: the cost of the whole tree (at its root).
     """
 
-    messages = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
-    traits = Traits(
+    messages: ClassVar[Any] = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
         costs=True,

@@ -58,7 +58,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
@@ -71,6 +71,7 @@ from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domai
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, costs_text
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 MAX_SPLIT = 0.5
 """With this share, both halves of a function are equal."""
@@ -136,6 +137,7 @@ def _rows_in_words(rows: Sequence[Row]) -> str:
     return "; ".join(map(costs_text, rows[:4]))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class FactorGraphProtocol(CycleProtocol):
     """The common base of Max-Sum and Max-Sum_AD: a variable, and the functions whose lowest robot is this one.
 
@@ -163,6 +165,7 @@ class FactorGraphProtocol(CycleProtocol):
         self.listen(self.above, self._receive_domains)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MaxSum(FactorGraphProtocol):
     """One agent of Max-Sum.
 
@@ -170,9 +173,9 @@ class MaxSum(FactorGraphProtocol):
     of each robot below.
     """
 
-    messages = Domain | R | Q | AnytimeMessage
+    messages: ClassVar[Any] = Domain | R | Q | AnytimeMessage
     settings: ClassVar[MaxSumSettings] = MaxSumSettings()
-    traits = Traits(
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Farinelli, Rogers, Petcu, Jennings 2008",
         complete=False,

@@ -49,7 +49,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, ClassVar, assert_never, cast
+from typing import Annotated, Any, ClassVar, assert_never, cast
 
 import msgspec
 import numpy as np
@@ -87,6 +87,7 @@ from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted, listed
 
 
@@ -168,6 +169,7 @@ class Context(Message, frozen=True):
 Sizes = dict[str, int]
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MBDPOP(DPOP):
     """One agent of MB-DPOP.
 
@@ -179,8 +181,8 @@ class MBDPOP(DPOP):
     - `context`: the current values, as indices, of the robots in these lists.
     """
 
-    messages = TreeMessage | DomainAtDepth | Label | Proceed | Context | UTIL | VALUE
-    traits = Traits(
+    messages: ClassVar[Any] = TreeMessage | DomainAtDepth | Label | Proceed | Context | UTIL | VALUE
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2007",
         costs=True,

@@ -36,7 +36,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import ClassVar, assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 import numpy as np
 
@@ -51,6 +51,7 @@ from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import listed
 
 
@@ -96,6 +97,7 @@ class Done(Message, frozen=True):
         return "nothing else is possible in my subtree"
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ODPOP(DPOP):
     """One agent of O-DPOP.
 
@@ -106,8 +108,8 @@ class ODPOP(DPOP):
     - `optimum`: at the root, a lower bound on the cost of its tree; at the end, the optimum.
     """
 
-    messages = TreeMessage | Domain | Dimensions | Proceed | Ask | Good | Done | VALUE
-    traits = Traits(
+    messages: ClassVar[Any] = TreeMessage | Domain | Dimensions | Proceed | Ask | Good | Done | VALUE
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2006",
         costs=True,

@@ -44,13 +44,14 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from robochoc.protocols.message import Message
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.local_problem import LexicographicCost
+from robochoc.system.compiling import mypyc_attr
 
 
 class DSASettings(CycleSettings, frozen=True):
@@ -65,6 +66,7 @@ class DSASettings(CycleSettings, frozen=True):
             raise ValueError(f"probability is {self.probability:g}; it must be more than 0 and at most 1")
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class OnePhase(CycleProtocol):
     """The common base of searches with one phase: all robots send their values, and each chooses its next value."""
 
@@ -84,6 +86,7 @@ class OnePhase(CycleProtocol):
             self.exchange_values(self._choose)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class StochasticSearch(OnePhase):
     """The common base of DSA and its variants: each robot moves with some probability."""
 
@@ -107,12 +110,13 @@ class StochasticSearch(OnePhase):
         return now != (0, self.problem.charges[self.present])
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class DSA(StochasticSearch):
     """One agent of DSA. A cycle has one phase: all robots send their values."""
 
-    messages = Value | AnytimeMessage
+    messages: ClassVar[Any] = Value | AnytimeMessage
     settings: ClassVar[DSASettings] = DSASettings()
-    traits = Traits(
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",
         complete=False,

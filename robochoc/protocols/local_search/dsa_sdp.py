@@ -42,13 +42,14 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from robochoc.protocols.local_search.dsa import StochasticSearch
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.local_problem import LexicographicCost
+from robochoc.system.compiling import mypyc_attr
 
 
 class DSASDPSettings(CycleSettings, frozen=True):
@@ -75,12 +76,13 @@ class DSASDPSettings(CycleSettings, frozen=True):
             raise ValueError(f"period is {self.period}; it must be 1 or more")
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class DSASDP(StochasticSearch):
     """One agent of DSA-SDP. A cycle has one phase: all robots send their values."""
 
-    messages = Value | AnytimeMessage
+    messages: ClassVar[Any] = Value | AnytimeMessage
     settings: ClassVar[DSASDPSettings] = DSASDPSettings()
-    traits = Traits(
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Zivan, Okamoto, Peled 2014",
         complete=False,

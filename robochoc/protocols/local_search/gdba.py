@@ -46,7 +46,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
@@ -59,6 +59,7 @@ from robochoc.protocols.wording import Wording
 from robochoc.solver.encoding import Cost
 from robochoc.solver.local_problem import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.shared_constraint import OtherValues
+from robochoc.system.compiling import mypyc_attr
 
 
 class GDBASettings(CycleSettings, frozen=True):
@@ -92,15 +93,16 @@ MOST = 1 << 62
 """The largest reduction that is sent: effective costs may exceed the integers of a message."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class GDBA(Gainers):
     """One agent of GDBA. A cycle has two phases: all robots send their values, then their reductions.
 
     `raised` are the modifiers: for each constraint, by its number, the number of raises of its entries.
     """
 
-    messages = Value | Improve | AnytimeMessage
+    messages: ClassVar[Any] = Value | Improve | AnytimeMessage
     settings: ClassVar[GDBASettings] = GDBASettings()
-    traits = Traits(
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Okamoto, Zivan, Nahon 2016",
         complete=False,

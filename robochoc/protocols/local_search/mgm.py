@@ -38,6 +38,7 @@ Choices that the paper leaves open:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
@@ -47,6 +48,7 @@ from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.local_problem import LexicographicCost, LocalProblem
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted, listed
 
 
@@ -71,6 +73,7 @@ class Gain(wire.Message, frozen=True):
         return f"my move would save {saving_in_words(self.broken, self.cost)}"
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Gainers(CycleProtocol):
     """The common base of MGM, MGM-2 and GDBA: a cycle begins with values, and gains decide which neighbour moves.
 
@@ -104,11 +107,12 @@ class Gainers(CycleProtocol):
         )
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MGM(Gainers):
     """One agent of MGM. A cycle has two phases: all robots send their values, then their gains."""
 
-    messages = Value | Gain | AnytimeMessage
-    traits = Traits(
+    messages: ClassVar[Any] = Value | Gain | AnytimeMessage
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,

@@ -46,7 +46,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from robochoc.protocols import acts
 from robochoc.protocols import message as wire
@@ -59,6 +59,7 @@ from robochoc.protocols.shared.cycles import NO_GAIN, CycleSettings, Domain, The
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
 from robochoc.solver.local_problem import LexicographicCost, LocalProblem
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted
 
 
@@ -192,12 +193,13 @@ class JointMove(NamedTuple):
     place: int
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MGM2(Gainers):
     """One agent of MGM-2. State: neighbours' `domains`, the `view`, and the `partner` that it is committed to."""
 
-    messages = Domain | Value | Offer | Accept | Reject | Gain | Go | AnytimeMessage
+    messages: ClassVar[Any] = Domain | Value | Offer | Accept | Reject | Gain | Go | AnytimeMessage
     settings: ClassVar[MGM2Settings] = MGM2Settings()
-    traits = Traits(
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Maheswaran, Pearce, Tambe 2004",
         complete=False,

@@ -39,13 +39,14 @@ a cost; the same constraint may be both. First values are random, and constraint
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar, Literal
+from typing import Any, ClassVar, Literal
 
 from robochoc.protocols.local_search.dsa import StochasticSearch
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleSettings, Value, gain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.local_problem import LexicographicCost
+from robochoc.system.compiling import mypyc_attr
 
 
 class MixedDSASettings(CycleSettings, frozen=True):
@@ -65,12 +66,13 @@ class MixedDSASettings(CycleSettings, frozen=True):
                 raise ValueError(f"{name} is {getattr(self, name):g}; it must be more than 0 and at most 1")
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class MixedDSA(StochasticSearch):
     """One agent of MixedDSA. A cycle has one phase: all robots send their values."""
 
-    messages = Value | AnytimeMessage
+    messages: ClassVar[Any] = Value | AnytimeMessage
     settings: ClassVar[MixedDSASettings] = MixedDSASettings()
-    traits = Traits(
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Zhang, Wang, Xing, Wittenburg 2005; Rust, Picard, Ramparany 2016",
         complete=False,

@@ -64,6 +64,7 @@ from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
 class ADOPTkSettings(BnBADOPTSettings, frozen=True):
@@ -97,6 +98,7 @@ class Value(bnb_adopt.Value, frozen=True):
         return f"{change}; try other values once yours costs k more than {cost_text(self.allowance)}{dear}"
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ADOPTk(BnBADOPT):
     """One agent of ADOPT(k). State besides that of BnB-ADOPT: `allowance` (TH^A), and the children's shares of it, `t`.
 

@@ -56,7 +56,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
@@ -87,6 +87,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text, costs_text, incumbent_text
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted
 
 
@@ -212,6 +213,7 @@ class Terminate(Message, frozen=True):
         return [HasValue(robot, value) for robot, value in zip(reception.order, best.values, strict=False)]
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AFB(Protocol):
     """One agent of AFB. State: the strongest known CPA (`assignments`), this robot's `counter`, and `bound` (B).
 
@@ -224,8 +226,8 @@ class AFB(Protocol):
     `solution` is the best solution that this robot knows.
     """
 
-    messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate
-    traits = Traits(
+    messages: ClassVar[Any] = CPA | FBCPA | FBEstimate | NewSolution | Terminate
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Gershman, Meisels & Zivan 2009",
         costs=True,

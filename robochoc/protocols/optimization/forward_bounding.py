@@ -26,6 +26,7 @@ from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CostsAbove:
     """The costs of this robot's values with the robots above, which ask one after the other, the highest first.
 

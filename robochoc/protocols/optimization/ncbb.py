@@ -40,7 +40,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import acts
@@ -64,6 +64,7 @@ from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
 class Greedy(Message, frozen=True):
@@ -92,11 +93,12 @@ class Search(Message, frozen=True):
         return f"search your subtree {allowance(self.bound)}"
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class NCBB(ForwardBoundingProtocol):
     """One agent of NCBB. State besides the search: `greedy_view`, and the `greedy` results of the children."""
 
-    messages = TreeMessage | Members | Greedy | Request | Report | Search | Result | Terminate
-    traits = Traits(
+    messages: ClassVar[Any] = TreeMessage | Members | Greedy | Request | Report | Search | Result | Terminate
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Chechetka & Sycara 2006",
         costs=True,

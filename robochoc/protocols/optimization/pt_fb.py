@@ -43,7 +43,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
@@ -54,6 +54,7 @@ from robochoc.protocols.optimization.forward_bounding import ForwardBoundingProt
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import listed
 
 
@@ -92,11 +93,12 @@ class Reduce(Message, frozen=True):
         return f"search on, {allowance(self.bound)}" if self.bound else "search no further"
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class PTFB(ForwardBoundingProtocol):
     """One agent of PT-FB."""
 
-    messages = TreeMessage | Members | Request | Report | CPA | Reduce | Result | Terminate
-    traits = Traits(
+    messages: ClassVar[Any] = TreeMessage | Members | Request | Report | CPA | Reduce | Result | Terminate
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Litov & Meisels 2017",
         costs=True,

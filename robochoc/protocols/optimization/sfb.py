@@ -67,6 +67,7 @@ from robochoc.protocols.optimization.sfb_bits import ForwardBits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.encoding import Cost
 from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.local_problem import LocalProblem
 
@@ -93,6 +94,7 @@ from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Run, cut_off
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.wording import Wording, along, cost_text, incumbent_text
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted, listed
 
 MIB = 1 << 20
@@ -383,6 +385,7 @@ _last_known: KnownSolution | None = None
 """The last solution that a robot in this process has received or found."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SFB(Protocol):
     """One agent. State: the `batches` to explore, the oldest first, and the `best` solution.
 
@@ -395,8 +398,8 @@ class SFB(Protocol):
     """
 
     bounds: Bounds
-    messages = Above | Below | CPAs | Explored | Solution
-    traits = Traits(
+    messages: ClassVar[Any] = Above | Below | CPAs | Explored | Solution
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009",
         synchronous=True,
@@ -605,12 +608,12 @@ class SFB(Protocol):
         return Findings(self.incumbent, bound)
 
 
-def _as_integer(cost: float) -> float:
+def _as_integer(cost: Cost) -> Cost:
     """Return `cost` as an integer if it is finite: integers take fewer bytes in a message."""
     return cost if cost == math.inf else int(cost)
 
 
-def _is_charge(cost: float) -> bool:
+def _is_charge(cost: Cost) -> bool:
     """Return whether `cost` is infinite, or an integer of 0 or more."""
     return cost == math.inf or (cost >= 0 and cost == int(cost))
 

@@ -37,7 +37,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 import msgspec
 
@@ -51,6 +51,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text, incumbent_text
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 Cost = int | float
 
@@ -132,14 +133,15 @@ def best_proves(best: BestPath, reception: Reception) -> list[Proof]:
     return [Total(dict(zip(reception.order, best.values, strict=False)), best.bound)] if best.values else []
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SyncBB(Protocol):
     """One agent of SyncBB. State: the last `path` and its cost (`paid`), and the `best` path.
 
     `over`: whether this robot knows that the best path is optimal.
     """
 
-    messages = Path | Backtrack | Terminate
-    traits = Traits(
+    messages: ClassVar[Any] = Path | Backtrack | Terminate
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Hirayama & Yokoo 1997",
         synchronous=True,

@@ -33,6 +33,7 @@ from robochoc.protocols.settings import Settings
 from robochoc.protocols.shared.anytime import Anytime, Best, Paid, Place, Step
 from robochoc.protocols.wording import Wording
 from robochoc.solver.local_problem import LexicographicCost, LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
 class CycleCount(Settings, frozen=True):
@@ -89,6 +90,7 @@ Then = Callable[[Mapping[str, wire.Message]], None]
 """Called with one message from each robot passed to `listen`, in the order of these robots, without lost messages."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CycleProtocol(Protocol):
     """One agent in a synchronous local search. Its state is the current `cycle`, and its value in this cycle.
 
