@@ -19,6 +19,8 @@ from measure import ROOT, RUNS, say
 from report import Row, Section
 
 PURE = "pure:"
+COMPILED = "ROBOCHOC_BENCH_COMPILED"
+"""The environment variable with the folder of a compiled robochoc (`site-packages`); without it, only this checkout."""
 Problem = Mapping[str, int | float | str]
 """The arguments of `random_csp`, or of `coloring` if there are `colors`, in the order min-width."""
 HARD: Problem = {"agents": 20, "domain": 10, "density": 0.25, "tightness": 0.6, "seed": 1, "connected": True}
@@ -39,7 +41,15 @@ PROBLEMS = {
     "dpop": COSTLY,
     "dsa": LARGE,
     "mgm": LARGE,
+    "mgm2": LARGE,
+    "gdba": LARGE,
     "maxsum": LARGE,
+    "mb-dpop": COSTLY,
+    "o-dpop": COSTLY,
+    "adopt-k": COSTLY,
+    "syncbb": COSTLY,
+    "ncbb": COSTLY,
+    "pt-fb": COSTLY,
 }
 """The protocols that are measured when none is named, and on what."""
 PROGRAM = """
@@ -101,8 +111,9 @@ def measured() -> Section:
     """A row for each protocol."""
     notes = (
         "Schedule concurrent, no delays, one process; the search alone, up to 50,000 messages, the least of "
-        f"{RUNS} times half a second. ABT, AFC-ng and SFB: `{_call(HARD)}`. ADOPT, BnB-ADOPT and DPOP: "
-        f"`{_call(COSTLY)}`. DSA, MGM, Max-Sum, 20 cycles: `{_call(LARGE)}`. "
+        f"{RUNS} times half a second, plain Python and compiled in turns (`{COMPILED}` is the `site-packages` with the "
+        f"wheel). ABT, AFC-ng and SFB: `{_call(HARD)}`. ADOPT, DPOP and the other complete protocols with costs: "
+        f"`{_call(COSTLY)}`. DSA, MGM, MGM-2, GDBA, Max-Sum, 20 cycles: `{_call(LARGE)}`. "
         "`python benchmarks/messages.py --tree . --tree OTHER` compares two checkouts. SFB over the size of the team: "
         "3-colouring, hard conflicts, degree 3, order min-width."
     )
@@ -111,7 +122,9 @@ def measured() -> Section:
         ("robots", *growing[0][0][1:]),
         *((f"{n:,}", *rows[1][1:]) for n, rows in zip(SIZES, growing, strict=True)),
     ]
-    tables = _table(costs(PROBLEMS, [str(ROOT)], RUNS), ["us CPU"]), by_size
+    compiled = os.environ.get(COMPILED)
+    trees, heads = ([str(ROOT), compiled], ["us CPU", "compiled"]) if compiled else ([str(ROOT)], ["us CPU"])
+    tables = _table(costs(PROBLEMS, trees, RUNS), heads), by_size
     return Section("messages", "What a message costs", notes, tables, ("By protocol", "SFB by the size of the team"))
 
 
