@@ -88,7 +88,7 @@ def run(protocol: type[Protocol], parts: Parts, number: int = -1, content: bytes
     while waiting and len(taken) < MOST:
         envelope = waiting.popleft()
         if len(taken) == number:
-            envelope = envelope._replace(content=content)
+            envelope = msgspec.structs.replace(envelope, content=content)
         taken.append(envelope)
         if envelope.receiver in hosts:  # runtimes refuse others
             waiting.extend(hosts[envelope.receiver].handle([envelope]))

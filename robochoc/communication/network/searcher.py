@@ -269,10 +269,11 @@ class Searcher(RobotLoop):
         super().receive(packet)
 
     def _transmit(self, envelopes: Sequence[Envelope]) -> None:
-        for _, receiver, content, clock in envelopes:
+        for envelope in envelopes:
             # Another robot may have set this clock.
-            self._context.send(receiver, ProtocolMessage(self.epoch, min(clock, LATEST), content))
-            self._sent_to[receiver] += 1
+            message = ProtocolMessage(self.epoch, min(envelope.clock, LATEST), envelope.content)
+            self._context.send(envelope.receiver, message)
+            self._sent_to[envelope.receiver] += 1
 
     # Reports
 

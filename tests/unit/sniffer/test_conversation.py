@@ -92,18 +92,20 @@ def test_what_no_robot_would_send_is_no_envelope() -> None:
 def test_what_is_no_message_has_no_acl_message() -> None:
     for content in (b"", b"\xc0", encode(Ok((3,)))[:-1], b"\x91" * 100_000):
         with pytest.raises(ACLError, match="not a message of abt"):
-            conversation().acl_of(OK._replace(content=content), 1)
+            conversation().acl_of(msgspec.structs.replace(OK, content=content), 1)
 
 
 def test_bounds_that_are_infinite_are_words() -> None:
     from robochoc.protocols.optimization.adopt_messages import Cost  # noqa: PLC0415
 
-    acl = returned(conversation("adopt"), OK._replace(content=encode(Cost({"R1": ((2, None), 5)}, 0, math.inf))), 1)
+    acl = returned(
+        conversation("adopt"), msgspec.structs.replace(OK, content=encode(Cost({"R1": ((2, None), 5)}, 0, math.inf))), 1
+    )
     assert acl.content == '["Cost",{"context":{"R1":[[2,null],5]},"lb":0,"ub":{"float":"inf"}}]'
 
 
 def test_names_that_look_like_marks_are_told_apart() -> None:
-    acl = returned(conversation(), OK._replace(content=encode(Nogood({"base64": (1,)}, (2,)))), 1)
+    acl = returned(conversation(), msgspec.structs.replace(OK, content=encode(Nogood({"base64": (1,)}, (2,)))), 1)
     assert acl.content == '["Nogood",{"lhs":{"map":[["base64",[1]]]},"value":[2]}]'
 
 
@@ -147,13 +149,13 @@ USERS_MESSAGES = [
 def test_messages_of_users_protocols_travel_too() -> None:
     for message, language in USERS_MESSAGES:
         talk = Conversation(UsersNamed if isinstance(message, Named) else Users, "users", PLATFORM, "run-1")
-        acl = returned(talk, OK._replace(content=encode(message)), 1)
+        acl = returned(talk, msgspec.structs.replace(OK, content=encode(message)), 1)
         assert (acl.language, acl.performative) == (language, Performative.INFORM)
 
 
 def test_a_content_in_other_words_than_ours_travels_as_it_is() -> None:
     long_form = b"\x92\xa2Ok\x91\xd3" + (3).to_bytes(8, "big")
-    assert returned(conversation(), OK._replace(content=long_form), 1).language == "msgpack"
+    assert returned(conversation(), msgspec.structs.replace(OK, content=long_form), 1).language == "msgpack"
 
 
 def test_a_platform_needs_a_name_without_an_at() -> None:
