@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 PATIENCE_S = 1.0
 """Seconds in which further signals count as the first (two Ctrl-C, `timeout` and a shell). Later ones force an end."""
-YOUNG_OBJECTS = 10_000
+YOUNG_OBJECTS = 50_000
 """The number of new objects that starts a garbage collection. With Python's 700, imports start 40 that free nothing."""
 _RETRY_S = 0.01
 _STOPPING = (signal.SIGINT, signal.SIGTERM)

@@ -13,7 +13,6 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from importlib.machinery import PathFinder
-from pathlib import Path
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
@@ -95,11 +94,13 @@ def _folders() -> Iterator[str]:
 
 def _in_folder(folder: str, group: str) -> Iterator[FoundEntryPoint]:
     try:
-        text = Path(folder, _FILE).read_text(encoding="utf-8")
+        with open(f"{folder}{os.sep}{_FILE}", "rb", buffering=0) as file:  # noqa: PTH123 - a path takes six times as long
+            content = file.read()
+        text = content.decode() if group.encode() in content else ""
     except (OSError, ValueError):
         return
     section = ""
-    for line in map(str.strip, text.splitlines() if group in text else ()):
+    for line in map(str.strip, text.splitlines()):
         if line.startswith("[") and line.endswith("]"):
             section = line[1:-1]
         elif section == group and line and not line.startswith("#"):

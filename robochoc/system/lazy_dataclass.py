@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import MISSING, Field, FrozenInstanceError
 from typing import TYPE_CHECKING, Any
 
@@ -61,9 +62,25 @@ class _OnFirstUse:
             twin, options = type(name, (), {"__doc__": name}), self._options
         return vars(dataclasses.dataclass(twin, **options))[self._name]
 
+    def _fields(self) -> Sequence[Field[Any]]:
+        """Return the fields like `dataclasses`, which would search each annotation for its markers three times."""
+        own: dict[str, str] = self._body.get("__annotations__", {})
+        marked = any(mark in str(text) for text in own.values() for mark in ("ClassVar", "InitVar", "KW_ONLY"))
+        if marked or any(hasattr(base, "__dataclass_fields__") for base in self._cls.__bases__):
+            return dataclasses.fields(self._cls)
+        found = []
+        for name, text in own.items():
+            value = self._body.get(name, MISSING)
+            one: Field[Any] = value if isinstance(value, Field) else dataclasses.field(default=value)
+            one.name, one.type = name, text
+            if one.kw_only is MISSING:
+                one.kw_only = self._options.get("kw_only", False)
+            found.append(one)
+        return found
+
     def _init(self) -> Any:  # noqa: ANN401 - a function
         """Compile `__init__`. `dataclasses` would compile two further methods with it."""
-        fields = dataclasses.fields(self._cls)
+        fields = self._fields()
         space: dict[str, Any] = {_SET: object.__setattr__, _UNSET: _Unset(), "__name__": self._cls.__module__}
         lines, parameters = [], ["self"]
         for field in fields:

@@ -12,7 +12,6 @@ import signal
 import socket
 import sys
 import time
-import traceback
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -351,6 +350,8 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
     except UnsupportedError as refusal:
         link.send(RobotFailed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
     except Exception as error:  # noqa: BLE001 - the parent has to know of any error
+        import traceback  # noqa: PLC0415 - start-up
+
         where = traceback.extract_tb(error.__traceback__)[-1]
         link.send(RobotFailed(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})"))
     link.finish()

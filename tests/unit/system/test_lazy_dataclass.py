@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import KW_ONLY, FrozenInstanceError, field
 from importlib import import_module
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 
@@ -43,6 +43,7 @@ def classes(decorator: Callable[..., Any]) -> list[Any]:
 
     @decorator(frozen=True, kw_only=True, repr=False)
     class Options:  # noqa: PLW1641 - made by the decorator
+        common: ClassVar[int] = 3
         left: int = 1
         right: int
 
