@@ -18,7 +18,6 @@ from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_byt
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 from robochoc.formats.problems import read_problem
-from robochoc.generators.families import FAMILIES
 from robochoc.generators.scenario import random_scenario
 from robochoc.journal.events import combined
 from robochoc.model.cost_units import Cost, common_units
@@ -115,6 +114,8 @@ def team_of(problem: ProblemSpec) -> Team:
         ValueError: if the family has no problem with these parameters.
     """
     if problem.family:
+        from robochoc.generators.families import FAMILIES  # noqa: PLC0415 - start-up: the application's pages
+
         team = FAMILIES[problem.family](**problem.parameters)
     else:
         options: dict[str, Any] = {key: one for key, one in problem.parameters.items() if key != "instance"}

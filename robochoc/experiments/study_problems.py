@@ -15,7 +15,6 @@ from robochoc.experiments.study_file import HINT, Place
 from robochoc.experiments.task import ProblemSpec
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.team_reader import find_teams
-from robochoc.generators.families import FAMILIES, parameters_of, required_of
 
 PROBLEM_KEYS = ("family", "path", "name", "scenario", "infinity", "owner")
 _SCENARIO: Mapping[str, tuple[type, ...]] = {
@@ -46,6 +45,8 @@ def problems_of(table: Mapping[str, Any], place: Place) -> Iterator[ProblemSpec]
         raise place.mistake("name", f"expected one line of text, got {shortened(str(name))}")
     rest = {key: value for key, value in table.items() if key not in {"family", "path", "name", "scenario"}}
     if ("family" in table) == ("path" in table):
+        from robochoc.generators.families import FAMILIES  # noqa: PLC0415 - start-up: numpy, for maps
+
         families = ", ".join(FAMILIES)
         raise place.mistake("", f"expected either family (one of {families}) or path (folders of teams, files)")
     if "family" in table:
@@ -79,6 +80,8 @@ def _scenarios(table: Mapping[str, Any], place: Place) -> Iterable[dict[str, Any
 
 
 def _of_family(family: object, given: Mapping[str, Any], name: str, place: Place) -> Iterator[ProblemSpec]:
+    from robochoc.generators.families import FAMILIES, parameters_of, required_of  # noqa: PLC0415 - as above
+
     if not isinstance(family, str) or family not in FAMILIES:
         raise place.mistake(
             "family", f"there is no family {shortened(str(family))}", f"there are {', '.join(FAMILIES)}"

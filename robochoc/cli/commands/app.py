@@ -9,6 +9,7 @@ import click
 
 from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import USAGE, Failure
+from robochoc.system.garbage import collection_paused
 
 
 @click.command()
@@ -29,7 +30,8 @@ def app(port: int, folder: Path | None, *, no_open: bool) -> None:
     robochoc app
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     try:
-        from robochoc.app.server import serve_app
+        with collection_paused():  # the imports create 100,000 objects
+            from robochoc.app.server import serve_app
     except ModuleNotFoundError as missing:
         if not missing.name or missing.name.partition(".")[0] not in {"nicegui", "fastapi", "uvicorn"}:
             raise
