@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import app_pages
+import array_cluster
 import auctions
 import choice
 import command_time
@@ -58,6 +59,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "choice": choice.measured,
     "wide": wide_tables.measured,
     "growth": scale.measured,
+    "cluster": array_cluster.measured,
     "mujoco": other_flight.mujoco,
     "rotorpy": other_flight.rotorpy,
 }

@@ -31,4 +31,8 @@ def run_in_threads(blocks: Sequence[Block], run: Callable[[Block, Channel], Bloc
     numbers = range(len(blocks))
     queues = {(one, other): SimpleQueue[bytes]() for one in numbers for other in numbers}
     with ThreadPoolExecutor(len(blocks)) as pool:
-        return list(pool.map(lambda block: run(block, ThreadChannel(block.number, queues)), blocks))
+        futures = [pool.submit(run, block, ThreadChannel(block.number, queues)) for block in blocks]
+    errors = [error for future in futures if (error := future.exception())]
+    for error in sorted(errors, key=lambda error: isinstance(error, BlockLostError)):
+        raise error
+    return [future.result() for future in futures]

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import Flags, Integers
-from robochoc.communication.arrays.border import Border, Item
+from robochoc.communication.arrays.border import Border, Item, Shared
 from robochoc.communication.arrays.cycle_run import CycleChange, CycleRun, cycles_of
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import ArrayLayout, IntegerCosts, cost_form
@@ -115,8 +115,10 @@ class BlockReport:
     changes: list[CycleChange] | None
 
 
-def split_team(description: Description, many: int) -> list[Block]:
+def split_team(description: Description, many: int, *, functions: bool = False) -> list[Block]:
     """Split a team into at most `many` blocks of similar size with few links between them.
+
+    `functions`: true if blocks also need the constraints of lower robots in other blocks with their own robots.
 
     Raises:
         UnsupportedError: if the costs are too large.
@@ -130,7 +132,7 @@ def split_team(description: Description, many: int) -> list[Block]:
     parts = []
     for number in range(number_of_blocks):
         own = np.flatnonzero(blocks == number)
-        held = [(one, np.flatnonzero(blocks[one.owners] == number)) for one in description.held]
+        held = [(one, np.flatnonzero(_held_by(one, blocks == number, functions=functions))) for one in description.held]
         near = [description.neighbours[_entries(starts, description.degrees, own)]]
         near += [one.others[mine].ravel() for one, mine in held]
         copies.append(np.setdiff1d(np.concatenate(near), own))
@@ -150,6 +152,14 @@ def split_team(description: Description, many: int) -> list[Block]:
             Block(number, robots, is_own, part, costs, _filled(outgoing), _filled(incoming), active, number_of_blocks)
         )
     return found
+
+
+def _held_by(held: KnownConstraints, own: Flags, *, functions: bool) -> Flags:
+    """Return the constraints that a block with its `own` robots needs."""
+    mine = own[held.owners]
+    if functions and held.others.shape[1]:
+        mine |= own[held.others].any(axis=1) & (held.owners > held.others.max(axis=1))
+    return mine
 
 
 def _filled(robots: Mapping[int, Integers]) -> dict[int, Integers]:
@@ -239,31 +249,44 @@ class BlockBorder(Border):
         self.active = block.active
         self._channel = channel
         self._all = [other for other in range(block.many) if other != block.number]
-        self._number = block.number
+        self.number = block.number
+        self.robots = block.robots[layout.robots]
+        self.blocks = np.full(len(self.robots), block.number)
         self._outgoing = {other: layout.places[robots] for other, robots in block.outgoing.items()}
         self._incoming = {other: layout.places[robots] for other, robots in block.incoming.items()}
+        for other, rows in self._incoming.items():
+            self.blocks[rows] = other
 
     def exchange(self, *arrays: NDArray[Any] | None) -> None:
         """See `Border.exchange`."""
-        self.swap([(array, self._outgoing, self._incoming) for array in arrays if array is not None])
+        given = [array for array in arrays if array is not None]
+        self.swap([Shared(key, array, self._outgoing, self._incoming) for key, array in enumerate(given)])
 
-    def swap(self, parts: Sequence[tuple[NDArray[Any], Mapping[int, Integers], Mapping[int, Integers]]]) -> None:
-        """Exchange parts of arrays: each with the rows to send to, and to receive from, other blocks."""
+    def swap(self, shared: Sequence[Shared]) -> None:
+        """See `Border.swap`."""
         outgoing = {
-            other: msgspec.msgpack.encode([(array.dtype.str, array[rows[other]].tobytes()) for array, rows, _ in parts])
+            other: msgspec.msgpack.encode(
+                {
+                    key: (array.dtype.str, array[rows[other]].tobytes())
+                    for key, array, rows, _ in shared
+                    if other in rows
+                }
+            )
             for other in self._outgoing
         }
-        received = self._channel.swap(outgoing, self._incoming)
-        for other, content in received.items():
-            for (array, _, rows), (kind, numbers) in zip(parts, msgspec.msgpack.decode(content), strict=True):
-                array[rows[other]] = np.frombuffer(numbers, kind).reshape(-1, *array.shape[1:])
+        for other, content in self._channel.swap(outgoing, self._incoming).items():
+            parts = msgspec.msgpack.decode(content)
+            for key, array, _, rows in shared:
+                if other in rows and key in parts:
+                    kind, numbers = parts[key]
+                    array[rows[other]] = np.frombuffer(numbers, kind).reshape(-1, *array.shape[1:])
 
     def gather(self, item: Item) -> list[Item]:
         """See `Border.gather`."""
         content = json.dumps(item).encode()
         received = self._channel.swap(dict.fromkeys(self._all, content), self._all)
         items = {other: json.loads(one) for other, one in received.items()}
-        items[self._number] = json.loads(content)
+        items[self.number] = json.loads(content)
         return [items[other] for other in sorted(items)]
 
 
@@ -290,6 +313,8 @@ class RunBlock:
     def __call__(self, block: Block, channel: Channel) -> BlockReport:
         """Return the report of the block. Raises `BlockLostError` if another block is lost."""
         layout = ArrayLayout(block.description, block.costs)
+        for group in layout.groups:
+            group.checks[~block.own[layout.robots[group.first : group.last]]] = 0
         run = self.form(layout, self.settings, self.seed, clocks=self.clocks, changes=self.changes)
         border = run.border = BlockBorder(block, layout, channel)
         began = time.monotonic()
@@ -323,7 +348,7 @@ def _report(block: Block, run: CycleRun, wall_s: float, *, is_over: bool) -> Blo
         run.cycle,
         is_over,
         run.verdict,
-        None if run.witness is None else int(block.robots[run.witness]),
+        run.witness,
         run.metrics(wall_s),
         changes,
     )

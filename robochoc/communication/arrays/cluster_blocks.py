@@ -51,7 +51,7 @@ def run_on_cluster(place: str, description: Description, run: RunBlock) -> Block
         workers = sorted(_workers(client))
         if not workers:
             raise BlockLostError(f"the cluster at {place} has no workers: start workers by `dask worker`")
-        blocks = split_team(description, len(workers))
+        blocks = split_team(description, len(workers), functions=run.form.functions_in_blocks)
         return _run_blocks(client, blocks, run, workers[: len(blocks)])
 
 

@@ -84,6 +84,8 @@ class CycleRun(ABC):
     """False if each robot makes equal checks in each cycle: clocks of a block then follow from its own robots."""
     in_blocks: ClassVar[bool] = False
     """True if a team can run in several blocks (`blocks.py`)."""
+    functions_in_blocks: ClassVar[bool] = False
+    """True if a block needs functions that robots in other blocks hold."""
 
     def __init__(
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
@@ -127,7 +129,7 @@ class CycleRun(ABC):
         """Start all robots: cycle 0."""
         for group in self.layout.groups:
             self._settle_alone(group)
-        if self._active:
+        if self._active or self.border.active:
             self._start_active()
         self.cycle = 0
         if self.layout.empty.size:

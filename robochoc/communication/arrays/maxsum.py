@@ -6,16 +6,19 @@ Sums are computed in the same order as for robots as objects, so that rounding i
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import cast
 
 import numpy as np
 
 from robochoc.communication.arrays.array_types import FEW, Floats, Index, Integers
+from robochoc.communication.arrays.border import Shared
 from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, least
 from robochoc.communication.arrays.description import KnownConstraints
 from robochoc.communication.arrays.jagged import columns
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
+from robochoc.communication.arrays.maxsum_border import Edges, shared_edges
 from robochoc.communication.arrays.tally import list_bytes
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
@@ -24,6 +27,7 @@ from robochoc.protocols.inference.maxsum_factor import MOST
 from robochoc.protocols.message import encode
 from robochoc.protocols.shared.cycles import CycleCount, Domain
 from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.exact_costs import EXACT
 from robochoc.system.lazy_dataclass import dataclass
 
 _CHUNK = 1 << 20
@@ -61,9 +65,13 @@ class Factors:
             found[part] = total
         return found
 
-    def cost(self, values: Integers) -> float:
-        """Return the sum of all functions for these `values`."""
-        return exact_sum(self.tables[(self.which, *(values[column] for column in self.rows.T))])
+    def cost(self, values: Integers, number: int, blocks: Integers | None) -> float:
+        """Return the sum of all functions for these `values`, or of those held in the block `number` of `blocks`."""
+        rows, which = self.rows, self.which
+        if blocks is not None:
+            held = blocks[rows[:, -1]] == number
+            rows, which = rows[held], which[held]
+        return exact_sum(self.tables[(which, *(values[column] for column in rows.T))])
 
 
 def factors_of(layout: ArrayLayout) -> list[Factors]:
@@ -188,6 +196,9 @@ class ArrayMaxSum(CycleRun):
         UnsupportedError: if functions are to be split.
     """
 
+    in_blocks = True
+    functions_in_blocks = True
+
     def __init__(
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
@@ -217,6 +228,7 @@ class ArrayMaxSum(CycleRun):
         self._weigh()
         self._send_r()
         z = self._z()
+        self._share_verdict()
         if self.verdict is not None:
             return
         for group, costs in zip(self.layout.groups, z, strict=True):
@@ -226,11 +238,12 @@ class ArrayMaxSum(CycleRun):
             self._send_q(z)
 
     def _weigh(self) -> None:
-        total = sum(factors.cost(self.values) for factors in self._factors)
+        border = self.border
+        total = sum(factors.cost(self.values, border.number, border.blocks) for factors in self._factors)
         for group, alone in zip(self.layout.groups, self._alone, strict=True):
             if alone is not None:
                 total += exact_sum(alone[np.arange(group.many), group.values(self.values)])
-        self.note(total)
+        self.note(_total(border.gather(total)))
 
     # Equations
 
@@ -264,8 +277,19 @@ class ArrayMaxSum(CycleRun):
             hopeless = np.flatnonzero(np.isinf(least(z[: ports.group.active])))
             if hopeless.size:
                 self.verdict = Verdict.NO_SOLUTION
-                self.witness = int(self.layout.robots[ports.group.first + hopeless[0]])
+                self.witness = ports.group.first + int(hopeless[0])
         return found
+
+    def _share_verdict(self) -> None:
+        """Find the robot with the verdict, among all blocks: the first row of the last group."""
+        row, border, found = self.witness, self.border, None
+        if row is not None:
+            local = self.layout.robots[row]
+            robot = local if border.blocks is None else border.robots[row]
+            found = [int(self.layout.description.sizes[local]), int(self.layout.degrees[row]), -int(robot)]
+        witnesses = [one for one in border.gather(found) if one is not None]
+        if witnesses:
+            self.verdict, self.witness = Verdict.NO_SOLUTION, -max(witnesses)[-1]
 
     def _send_q(self, z: list[Floats]) -> None:
         """Compute Q for all variables (1), normalised and damped."""
@@ -275,8 +299,19 @@ class ArrayMaxSum(CycleRun):
             fresh -= least(fresh)[:, None]
             np.minimum(fresh, MOST, out=fresh, where=fresh < INFINITE)
             ports.q = damping * ports.q + (1 - damping) * fresh if self.cycle and damping else fresh
+        self._exchange_q()
         self.tally.add(Q.__name__, self._link_bytes, np.ones_like(self._link_bytes))
         self._raise_clocks(below=False)
+
+    def _exchange_q(self) -> None:
+        """Exchange Q on the edges of functions with robots in several blocks, and clocks."""
+        self.border.exchange(self.clocks)
+        edges = self._shared_edges
+        self.border.swap([Shared(one.group.size, one.q, *edges[one.group.size]) for one in self._ports])
+
+    @cached_property
+    def _shared_edges(self) -> Mapping[int, tuple[Edges, Edges]]:
+        return shared_edges(self.border, self._factors, self._sides)
 
     # Counts
 
@@ -296,8 +331,9 @@ class ArrayMaxSum(CycleRun):
             higher[places] = flags
         rows = np.zeros(len(higher), np.int64)
         for factors in self._factors:
-            for column in factors.rows.T[:-1]:
-                rows += np.bincount(layout.link(factors.rows[:, -1], column), minlength=len(rows))
+            own = factors.rows[layout.degrees[factors.rows[:, -1]] > 0]  # without holders in other blocks
+            for column in own.T[:-1]:
+                rows += np.bincount(layout.link(own[:, -1], column), minlength=len(rows))
         sizes = layout.description.sizes[layout.robots][layout.neighbours]
         lengths = _REST + list_bytes(rows) + rows * (list_bytes(sizes) + _FLOAT * sizes)
         self._link_bytes: Integers = lengths[higher]
@@ -311,6 +347,7 @@ class ArrayMaxSum(CycleRun):
                 alone += np.bincount(layout.places[held.owners], minlength=layout.many) * held.tables.shape[-1]
         alone[layout.degrees == 0] = 0
         self.count_checks(alone)
+        self.border.exchange(self.clocks)
         self._raise_clocks(below=False)
         made = layout.description.table_checks
         if made is None:
@@ -319,7 +356,7 @@ class ArrayMaxSum(CycleRun):
                 holders = layout.places[held.owners[held.owners > held.others.max(axis=1, initial=-1)]]
                 wide = held.others.shape[1] > 0
                 made = made + np.bincount(holders, minlength=layout.many) * held.tables[0].size * wide
-            self.count_checks(made)
+            self.count_checks(np.where(layout.degrees > 0, made, 0))
         else:
             self.count_checks(np.where(layout.degrees > 0, made[layout.robots], 0))
 
@@ -332,6 +369,14 @@ class ArrayMaxSum(CycleRun):
                 received = np.where(higher != below, self.clocks.take(neighbours), 0)
                 part[lists] = np.maximum(part[lists], received)
             self.clocks = clocks_after
+
+
+def _total(parts: list[float]) -> float:
+    """Return the sum of the costs in `parts`, which is an integer if a float would not be exact."""
+    if len(parts) == 1 or INFINITE in parts:
+        return max(parts)
+    total = sum(map(int, parts))
+    return float(total) if total < EXACT else total
 
 
 def _fresh(ports: Ports, preferred: Floats, costs: Floats) -> Floats:

@@ -23,7 +23,7 @@ from tests.support.array_teams import COUNTS, MAKERS, random_settings
 from tests.support.block_threads import run_in_threads
 from tests.support.examples import count, drawn
 
-PROTOCOLS = ("dsa", "mgm")
+PROTOCOLS = ("dsa", "mgm", "maxsum")
 
 
 def compare(
@@ -37,7 +37,10 @@ def compare(
     form = array_run_for(kind)
     run = RunBlock(form, chosen, seed, limits, changes=True)
 
-    one, several = (joined(run_in_threads(split_team(description, blocks), run)) for blocks in (1, many))
+    one, several = (
+        joined(run_in_threads(split_team(description, blocks, functions=form.functions_in_blocks), run))
+        for blocks in (1, many)
+    )
     assert_same(one, several)
     if one.is_over:
         whole = form(ArrayLayout(description), chosen, seed)

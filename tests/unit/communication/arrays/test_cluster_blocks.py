@@ -26,7 +26,7 @@ import numpy as np
 import robochoc
 edges = [(robot, (robot + step) % 3000) for robot in range(3000) for step in (1, 60)]
 problem = robochoc.ArrayProblem(3000, 4, edges, np.eye(4), charges=np.arange(12000).reshape(3000, 4) % 3)
-for protocol in ("dsa", "mgm"):
+for protocol in ("dsa", "mgm", "maxsum"):
     whole, blocks = (problem.solve(protocol, cycles=9, cluster=one) for one in (None, sys.argv[1]))
     assert whole.costs == blocks.costs
     assert (whole.values == blocks.values).all()
