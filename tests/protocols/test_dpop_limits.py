@@ -16,7 +16,7 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Given, Sent
-from robochoc.model.problem import Constraint, Relation, Semantics
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.inference import dpop_tables
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.protocols.inference.dpop_tables import Extent, bytes_of
@@ -26,6 +26,7 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies
+from tests.support.brute_force import least_cost
 from tests.support.cases import looped
 from tests.support.cost_problems import with_costs
 from tests.support.dpop_robots import PRODUCT, begun, dimensions, domain, leaf, products
@@ -53,12 +54,12 @@ def test_a_need_above_the_free_space_of_the_disk_is_refused_before_any_table_is_
     assert robot.problem.checks == 0
 
 
-@looped("protocol", ["dpop", "s-dpop"])
+@looped("protocol", ["dpop", "s-dpop", "mb-dpop", "rmb-dpop"])
 @pytest.mark.parametrize("seeds", [range(4), pytest.param(range(4, 100), marks=pytest.mark.more)], ids=str)
 def test_tables_on_the_disk_make_no_difference(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, protocol: str, seeds: range
 ) -> None:
-    """Neither to messages nor to answers, and the folder stays empty."""
+    """Neither to messages nor to the optimum, and the folder stays empty."""
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(dpop_tables, "BLOCK", 40)
     monkeypatch.setattr(dpop_tables, "SMALL", 9)
@@ -70,6 +71,8 @@ def test_tables_on_the_disk_make_no_difference(
         for memory in ("1", str(2**30)):
             events: list[AnyEvent] = []
             settings = {"memory": memory, "disk": str(2**30)}
+            if protocol.endswith("mb-dpop"):
+                settings["k"] = str(3 + seed % 3)
             outcome = solve(
                 team,
                 Options(protocol=protocol, runtime=Runtime.SIMULATOR, settings=settings),
@@ -80,6 +83,8 @@ def test_tables_on_the_disk_make_no_difference(
             found.append((outcome.cost, outcome.verdict, metrics.messages, metrics.bytes, said))
             assert not [*tmp_path.iterdir()]
         assert found[0] == found[1]
+        least = least_cost(team)
+        assert found[0][0] == (None if least == INFINITE else least)
 
 
 def test_a_table_on_the_disk_is_sent_between_processes() -> None:

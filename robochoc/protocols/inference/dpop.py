@@ -38,6 +38,7 @@ Choices that the paper leaves open, and differences:
   made. Additions and minimisations do not count as constraint checks.
 - Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
 - The limits apply to each robot's arrays. They do not include messages in transit, nor costs cached by a local problem.
+  On a network, a robot drops messages of a neighbour beyond 256 MiB that it has not read, and the run ends.
 - A robot that needs more than `memory` keeps its table, its choices and its children's tables in unnamed files in the
   folder for temporary files (`TMPDIR`). Nothing remains of them, whatever ends the run.
 

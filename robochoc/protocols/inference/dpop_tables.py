@@ -8,6 +8,7 @@ represents `inf`. The memory that an operation needs is known before: `bytes_of`
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple, cast
@@ -107,7 +108,7 @@ def project(
     """
     width = width_of(dearest)
     result = Projection(
-        _empty(shape, f"<u{width}", on_disk=on_disk), _empty(shape, _choice(len(charges)), on_disk=on_disk)
+        empty_table(shape, f"<u{width}", on_disk=on_disk), empty_table(shape, _choice(len(charges)), on_disk=on_disk)
     )
     split = _stepped(shape, len(charges))
     steps: list[list[Table]] = [[] for _ in shape[:split]]
@@ -295,7 +296,7 @@ class IncomingTable:
         if _max_finite(codes) > self._dearest:
             raise ValueError(f"a cost is {_max_finite(codes):,}, above the announced maximum of {self._dearest:,}")
         if self._costs is None:
-            self._costs = _empty(self._shape, codes.dtype, on_disk=self._on_disk)
+            self._costs = empty_table(self._shape, codes.dtype, on_disk=self._on_disk)
         start = self._costs.size - self._left
         self._costs.reshape(-1)[start : start + codes.size] = codes
         release_pages(self._costs)
@@ -348,7 +349,7 @@ def _parts(costs: Codes) -> Iterator[Codes]:
             release_pages(costs)
 
 
-def _empty(shape: Sequence[int], kind: DTypeLike, *, on_disk: bool) -> NDArray[Any]:
+def empty_table(shape: Sequence[int], kind: DTypeLike, *, on_disk: bool) -> NDArray[Any]:
     """Return a new array whose content is undefined. Raises `TooLargeError` if there is no space on the disk."""
     try:
         return empty_array(shape, kind, on_disk=on_disk)
@@ -358,6 +359,18 @@ def _empty(shape: Sequence[int], kind: DTypeLike, *, on_disk: bool) -> NDArray[A
             f"a table of {size:,} bytes cannot be stored in the folder for temporary files: {error.strerror or error}"
             " (free space there, or choose another folder by the environment variable TMPDIR)"
         ) from None
+
+
+def release(*tables: NDArray[Any]) -> None:
+    """Remove the pages of those tables that are on the disk from the memory."""
+    for table in tables:
+        release_pages(table)
+
+
+def blocks_of(shape: Sequence[int]) -> Iterator[tuple[Any, ...]]:
+    """Yield an index for each block of a table of this `shape`."""
+    for place in itertools.product(*map(range, shape[: _stepped(shape, 1)])):
+        yield (*place, ...)
 
 
 def _stepped(shape: Sequence[int], own: int) -> int:

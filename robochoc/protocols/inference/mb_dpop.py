@@ -8,8 +8,8 @@ receives a table for it. So memory is bounded, but more messages are needed.
   DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
   sent has more than `k` dimensions. The number of messages is exponential in the cycle-cut robots of a cluster.
-- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory`, the
-  maximum number of bytes in a robot's tables (default 1 GiB).
+- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` and `disk`, the
+  maximum numbers of bytes in a robot's tables in memory and on the disk, as in DPOP.
 - **Reference**: Petcu, Faltings: "MB-DPOP: a new memory-bounded algorithm for distributed optimization", IJCAI 2007,
   Algorithms 1 (labeling) and 2 (memory-bounded inference).
 
@@ -64,10 +64,10 @@ from robochoc.protocols.inference.dpop import (
     VALUE,
     Cost,
     Dimensions,
+    DPOPSettings,
     Need,
     Proceed,
     Size,
-    TableSettings,
     store_once,
 )
 from robochoc.protocols.inference.dpop_tables import (
@@ -77,8 +77,11 @@ from robochoc.protocols.inference.dpop_tables import (
     Table,
     Width,
     aligned,
+    blocks_of,
+    empty_table,
     place_type,
     project,
+    release,
     width_of,
 )
 from robochoc.protocols.message import Message, Value
@@ -91,8 +94,8 @@ from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted, listed
 
 
-class MBDPOPSettings(TableSettings, frozen=True):
-    """`k`: the maximum number of dimensions of a table. `memory`: the maximum number of bytes in a robot's tables."""
+class MBDPOPSettings(DPOPSettings, frozen=True):
+    """`k`: the maximum number of dimensions of a table. `memory` and `disk` as in DPOP."""
 
     k: int = 4
 
@@ -369,7 +372,7 @@ class MBDPOP(DPOP):
         tables = [aligned(*self._fixed(table, over, context), onto) for table, over in [*self._own_tables, *children]]
         own = context.get(self.problem.agent)
         charges = self.problem.charges if own is None else self.problem.charges[own : own + 1]
-        return project([self._sizes[name] for name in axes], charges, tables, self._dearest)
+        return project([self._sizes[name] for name in axes], charges, tables, self._dearest, on_disk=self._on_disk)
 
     def _fixed(self, table: Table, axes: Sequence[str], context: Mapping[str, int]) -> tuple[Table, list[str]]:
         """Return the part of `table` in `context`, and its axes; this robot's axis remains, with one index."""
@@ -387,12 +390,17 @@ class MBDPOP(DPOP):
     def _record_best(self, costs: Codes) -> None:
         """Store the costs of this context that are lower than all before; then start the next, or send on the best."""
         if self._best is None or self._best_context is None:
-            self._best = np.full_like(costs, np.iinfo(costs.dtype).max)
-            self._best_context = np.zeros((len(self.enumerated), *costs.shape), place_type(self.enumerated.values()))
-        better = costs < self._best
-        np.copyto(self._best, costs, where=better)
-        for number, value in enumerate((self.context or {}).values()):
-            np.copyto(self._best_context[number, ...], value, where=better, casting="unsafe")
+            self._best = empty_table(costs.shape, costs.dtype, on_disk=self._on_disk)
+            self._best.fill(np.iinfo(costs.dtype).max)
+            shape, kind = (len(self.enumerated), *costs.shape), place_type(self.enumerated.values())
+            self._best_context = empty_table(shape, kind, on_disk=self._on_disk)
+            self._best_context.fill(0)
+        for block in blocks_of(costs.shape):
+            better = costs[block] < self._best[block]
+            np.copyto(self._best[block], costs[block], where=better)
+            for number, value in enumerate((self.context or {}).values()):
+                np.copyto(self._best_context[number, *block], value, where=better, casting="unsafe")
+        release(costs, self._best, self._best_context)
         if not self._next_context():
             best, self._best = self._best, None
             self._send_or_choose(best)

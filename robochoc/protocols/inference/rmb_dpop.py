@@ -10,7 +10,7 @@ each receives only the values that it needs.
   is the same as DPOP.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
   sent has more than `k` dimensions. The number of messages is exponential in the cut robots of a branch.
-- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` as in
+- **Parameters (`--set`)**: `k`, the maximum number of dimensions of a table (default 4); `memory` and `disk` as in
   MB-DPOP.
 - **Reference**: Chen, Zhang, Deng, Chen, Li: "RMB-DPOP: refining MB-DPOP by reducing redundant inferences", AAMAS 2020.
 
@@ -61,12 +61,16 @@ from robochoc.protocols.inference.dpop_tables import (
     PIECE,
     Codes,
     Extent,
+    Projection,
     Table,
     Width,
     aligned,
+    blocks_of,
+    empty_table,
     packed_costs,
     piece_in_words,
     place_type,
+    release,
     width_of,
 )
 from robochoc.protocols.inference.mb_dpop import MBDPOP, Context, Depth, DomainAtDepth, SeparatorAxis, Sizes, is_place
@@ -218,21 +222,30 @@ def thinned(candidates: Mapping[str, Candidate], above: Mapping[str, int]) -> di
 class BestTables:
     """The best of several tables, cell by cell: costs, this robot's values, those of `cut` robots, as indices."""
 
-    def __init__(self, shape: Sequence[int], costs: np.dtype[Any], own: int, cut: Sequence[int]) -> None:
-        self.costs: Codes = np.full(shape, np.iinfo(costs).max, costs)
-        self.choices: Codes = np.zeros(shape, place_type([own]))
-        self.places: Places = np.zeros((len(cut), *shape), place_type(cut or [own]))
+    def __init__(
+        self, shape: Sequence[int], costs: np.dtype[Any], own: int, cut: Sequence[int], *, on_disk: bool
+    ) -> None:
+        self.costs: Codes = empty_table(shape, costs, on_disk=on_disk)
+        self.choices: Codes = empty_table(shape, place_type([own]), on_disk=on_disk)
+        self.places: Places = empty_table((len(cut), *shape), place_type(cut or [own]), on_disk=on_disk and bool(cut))
+        self.costs.fill(np.iinfo(costs).max)
+        self.choices.fill(0)
+        self.places.fill(0)
 
     def improve(
-        self, at: Sequence[slice | int], costs: Codes, choices: Codes | int, places: Sequence[Table | int]
+        self, at: Sequence[slice | int], found: Projection, own: int | None, places: Sequence[Table | int]
     ) -> None:
-        """Adopt the cheaper cells, in the part `at` these axes."""
-        part = (*at, ...)
-        better = costs < self.costs[part]
-        np.copyto(self.costs[part], costs, where=better)
-        np.copyto(self.choices[part], choices, where=better, casting="unsafe")
-        for number, row in enumerate(places):
-            np.copyto(self.places[number, *part], row, where=better, casting="unsafe")
+        """Adopt the cheaper cells, in the part `at` these axes; `own`: this robot's value, if it is fixed."""
+        costs, choices, rows = (table[(..., *at)] for table in (self.costs, self.choices, self.places))
+        for block in blocks_of(found.costs.shape):
+            better = found.costs[block] < costs[block]
+            np.copyto(costs[block], found.costs[block], where=better)
+            here = found.choices[block]
+            np.copyto(choices[block], here if own is None else own, where=better, casting="unsafe")
+            for number, place in enumerate(places):
+                best = place if isinstance(place, int) else picked(part_at(place, block), here)
+                np.copyto(rows[number, *block], best, where=better, casting="unsafe")
+        release(*found, self.costs, self.choices, self.places)
 
     def packed(self) -> Iterator[tuple[Width, bytes, bytes]]:
         """Yield the costs in pieces for messages, each with the indices that belong to it."""
@@ -253,10 +266,10 @@ def bytes_of_best(shape: Sequence[int], width: int, own: int, cut: Sequence[int]
 class IncomingPlaces:
     """The indices of cut robots' values that come with a table of this `shape`; `cut`: their numbers of values."""
 
-    def __init__(self, shape: Sequence[int], cut: Sequence[int]) -> None:
+    def __init__(self, shape: Sequence[int], cut: Sequence[int], *, on_disk: bool) -> None:
         self._limits = np.array(cut).reshape(-1, 1)
         self._start = 0
-        self.table: Places = np.empty((len(cut), *shape), place_type(cut))
+        self.table: Places = empty_table((len(cut), *shape), place_type(cut), on_disk=on_disk)
 
     def add(self, cells: int, piece: bytes) -> None:
         """Append the next piece, of `cells` cells. Raises `ValueError` if the bytes do not fit."""
@@ -269,7 +282,14 @@ class IncomingPlaces:
                 f"the index of a value is too large: the robots have {self._limits.ravel().tolist()} values"
             )
         rows[:, self._start : self._start + cells] = places
+        release(self.table)
         self._start += cells
+
+
+def part_at(table: Table, block: Sequence[Any]) -> Table:
+    """Return a view of the `block` of `table`, whose first axis belongs to this robot."""
+    places = [place if length > 1 else 0 for place, length in zip(block[:-1], table.shape[1:], strict=False)]
+    return table[(slice(None), *places)]
 
 
 def picked(table: Table, choices: Codes) -> Table:
@@ -497,30 +517,31 @@ class RMBDPOP(MBDPOP):
         if child not in self._places:
             sizes = self.dimensions[child].separator
             shape = [sizes[name] for name in self._table_axes(child)]
-            self._places[child] = IncomingPlaces(shape, [*cut.values()])
+            self._places[child] = IncomingPlaces(shape, [*cut.values()], on_disk=self._on_disk)
         return self._places[child]
 
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree in the context; after the last context, send the best of all."""
         context = self.context or {}
         axes = [name for name in self._free if name not in context]
-        costs, choices = self._projected(axes, context)
+        found = self._projected(axes, context)
         if self.best is None:
             shape, below = [self._sizes[name] for name in self._free], [*self.below.values()]
-            self.best = BestTables(shape, costs.dtype, len(self.problem.values), below)
+            own = len(self.problem.values)
+            self.best = BestTables(shape, found.costs.dtype, own, below, on_disk=self._on_disk)
         at = [context.get(name, slice(None)) for name in self._free]
-        own = context.get(self.problem.agent, choices)
-        self.best.improve(at, costs, own, [] if self.settled else self._best_places(axes, context, choices))
+        fixed = context.get(self.problem.agent)
+        self.best.improve(at, found, fixed, [] if self.settled else self._best_places(axes, context))
         if not self._next_context():
             self._end_contexts(self.best)
 
-    def _best_places(self, axes: Sequence[str], context: Mapping[str, int], choices: Codes) -> list[Table | int]:
-        """Return, for each cut robot from this one down, its value in this context for each cell of the table."""
+    def _best_places(self, axes: Sequence[str], context: Mapping[str, int]) -> list[Table | int]:
+        """Return the value of each cut robot from this one down in this context, for each of this robot's values."""
         onto = (self.problem.agent, *axes)
         rows = dict[str, Table]()
         for child, incoming in self._places.items():
             for name, row in zip(self.inner[child], incoming.table, strict=True):
-                rows[name] = picked(aligned(*self._fixed(row, self._table_axes(child), context), onto), choices)
+                rows[name] = aligned(*self._fixed(row, self._table_axes(child), context), onto)
         return [rows[name] if name in rows else context[name] for name in self.below]
 
     def _end_contexts(self, found: BestTables) -> None:
