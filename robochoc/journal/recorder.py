@@ -34,6 +34,10 @@ BlockSink = Callable[[bytes], object]
 """A function that receives complete blocks, the first with the beginning of the file. It may raise `OSError`."""
 
 
+_COST_EVENTS = {Began, Given, Decided, Heard}
+"""The kinds of events on which improvements depend."""
+
+
 class JournalRecorder:
     """An observer that writes a journal of the events to all `sinks` during the run.
 
@@ -145,6 +149,12 @@ class JournalRecorder:
             return pending, None, []
         cost_events = None if self._cost_events is None else [*self._cost_events]
         given = [*self._given]
+        rare = [entry for entry in pending if type(entry) in _COST_EVENTS]
+        if not any(isinstance(entry, Began) for entry in rare):  # the usual case
+            given += (entry for entry in rare if isinstance(entry, Given))
+            if cost_events is not None:
+                cost_events += (entry for entry in rare if isinstance(entry, Decided | Heard))
+            return pending, cost_events, given
         lines: list[JournalEntry] = []
         for entry in pending:
             match entry:

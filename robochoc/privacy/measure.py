@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import time
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
+import msgspec
+
+from robochoc.communication.search_result import Progress
 from robochoc.journal.events import Decided, Received, Sent
 from robochoc.journal.journal import Journal
 from robochoc.journal.team_events import run_parameters_of
@@ -19,6 +23,7 @@ from robochoc.privacy.secrets import TeamSecrets, TooManySecretsError
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PseudoTree
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RebuiltRobots, ReplayOptions
+from robochoc.replay.replay import PROGRESS_EVERY
 from robochoc.replay.steps import RecordedRun, runs_of
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.registry import protocol_by_class
@@ -37,13 +42,20 @@ class PrivacyError(RobochocError):
         self.broken = broken
 
 
-def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: int | None = None) -> PrivacyReport:
+def privacy_of(
+    journal: Journal,
+    options: ReplayOptions | None = None,
+    number: int | None = None,
+    *,
+    progress: Callable[[Progress], None] | None = None,
+) -> PrivacyReport:
     """Return the privacy loss in a run.
 
     Args:
         journal: The journal, including the robots' problems.
         options: Inputs besides the journal (`replay/rebuild.py`).
         number: The number of the run, from 1; None for the last run.
+        progress: Called with the progress.
 
     Raises:
         PrivacyError: if the run does not exist, or required data are missing.
@@ -59,7 +71,7 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
     try:
         rebuilder = Rebuilder(journal.header, options or ReplayOptions())
         robots = [rebuilder.robots_of(run) for run in runs[:number]][-1]
-        return _RunMeasurement(journal, runs, number, robots).report()
+        return _RunMeasurement(journal, runs, number, robots, progress).report()
     except CannotReplayError as why:
         raise PrivacyError(str(why), broken=why.broken) from why
     except TooManySecretsError as why:
@@ -69,7 +81,17 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
 class _RunMeasurement:
     """Measures one run: its observers process all messages, and `report` computes the losses."""
 
-    def __init__(self, journal: Journal, runs: Sequence[RecordedRun], number: int, robots: RebuiltRobots) -> None:
+    def __init__(
+        self,
+        journal: Journal,
+        runs: Sequence[RecordedRun],
+        number: int,
+        robots: RebuiltRobots,
+        progress: Callable[[Progress], None] | None,
+    ) -> None:
+        self._progress = progress
+        self._encode = msgspec.msgpack.Encoder(enc_hook=str).encode
+        self._last_message: tuple[str, bytes, Message] | None = None
         self._journal = journal
         self._runs = len(runs)
         self._number = number
@@ -125,33 +147,43 @@ class _RunMeasurement:
 
     def _process_messages(self) -> None:
         """Deliver all received messages in order; then invalidate the values in messages that were not received."""
-        in_transit: dict[Edge, deque[Sent]] = {}
+        in_transit: dict[Edge, deque[tuple[Sent, Message]]] = {}
+        began, number = time.monotonic(), 0
         for event in self._run.events:
             match event:
                 case Sent():
-                    in_transit.setdefault((event.sender, event.receiver), deque()).append(event)
+                    number += 1
+                    if self._progress and number % PROGRESS_EVERY == 0:
+                        self._progress(Progress(number, time.monotonic() - began))
+                    if self._observers.keys().isdisjoint((event.sender, event.receiver)):
+                        continue
+                    message = self._message(event)
+                    in_transit.setdefault((event.sender, event.receiver), deque()).append((event, message))
                     if event.sender in self._observers:
-                        message = self._message(event)
                         with _rule_errors(event):
                             self._observers[event.sender].sends(event.receiver, message)
                 case Received():
                     waiting = in_transit.get((event.sender, event.receiver))
                     if waiting and event.receiver in self._observers:
-                        sent = waiting.popleft()
-                        message = self._message(sent)
+                        sent, message = waiting.popleft()
                         with _rule_errors(sent):
                             self._observers[event.receiver].receives(sent.sender, message)
                 case _:
                     pass
-        for sent in [one for waiting in in_transit.values() for one in waiting]:
+        for sent, message in [one for waiting in in_transit.values() for one in waiting]:
             if sent.receiver in self._observers:
-                self._observers[sent.receiver].loses(sent.sender, self._message(sent))
+                self._observers[sent.receiver].loses(sent.sender, message)
 
     def _message(self, sent: Sent) -> Message:
+        """Return the message, which is decoded once if several robots receive it one after the other."""
+        packed = self._encode(sent.content)
+        if self._last_message and self._last_message[:2] == (sent.type, packed):
+            return self._last_message[2]
         kind = self._types.get(sent.type)
         message = None if kind is None else message_of(kind, sent.content)
         if message is None:
             raise PrivacyError(f"{sent.type} from {sent.sender} is not a message of this protocol", broken=True)
+        self._last_message = sent.type, packed, message
         return message
 
     # Results

@@ -77,6 +77,8 @@ def privacy(
 
 
 def _measured(path: Path, number: int | None, options: ReplayOptions) -> PrivacyReport:
+    from robochoc.cli.reports.progress import progress_line
+    from robochoc.formats import on_one_line
     from robochoc.privacy import PrivacyError, privacy_of
     from robochoc.replay.rebuild import reads_files
 
@@ -84,8 +86,8 @@ def _measured(path: Path, number: int | None, options: ReplayOptions) -> Privacy
     if recorded.damage is not None and not recorded.truncated:
         raise Failure(INVALID, f"{path}: the journal was altered: {recorded.damage}")
     try:
-        with errors_as_failures(path):
-            report = privacy_of(recorded, options, number)
+        with errors_as_failures(path), progress_line(on_one_line(recorded.header.team)) as progress:
+            report = privacy_of(recorded, options, number, progress=progress)
     except PrivacyError as why:
         raise Failure(INVALID if why.broken else USAGE, f"{path}: {why}") from why
     if options.team is not None and not reads_files(recorded.events):
