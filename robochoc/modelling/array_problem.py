@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.array_types import Floats, Integers
 from robochoc.communication.arrays.blocks import BlockReport, Limits, RunBlock, run_on_cluster
+from robochoc.communication.arrays.compiled import sort_order
 from robochoc.communication.arrays.cycle_run import CycleRun, cycles_of, exact_sum
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import ArrayLayout
@@ -216,7 +217,7 @@ class ArrayProblem:
         turned = self.tables.swapaxes(1, 2)
         alike = bool((turned == self.tables).all())
         keys = np.concatenate([second * self.robots + first, first * self.robots + second])
-        order = np.argsort(keys, kind="stable")
+        order = sort_order(keys)
         owners, others = np.divmod(keys[order], self.robots)
         which = np.concatenate([self.which, self.which if alike else self.which + len(self.tables)])[order]
         tables: Floats = self.tables if alike else np.concatenate([self.tables, turned])

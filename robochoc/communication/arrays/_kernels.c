@@ -77,6 +77,92 @@ static int64_t integer_bytes(int64_t number) { /* tally.py */
     return number < 128 ? 1 : number < 256 ? 2 : number < 65536 ? 3 : number < 4294967296LL ? 5 : 9;
 }
 
+static uint64_t turned(uint64_t word, int bits) { return word >> bits | word << (64 - bits); }
+
+/* Return the first two words of the BLAKE2b digest of 16 bytes of a message with at most 128 bytes (RFC 7693). */
+static void blake2b(const uint8_t *message, size_t length, uint64_t *digest) {
+    static const uint64_t start[8] = {
+        0x6A09E667F3BCC908u, 0xBB67AE8584CAA73Bu, 0x3C6EF372FE94F82Bu, 0xA54FF53A5F1D36F1u,
+        0x510E527FADE682D1u, 0x9B05688C2B3E6C1Fu, 0x1F83D9ABFB41BD6Bu, 0x5BE0CD19137E2179u,
+    };
+    static const char orders[10][17] = {
+        "0123456789ABCDEF", "EA489FD61C02B753", "B8C052FDAE367194", "7931DCBE265A40F8", "905724AFE1BC683D",
+        "2C6A0B834D75FE19", "C51FED4A0763928B", "DB7EC13950F4862A", "6FE9B308C2D714A5", "A2847615FB9E3CD0",
+    };
+    static const uint8_t mixed[8][4] = {
+        {0, 4, 8, 12}, {1, 5, 9, 13}, {2, 6, 10, 14}, {3, 7, 11, 15},
+        {0, 5, 10, 15}, {1, 6, 11, 12}, {2, 7, 8, 13}, {3, 4, 9, 14},
+    };
+    uint64_t words[16] = {0}, v[16];
+    for (size_t place = 0; place < length; place++) words[place / 8] |= (uint64_t)message[place] << place % 8 * 8;
+    for (int place = 0; place < 16; place++) v[place] = start[place % 8];
+    v[0] ^= 0x01010010;
+    v[12] ^= length;
+    v[14] = ~v[14];
+    for (int round = 0; round < 12; round++)
+        for (int step = 0; step < 8; step++) {
+            const char *order = orders[round % 10] + 2 * step;
+            uint64_t *a = v + mixed[step][0], *b = v + mixed[step][1], *c = v + mixed[step][2], *d = v + mixed[step][3];
+            for (int half = 0; half < 2; half++) {
+                *a += *b + words[order[half] < 'A' ? order[half] - '0' : order[half] - 'A' + 10];
+                *d = turned(*d ^ *a, half ? 16 : 32);
+                *c += *d;
+                *b = turned(*b ^ *c, half ? 63 : 24);
+            }
+        }
+    for (int place = 0; place < 2; place++) digest[place] = start[place] ^ (place ? 0 : 0x01010010) ^ v[place] ^ v[place + 8];
+}
+
+/* Compute `key_and_step` for each of `many` names, separated by zeros, after `seed`. Return 1 if a name is too long. */
+EXPORT int draw_keys(
+    const char *seed, int64_t seed_length, const char *names, int64_t length, uint64_t *keys, uint64_t *steps
+) {
+    uint8_t message[128];
+    const char *end = names + length;
+    if (seed_length > 128) return 1;
+    memcpy(message, seed, seed_length);
+    for (;; names++, keys++, steps++) {
+        const char *next = memchr(names, 0, end - names);
+        size_t size = (next ? next : end) - names;
+        if (seed_length + size > 128) return 1;
+        memcpy(message + seed_length, names, size);
+        uint64_t digest[2];
+        blake2b(message, seed_length + size, digest);
+        *keys = digest[0];
+        uint64_t step = digest[1] | 1, transitions = step ^ step >> 1;
+        int many = 0;
+        for (; transitions; transitions &= transitions - 1) many++;
+        *steps = many < 24 ? step ^ 0xAAAAAAAAAAAAAAAAu : step;
+        names += size;
+        if (names == end) return 0;
+    }
+}
+
+/* Sort numbers of 0 or more, and return in `order` where they were: radix sort. The other arrays are work space. */
+EXPORT int sort_order(int64_t *numbers, int64_t *order, int64_t *numbers_after, int64_t *order_after, int64_t many) {
+    enum { BITS = 11, DIGITS = 1 << BITS };
+    int64_t largest = 0;
+    for (int64_t one = 0; one < many; one++) {
+        order[one] = one;
+        largest = numbers[one] > largest ? numbers[one] : largest;
+    }
+    int passes = 0;
+    for (int shift = 0; shift < 63 && (largest >> shift || passes % 2); shift += BITS, passes++) {
+        int64_t places[DIGITS + 1] = {0};
+        for (int64_t one = 0; one < many; one++) places[(numbers[one] >> shift & (DIGITS - 1)) + 1]++;
+        for (int digit = 0; digit < DIGITS; digit++) places[digit + 1] += places[digit];
+        for (int64_t one = 0; one < many; one++) {
+            int64_t place = places[numbers[one] >> shift & (DIGITS - 1)]++;
+            numbers_after[place] = numbers[one];
+            order_after[place] = order[one];
+        }
+        int64_t *swap = numbers;
+        numbers = numbers_after, numbers_after = swap;
+        swap = order, order = order_after, order_after = swap;
+    }
+    return passes % 2;
+}
+
 static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_kernels", NULL, -1, NULL, NULL, NULL, NULL, NULL};
 PyMODINIT_FUNC PyInit__kernels(void) { return PyModule_Create(&module); }
 

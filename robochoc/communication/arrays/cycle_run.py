@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
 from robochoc.communication.arrays.border import WHOLE_TEAM, Border
-from robochoc.communication.arrays.kernels import LARGEST_VALUE_SIZE, CycleAccount, Kernels, compiled_functions
+from robochoc.communication.arrays.compiled import compiled_functions, keys_and_steps
+from robochoc.communication.arrays.kernels import LARGEST_VALUE_SIZE, CycleAccount, Kernels
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import MessageTally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.chance import FIRST_FACTOR, SECOND_FACTOR, UNIT, key_and_step
+from robochoc.protocols.chance import FIRST_FACTOR, SECOND_FACTOR, UNIT
 from robochoc.protocols.shared.cycles import CycleCount, CycleSettings, Value
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
@@ -43,9 +44,7 @@ class Draws:
     """The random numbers of all robots, equal to those in `protocols/chance.py`: two words per robot."""
 
     def __init__(self, seed: int, names: Iterable[str], many: int) -> None:
-        words = (word for name in names for word in key_and_step(seed, name))
-        pairs = np.fromiter(words, np.uint64, 2 * many).reshape(many, 2)
-        self.states, self.steps = np.ascontiguousarray(pairs[:, 0]), np.ascontiguousarray(pairs[:, 1])
+        self.states, self.steps = keys_and_steps(seed, names, many)
 
     def draw(self, robots: Index) -> NDArray[np.float64]:
         """Return the next random number of each robot in `robots`, which must not contain duplicates."""

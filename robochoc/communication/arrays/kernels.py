@@ -1,7 +1,4 @@
-"""The compiled cycles of DSA and MGM (`_kernels.c`), with the same results as numpy.
-
-They exist in wheels with a compiled core (`hatch_build.py`), and are not used if `ROBOCHOC_PURE` is set.
-"""
+"""The compiled cycles of DSA and MGM (`_kernels.c`), with the same results as numpy."""
 
 from __future__ import annotations
 
@@ -9,22 +6,19 @@ import ctypes
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from importlib.util import find_spec
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.communication.arrays.array_types import Integers
+from robochoc.communication.arrays.compiled import start_of
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 
 LARGEST_VALUE_SIZE = 2
 """The largest size in bytes of values for which there are compiled functions."""
 ROWS_PER_THREAD = 50_000
 """The fewest rows for which another thread saves time."""
-_MODULE = "robochoc.communication.arrays._kernels"
-_WIDE = np.dtype(np.int64)
 
 
 def _structure(fields: str) -> type[ctypes.Structure]:
@@ -35,15 +29,6 @@ def _structure(fields: str) -> type[ctypes.Structure]:
 _Block = _structure("arity starts bases others strides rows")
 _Group = _structure("first size blocks_count blocks fixed charges")
 _Team = _structure("bits states steps starts degrees robots neighbours")
-
-
-@cache
-def compiled_functions() -> ctypes.CDLL | None:
-    """Return the compiled functions, or None if there are none."""
-    if os.environ.get("ROBOCHOC_PURE", "0") not in {"", "0"} or ctypes.sizeof(ctypes.c_void_p) != _WIDE.itemsize:
-        return None
-    found = find_spec(_MODULE)
-    return None if found is None or found.origin is None else ctypes.CDLL(found.origin)
 
 
 def usable_processors() -> int:
@@ -117,7 +102,7 @@ class Kernels:
         account, found = self._account(), []
         for group, fields in zip(self._layout.groups, self._groups, strict=True):
             total = np.empty((group.active, group.size), self._layout.costs.kind)
-            self._call("value_costs", group.active, account, fields, _start(values), _start(total))
+            self._call("value_costs", group.active, account, fields, start_of(values), start_of(total))
             found.append(total)
         return found, account
 
@@ -128,7 +113,7 @@ class Kernels:
         account, after = self._account(), values.copy()
         chance = (sideways, float(probability), float(probability_of_gain))
         for group, fields in zip(self._layout.groups, self._groups, strict=True):
-            self._call("dsa", group.active, account, fields, _start(values), _start(after), *chance)
+            self._call("dsa", group.active, account, fields, start_of(values), start_of(after), *chance)
         return after, account
 
     def best_unilateral(self, values: Integers, rest: int) -> tuple[Integers, Integers, CycleAccount]:
@@ -138,14 +123,14 @@ class Kernels:
         """
         account, targets = self._account(), values.copy()
         gains = np.zeros(self._layout.many, self._layout.costs.kind)
-        addresses = (_start(values), _start(targets), _start(gains), rest)
+        addresses = (start_of(values), start_of(targets), start_of(gains), rest)
         for group, fields in zip(self._layout.groups, self._groups, strict=True):
             self._call("best_unilateral", group.active, account, fields, *addresses)
         return targets, gains, account
 
     def move_winners(self, values: Integers, targets: Integers, gains: Integers) -> None:
         """Set the robots that gain most among their neighbours to their `targets`."""
-        addresses = (_start(values), _start(targets), _start(gains))
+        addresses = (start_of(values), start_of(targets), start_of(gains))
         self._call("move_winners", self._layout.many, self._unused, *addresses)
 
     def _account(self) -> CycleAccount:
@@ -159,10 +144,10 @@ class Kernels:
             kinds = [ctypes.c_int64 if isinstance(word, int) else ctypes.c_double for word in words]
             function.argtypes = [ctypes.c_int64, *kinds, *[ctypes.c_int64] * 3]
         if self._pool is None:
-            self._check(function(self._team, *words, _start(account.rows), 0, many))
+            self._check(function(self._team, *words, start_of(account.rows), 0, many))
             return
         bounds = (many * number // self._threads for number in range(self._threads + 1))
-        parts = zip(map(_start, account.rows), pairwise(bounds), strict=True)
+        parts = zip(map(start_of, account.rows), pairwise(bounds), strict=True)
         for failed in self._pool.map(lambda part: function(self._team, *words, part[0], *part[1]), parts):
             self._check(failed)
 
@@ -188,12 +173,4 @@ class Kernels:
 
     def _address(self, array: Integers) -> int:
         self._in_use.append(array)
-        return _start(array)
-
-
-def _start(array: Integers) -> int:
-    """Return the address of an array. Raises `ValueError` if its entries are not in one piece."""
-    if not array.flags.c_contiguous:
-        raise ValueError("the array is not contiguous")
-    address: int = array.__array_interface__["data"][0]
-    return address
+        return start_of(array)

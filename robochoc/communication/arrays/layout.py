@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from robochoc.communication.arrays.array_types import Flags, Floats, Index, Integers
+from robochoc.communication.arrays.compiled import sort_order
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.jagged import columns, narrowest, segments
 from robochoc.solver.errors import TooLargeError
@@ -179,7 +180,8 @@ class ArrayLayout:
     def __init__(self, description: Description, costs: IntegerCosts | None = None) -> None:
         self.description = description
         sizes, degrees = description.sizes, description.degrees
-        order = np.lexsort((-degrees, sizes))
+        most = int(degrees.max(initial=0))
+        order = sort_order(sizes * (most + 1) + most - degrees)
         self.robots = order[np.searchsorted(sizes[order], 1) :]
         self.places = np.full(len(sizes), -1, np.int64)
         self.places[self.robots] = np.arange(len(self.robots))
@@ -286,7 +288,7 @@ class ArrayLayout:
                 np.add.at(group.fixed, own, rows[one.which])
 
     def _block(self, group: RobotGroup, held: KnownConstraints, own: Integers, rows: Integers) -> ConstraintBlock:
-        order = np.argsort(own, kind="stable")
+        order = sort_order(own)
         shape = held.tables.shape[1:-1]
         strides = tuple(int(np.prod(shape[place + 1 :])) for place in range(len(shape)))
         per_table = int(np.prod(shape))

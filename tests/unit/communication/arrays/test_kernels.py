@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from hatch_build import KERNELS, KERNELS_FLAGS, may_compile
-from robochoc.communication.arrays import cycle_run, kernels
+from robochoc.communication.arrays import compiled, cycle_run, kernels
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.cycle_run import cycles_of
 from robochoc.communication.arrays.description import Description, KnownConstraints
@@ -90,6 +90,12 @@ def _known(shape: tuple[int, ...], entries: list[tuple[int, Sequence[int], bytes
     )
 
 
+def use(monkeypatch: pytest.MonkeyPatch, library: ctypes.CDLL | None) -> None:
+    """Let all modules use the functions of `library`; None: numpy."""
+    for module in (compiled, cycle_run):
+        monkeypatch.setattr(module, "compiled_functions", lambda: library)
+
+
 def trace(layout: ArrayLayout, protocol: str, settings: dict[str, str], seed: int, *, clocks: bool) -> list[Any]:
     """Return all results of a run."""
     kind = protocol_named(protocol)
@@ -110,18 +116,37 @@ def test_compiled_functions_compute_the_same_runs(
     monkeypatch.setattr(kernels, "ROWS_PER_THREAD", 1)
     for seed in range(many):
         chance = Random(f"{protocol} {seed}")
-        layout = ArrayLayout(random_description(chance))
+        description = random_description(chance)
         settings, clocks = random_settings(protocol, chance), chance.random() < 0.8
         runs = []
-        for compiled, threads in ((None, 1), (functions, chance.randint(1, 3))):
-            monkeypatch.setattr(cycle_run, "compiled_functions", lambda compiled=compiled: compiled)
+        for library, threads in ((None, 1), (functions, chance.randint(1, 3))):
+            use(monkeypatch, library)
             monkeypatch.setattr(kernels, "usable_processors", lambda threads=threads: threads)
-            runs.append(trace(layout, protocol, settings, seed, clocks=clocks))
+            runs.append(trace(ArrayLayout(description), protocol, settings, seed, clocks=clocks))
         assert runs[0] == runs[1], seed
 
 
+def test_random_numbers_and_orders_are_the_same(monkeypatch: pytest.MonkeyPatch, functions: ctypes.CDLL) -> None:
+    for seed in range(100):
+        chance = Random(seed)
+        names = [
+            "".join(chance.choices("aZ0 é\U0001f600", k=chance.randint(0, 60))) for _ in range(chance.randint(0, 9))
+        ]
+        names += ["long" * 40] * (chance.random() < 0.1) + ["\0"] * (chance.random() < 0.1)
+        numbers = np.array(
+            [chance.randrange(2 ** chance.randint(0, 62)) for _ in range(chance.randint(0, 50))], np.int64
+        )
+        found = []
+        for library in (None, functions):
+            use(monkeypatch, library)
+            keys = compiled.keys_and_steps(2**seed, names, len(names))
+            found.append([[part.tolist() for part in keys], compiled.sort_order(numbers % 1000).tolist()])
+            found[-1].append(compiled.sort_order(numbers).tolist())
+        assert found[0] == found[1], seed
+
+
 def test_the_functions_are_loaded_from_the_package(monkeypatch: pytest.MonkeyPatch) -> None:
-    kernels.compiled_functions.cache_clear()
+    compiled.compiled_functions.cache_clear()
     monkeypatch.setenv("ROBOCHOC_PURE", "1")
-    assert kernels.compiled_functions() is None
-    kernels.compiled_functions.cache_clear()
+    assert compiled.compiled_functions() is None
+    compiled.compiled_functions.cache_clear()
