@@ -175,6 +175,16 @@ def _first_line(one: ast.stmt) -> int:
     return min([one.lineno, *(decorator.lineno for decorator in decorators)])
 
 
+def kernels_library(root: Path, folder: Path) -> Path:
+    """Compile the kernels as a library in `folder`, for tests and benchmarks of a checkout; return the library."""
+    library = folder / "kernels.so"
+    compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")
+    words = [*compiler, *KERNELS_FLAGS, "-Wall", "-shared", "-fPIC", f"-I{sysconfig.get_path('include')}"]
+    source = root / f"{KERNELS.replace('.', '/')}.c"
+    subprocess.run([*words, "-o", str(library), str(source)], check=True)  # noqa: S603 - the compiler
+    return library
+
+
 def _compile_here(modules: list[str]) -> None:
     """Compile the modules and the kernels in this folder, each beside its source. An error ends the process."""
     from mypyc.build import mypycify  # noqa: PLC0415 - where nothing is compiled it need not be there

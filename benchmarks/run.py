@@ -15,6 +15,7 @@ from pathlib import Path
 
 import app_pages
 import array_cluster
+import arrays
 import auctions
 import choice
 import command_time
@@ -55,6 +56,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "network": network.measured,
     "sniffer": sniffer.measured,
     "app": app_pages.measured,
+    "arrays": arrays.measured,
     "auctions": auctions.measured,
     "choice": choice.measured,
     "wide": wide_tables.measured,

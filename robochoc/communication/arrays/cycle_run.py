@@ -14,9 +14,9 @@ from typing import ClassVar, NamedTuple, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from robochoc.communication.arrays import compiled
 from robochoc.communication.arrays.array_types import FEW, Flags, Floats, Index, Integers, Places
 from robochoc.communication.arrays.border import WHOLE_TEAM, Border
-from robochoc.communication.arrays.compiled import compiled_functions, keys_and_steps
 from robochoc.communication.arrays.kernels import LARGEST_VALUE_SIZE, CycleAccount, Kernels
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
 from robochoc.communication.arrays.tally import MessageTally
@@ -44,7 +44,7 @@ class Draws:
     """The random numbers of all robots, equal to those in `protocols/chance.py`: two words per robot."""
 
     def __init__(self, seed: int, names: Iterable[str], many: int) -> None:
-        self.states, self.steps = keys_and_steps(seed, names, many)
+        self.states, self.steps = compiled.keys_and_steps(seed, names, many)
 
     def draw(self, robots: Index) -> NDArray[np.float64]:
         """Return the next random number of each robot in `robots`, which must not contain duplicates."""
@@ -190,9 +190,9 @@ class CycleRun(ABC):
     def value_costs(self) -> list[Integers]:
         """Return the cost of each value of robots with neighbours, by group. Record the cost of the current values."""
         if self.kernels is not None:
-            compiled, account = self.kernels.value_costs(self.values)
+            totals, account = self.kernels.value_costs(self.values)
             self.note_account(account)
-            return compiled
+            return totals
         found, sums = [], self._settled_sums()
         for group, firsts in zip(self.layout.groups, self._firsts, strict=True):
             own = group.values(self.values)
@@ -234,7 +234,7 @@ class CycleRun(ABC):
     @cached_property
     def kernels(self) -> Kernels | None:
         """The compiled functions. None: numpy computes the cycles."""
-        functions = compiled_functions()
+        functions = compiled.compiled_functions()
         if functions is None or self.layout.index != np.int32 or self.layout.kind.itemsize > LARGEST_VALUE_SIZE:
             return None
         return Kernels(functions, self.layout, self.draws.states, self.draws.steps)

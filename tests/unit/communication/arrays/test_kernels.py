@@ -3,20 +3,15 @@
 from __future__ import annotations
 
 import ctypes
-import shlex
-import shutil
-import subprocess
-import sysconfig
 from collections.abc import Sequence
-from pathlib import Path
 from random import Random
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hatch_build import KERNELS, KERNELS_FLAGS, may_compile
-from robochoc.communication.arrays import compiled, cycle_run, kernels
+from hatch_build import kernels_library, may_compile
+from robochoc.communication.arrays import compiled, kernels
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.cycle_run import cycles_of
 from robochoc.communication.arrays.description import Description, KnownConstraints
@@ -25,8 +20,8 @@ from robochoc.protocols.settings import read_settings
 from robochoc.run.registry import protocol_named
 from tests.support.array_teams import PROTOCOLS, random_settings
 from tests.support.examples import count
+from tests.support.program import ROOT
 
-SOURCE = Path(__file__).parents[4] / f"{KERNELS.replace('.', '/')}.c"
 SIZES = (1, 2, 3, 4, 5, 8, 9, 12, 14, 130, 300)
 COSTS = ((0, 1), (0, 0, 1, 2, 70_000), (0, 1, 2**40), (0, 3, np.inf), (0, 5, 2**33 - 1, np.inf))
 
@@ -34,14 +29,9 @@ COSTS = ((0, 1), (0, 0, 1, 2, 70_000), (0, 1, 2**40), (0, 3, np.inf), (0, 5, 2**
 @pytest.fixture(scope="module")
 def functions(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
     """The functions, compiled as for a wheel."""
-    if not may_compile() or shutil.which("cc") is None:
+    if not may_compile():
         pytest.skip("no C compiler, or no headers of Python")
-    library = tmp_path_factory.mktemp("kernels") / "kernels.so"
-    compiler = shlex.split(sysconfig.get_config_var("CC") or "cc")
-    headers = sysconfig.get_path("include")
-    words = [*compiler, *KERNELS_FLAGS, "-Wall", "-Werror", "-shared", "-fPIC", f"-I{headers}"]
-    subprocess.run([*words, "-o", str(library), str(SOURCE)], check=True)
-    return ctypes.CDLL(str(library))
+    return ctypes.CDLL(str(kernels_library(ROOT, tmp_path_factory.mktemp("kernels"))))
 
 
 def random_description(chance: Random) -> Description:
@@ -91,9 +81,8 @@ def _known(shape: tuple[int, ...], entries: list[tuple[int, Sequence[int], bytes
 
 
 def use(monkeypatch: pytest.MonkeyPatch, library: ctypes.CDLL | None) -> None:
-    """Let all modules use the functions of `library`; None: numpy."""
-    for module in (compiled, cycle_run):
-        monkeypatch.setattr(module, "compiled_functions", lambda: library)
+    """Use the functions of `library`; None: numpy."""
+    monkeypatch.setattr(compiled, "compiled_functions", lambda: library)
 
 
 def trace(layout: ArrayLayout, protocol: str, settings: dict[str, str], seed: int, *, clocks: bool) -> list[Any]:
