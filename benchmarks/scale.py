@@ -7,6 +7,7 @@ system, with children) and the peak of memory of the process, a row for each gra
 Nothing is kept.
 """
 
+# ruff: noqa: PLC0415 - the peak of memory of a command is at least that of this process, which must stay small
 from __future__ import annotations
 
 import argparse
@@ -25,23 +26,6 @@ from typing import TypeVar
 
 from measure import ROOT, say
 from report import Row, Section
-
-from robochoc.cli.reports.outcome import outcome_report
-from robochoc.cli.reports.scene import scene_for
-from robochoc.formats import read_team, write_team
-from robochoc.formats.validation import check_team
-from robochoc.generators.coloring import Conflicts, coloring_of
-from robochoc.generators.graphs import tree, uniform
-from robochoc.journal.recorder import recorded
-from robochoc.model.orders import Order, with_order
-from robochoc.run import Options, Runtime, solve
-from robochoc.run.evaluation import check_with_files
-from robochoc.run.phases import first_phase
-from robochoc.run.recording import journal_header, objective_to_record
-from robochoc.run.registry import protocol_named
-from robochoc.run.runtimes import SessionRequest, open_session
-from robochoc.solver.compile import TeamCompiler
-from robochoc.view.page import scene_page
 
 SIZES = (1_000, 3_000, 10_000)
 CYCLES = 20
@@ -94,10 +78,9 @@ def cost_of(words: Sequence[str]) -> tuple[float, float] | None:
 
 
 GROWING = (64, 256, 1_024, 4_096)
-TURNS = 3
 STAGES = ("read", "validate", "compile", "search", "check", "report", "journal", "page", "messages")
-ORDER = Order.MIN_WIDTH
 TREES = ("abt", "afc-ng", "sfb", "dpop")
+PROTOCOLS = (*TREES, "mgm")
 Result = TypeVar("Result")
 
 
@@ -106,15 +89,15 @@ def measured() -> Section:
     rows: list[Row] = [
         ("protocol", "stage", *(f"{size:,} robots" for size in GROWING), "exponent", f"from {GROWING[1]}")
     ]
-    for protocol in (*TREES, "mgm"):
-        taken = [_least(protocol, size) for size in GROWING]
+    for protocol in PROTOCOLS:
+        taken = [_cost_of_stages(protocol, size) for size in GROWING]
         for number, stage in enumerate(STAGES):
             values = [one[number] for one in taken]
             shown = [f"{value:,.0f}" if stage == "messages" else f"{1000 * value:,.1f}" for value in values]
             exponents = [exponent(GROWING[first:], values[first:]) for first in (0, 1)]
             rows.append((protocol, stage, *shown, *(f"{one:.2f}" for one in exponents)))
     notes = (
-        f"CPU milliseconds of each stage in one process without its start, the least of {TURNS}. Graph colouring with "
+        "CPU milliseconds of each stage in one process without its start, one run each. Graph colouring with "
         "3 colours: trees with hard conflicts for ABT, AFC-ng and SFB, trees with costs for DPOP, random graphs of "
         "degree 4 with costs and 20 cycles for MGM. read: the files; validate: the same team as objects; compile: in "
         "the order min-width; search: with the preparation of the robots, in the simulator; check: the answer against "
@@ -129,17 +112,32 @@ def exponent(sizes: Sequence[int], values: Sequence[float]) -> float:
     return statistics.linear_regression([math.log(size) for size in sizes], [math.log(one) for one in values]).slope
 
 
-def _least(protocol: str, size: int) -> list[float]:
+def _cost_of_stages(protocol: str, size: int) -> list[float]:
     say(f"{protocol}, {size} robots")
     command = [sys.executable, __file__, "--stages", protocol, "--sizes", str(size)]
-    runs = [
-        json.loads(subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout) for _ in range(TURNS)
-    ]
-    return [min(column) for column in zip(*runs, strict=True)]
+    found: list[float] = json.loads(subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True).stdout)
+    return found
 
 
 def cpu_of_stages(protocol: str, size: int) -> list[float]:
     """Return the CPU seconds of each stage, and the number of messages, in the order of `STAGES`."""
+    from robochoc.cli.reports.outcome import outcome_report
+    from robochoc.cli.reports.scene import scene_for
+    from robochoc.formats import read_team, write_team
+    from robochoc.formats.validation import check_team
+    from robochoc.generators.coloring import Conflicts, coloring_of
+    from robochoc.generators.graphs import tree, uniform
+    from robochoc.journal.recorder import recorded
+    from robochoc.model.orders import Order, with_order
+    from robochoc.run import Options, Runtime, solve
+    from robochoc.run.evaluation import check_with_files
+    from robochoc.run.phases import first_phase
+    from robochoc.run.recording import journal_header, objective_to_record
+    from robochoc.run.registry import protocol_named
+    from robochoc.run.runtimes import SessionRequest, open_session
+    from robochoc.solver.compile import TeamCompiler
+    from robochoc.view.page import scene_page
+
     spent: list[float] = []
 
     def timed(act: Callable[[], Result]) -> Result:
@@ -151,14 +149,14 @@ def cpu_of_stages(protocol: str, size: int) -> list[float]:
     conflicts = Conflicts.SOFT if protocol in {"dpop", "mgm"} else Conflicts.HARD
     graph = tree(size) if protocol in TREES else uniform(size, 2 * size, "")
     settings = {} if protocol in TREES else {"cycles": str(CYCLES)}
-    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, settings=settings, order=ORDER)
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, settings=settings, order=Order.MIN_WIDTH)
     phase = first_phase(options, protocol_named(protocol), lambda: 0)
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "team"
         write_team(coloring_of(graph, 3, conflicts=conflicts), folder)
         team = timed(lambda: read_team(folder))
         timed(lambda: check_team(replace(team)))
-        ordered = with_order(team, ORDER)
+        ordered = with_order(team, Order.MIN_WIDTH)
         compiled = timed(lambda: TeamCompiler(None, None, None, None, None).compile(ordered))
         request = SessionRequest(phase.protocol, compiled, phase.parameters, options)
         result = timed(lambda: open_session(request).search())
