@@ -44,7 +44,8 @@ class Picture {
     const THREE = MeshCat.THREE;
     const { renderer } = this.viewer;
     const { x, y } = renderer.getDrawingBufferSize(new THREE.Vector2());
-    const target = new THREE.WebGLMultisampleRenderTarget(x, y, { format: THREE.RGBAFormat });
+    const format = { format: THREE.RGBAFormat, stencilBuffer: true }; // then depth has 24 bits, otherwise 16
+    const target = new THREE.WebGLMultisampleRenderTarget(x, y, format);
     target.samples = Picture.SAMPLES;
     const copy = new THREE.Mesh(
       new THREE.PlaneGeometry(2, 2),
