@@ -53,7 +53,7 @@ class GrowingFile(io.RawIOBase):
     @property
     def head(self) -> bytes:
         """The file's first bytes, which identify a journal."""
-        return os.pread(self._descriptor, _HEAD_BYTES, 0)
+        return self._read_at(_HEAD_BYTES, 0)
 
     def widen(self, most: int) -> bool:
         """Increase `end` by up to `most` existing bytes. Return whether there were any."""
@@ -83,7 +83,13 @@ class GrowingFile(io.RawIOBase):
 
     def readinto(self, buffer: Any) -> int:  # noqa: ANN401 - whatever holds bytes
         """Read into `buffer`, and return the number of bytes read, which is 0 at `end`."""
-        content = os.pread(self._descriptor, min(len(buffer), max(0, self.end - self.place)), self.place)
+        content = self._read_at(min(len(buffer), max(0, self.end - self.place)), self.place)
         buffer[: len(content)] = content
         self.place += len(content)
         return len(content)
+
+    def _read_at(self, size: int, place: int) -> bytes:
+        if hasattr(os, "pread"):
+            return os.pread(self._descriptor, size, place)
+        os.lseek(self._descriptor, place, os.SEEK_SET)  # Windows, where no other process writes the open file
+        return os.read(self._descriptor, size)
