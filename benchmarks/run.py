@@ -22,6 +22,7 @@ import command_time
 import crowd
 import flagship
 import flight
+import journal_tools
 import journals
 import messages
 import network
@@ -55,6 +56,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "peers_costs": peers.measured_costs,
     "network": network.measured,
     "sniffer": sniffer.measured,
+    "journal_tools": journal_tools.measured,
     "app": app_pages.measured,
     "arrays": arrays.measured,
     "auctions": auctions.measured,
