@@ -14,7 +14,7 @@ from robochoc.run.facts import Facts
 from robochoc.solver.encoding import MAX_TUPLES
 from robochoc.solver.filters import MAX_FILTER_BITS
 
-NARROW_CELLS = 2_000_000
+NARROW_CELLS = 4_000_000
 """The largest number of entries of a table on a narrow pseudo-tree."""
 FEW_ROBOTS = 6
 """Up to this number of robots every protocol takes milliseconds, and `sfb` needs the fewest messages."""
@@ -28,20 +28,22 @@ EASY = 0.48
 """The constrainedness up to which robots that search at the same time find a solution after few changes."""
 HARD = 0.68
 """The constrainedness from which `sfb` saves more messages than it takes time for each of them."""
+DENSE = 0.6
+"""The share of linked pairs from which a small part of the team may already have no assignment without costs."""
 FREE = 0.5
 """The constrainedness, of the problem without any costs, up to which such an assignment is likely."""
+LARGE_PAIR = 10_000
+"""The entries of a constraint's table from which `sfb` takes long for each message: two robots with 100 values."""
 NEARLY_ALL = 0.9
 """The share of linked pairs from which only `sfb` backtracks early enough (queens)."""
 SMALL_TEAM = 12
 """Up to this number of robots, the computations before the search count more than the search."""
-HARD_SMALL = 0.8
-"""The same as `HARD` for up to `SMALL_TEAM` robots."""
+HARD_SMALL = (0.8, 1.3)
+"""Between these, the same as `HARD` for up to `SMALL_TEAM` robots: with more, a contradiction is found soon."""
 LARGE_TEAM = 100
-"""With more robots, a search by one robot after the other takes longer than a search by all at the same time."""
-LARGE_DOMAIN = 16
-"""With more values, the messages of `sfb` take much longer to compute."""
+"""With more robots, a search by one robot after the other takes longer than one by all at the same time."""
 HARD_LARGE = 0.8
-"""The same as `HARD` for more than `LARGE_TEAM` robots or `LARGE_DOMAIN` values."""
+"""The same as `HARD` for more than `LARGE_TEAM` robots."""
 FEW_TO_BEGIN_ANEW = 25
 """Up to this many robots, `sfb` decides hard problems in the files' order, which dynamic problems keep."""
 TIGHT = 0.7
@@ -97,18 +99,15 @@ MORE_THAN_FEW = Condition(
 )
 NO_WITHDRAWAL = Condition(lambda f: not f.withdrawal, "no --withdraw", "robots may withdraw")
 NOT_COMPLETE = Condition(
-    lambda f: f.robots <= SMALL_TEAM or f.share_linked < NEARLY_ALL,
-    f"at most {SMALL_TEAM} robots, or less than {NEARLY_ALL:.0%} of all pairs linked",
+    lambda f: f.robots <= SMALL_TEAM or f.share_linked < NEARLY_ALL or f.declared_table > LARGE_PAIR,
+    f"at most {SMALL_TEAM} robots, or less than {NEARLY_ALL:.0%} of all pairs linked, or more than 100 values",
     f"{NEARLY_ALL:.0%} or more of all pairs of robots are linked",
 )
 ANY_SOLUTION = (NO_COSTS, NO_WITHDRAWAL, MORE_THAN_FEW, NOT_COMPLETE)
 NOT_HARD = Condition(
-    lambda f: (
-        f.constrainedness
-        < (HARD_LARGE if f.robots > LARGE_TEAM or max(f.declared_sizes.values()) > LARGE_DOMAIN else HARD)
-    ),
-    f"a constrainedness below {HARD} (more than {LARGE_TEAM} robots, or {LARGE_DOMAIN} values: {HARD_LARGE})",
-    f"the constrainedness is {HARD} or more (more than {LARGE_TEAM} robots, or {LARGE_DOMAIN} values: {HARD_LARGE})",
+    lambda f: f.constrainedness < (HARD_LARGE if f.robots > LARGE_TEAM else HARD),
+    f"a constrainedness below {HARD} (more than {LARGE_TEAM} robots: {HARD_LARGE})",
+    f"the constrainedness is {HARD} or more (more than {LARGE_TEAM} robots: {HARD_LARGE})",
 )
 LOSSY = Condition(lambda f: f.loss > 0, "messages may be lost", "no message is lost")
 NEARLY_A_TREE = (
@@ -244,6 +243,11 @@ RULES = (
                 f"there are more than {MANY_ROBOTS} robots",
             ),
             Condition(
+                lambda f: f.share_linked < DENSE,
+                f"less than {DENSE:.0%} of all pairs linked",
+                f"{DENSE:.0%} or more of all pairs of robots are linked",
+            ),
+            Condition(
                 lambda f: f.cost_constrainedness < FREE,
                 f"a constrainedness below {FREE} if nothing may cost anything",
                 f"the constrainedness is {FREE} or more if nothing may cost anything",
@@ -304,32 +308,18 @@ RULES = (
                 f"there are more than {SMALL_TEAM} robots",
             ),
             Condition(
-                lambda f: f.constrainedness < HARD_SMALL,
-                f"a constrainedness below {HARD_SMALL}",
-                f"the constrainedness is {HARD_SMALL} or more",
+                lambda f: not HARD_SMALL[0] <= f.constrainedness < HARD_SMALL[1],
+                f"a constrainedness below {HARD_SMALL[0]}, or of {HARD_SMALL[1]} or more",
+                f"the constrainedness is from {HARD_SMALL[0]} to {HARD_SMALL[1]}",
             ),
         ),
-        "there are few robots, and constraints do not exclude much: nothing is computed before the search",
-        Order.MAX_DEGREE,
-    ),
-    Rule(
-        "afc-ng",
-        (
-            *ANY_SOLUTION,
-            NOT_HARD,
-            Condition(
-                lambda f: f.robots <= LARGE_TEAM,
-                f"at most {LARGE_TEAM} robots",
-                f"there are more than {LARGE_TEAM} robots",
-            ),
-        ),
-        "constraints do not exclude much: it sends few and short messages",
+        "there are few robots: it computes nothing before the search",
         Order.MAX_DEGREE,
     ),
     Rule(
         "abt",
         (*ANY_SOLUTION, NOT_HARD),
-        "constraints do not exclude much, and there are many robots: they search at the same time, with short messages",
+        "constraints do not exclude much: robots search at the same time, with short messages",
         Order.MAX_DEGREE,
     ),
     Rule(
