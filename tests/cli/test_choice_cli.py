@@ -27,7 +27,7 @@ def test_what_was_chosen_is_said_with_the_reason_and_more_on_request(four: Path)
     )
     assert "  not dpop: there are no costs\n" in said
     assert "; a constrainedness of about " in said
-    assert "  not abt: no constraint is partially known (PKC); the constrainedness is 0.48 or more " in said
+    assert "  not abt: no constraint is partially known (PKC); the constrainedness is 0.48 or more" in said
     assert "  not sfb" not in said
     assert "message is lost" not in said
 
