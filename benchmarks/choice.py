@@ -289,7 +289,12 @@ def _summary(name: str, rows: list[Measured]) -> Row:
     regrets = sorted(map(_regret, rows))
     nine = statistics.quantiles(regrets, n=10, method="inclusive")[-1]
     poor = sum(_regret(row) > 2.5 and _auto_s(row) - _best_s(row) > LONG_S for row in rows)
-    return name, str(len(rows)), f"{statistics.median(regrets):.2f}", f"{nine:.2f}", f"{regrets[-1]:.2f}", str(poor)
+    figures = map(_in_words, (statistics.median(regrets), nine, regrets[-1]))
+    return name, str(len(rows)), *figures, str(poor)
+
+
+def _in_words(regret: float) -> str:
+    return f"{regret:.2f}" if regret < math.inf else "not decided"
 
 
 def _family_row(name: str, rows: list[Measured]) -> Row:
@@ -297,8 +302,8 @@ def _family_row(name: str, rows: list[Measured]) -> Row:
     return (
         name,
         f"{min(robots)} to {max(robots):,}",
-        f"{statistics.median(regrets):.2f}",
-        f"{max(regrets):.2f}",
+        _in_words(statistics.median(regrets)),
+        _in_words(max(regrets)),
         _listed(row["auto"] for row in rows),
         _listed((_best(row) or ("",))[0] for row in rows),
     )
