@@ -16,6 +16,7 @@ from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import CompileLimits
 from robochoc.verification.checker import RefutedError
 from tests.support.cases import looped
+from tests.support.limits import HANG_S
 
 DIFFERENCES = (-1, 0, 1)
 
@@ -163,6 +164,7 @@ def test_all_searches_of_the_central_solver_use_one_process(monkeypatch: pytest.
         start(process)
 
     monkeypatch.setattr(AceProcess, "_start", counted_start)
+    monkeypatch.setattr("robochoc.solver.central.HEDGE_S", HANG_S)  # however busy the machine is
     model, _ = random_model(3)
     assert len(list(model.solutions(local=CompileLimits(always_ace=True)))) > 1
     assert len(started) == 1
