@@ -6,8 +6,10 @@
 from __future__ import annotations
 
 import dataclasses
+import sys
 from collections.abc import Sequence
 from dataclasses import MISSING, Field, FrozenInstanceError
+from types import FunctionType
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -51,7 +53,8 @@ class _OnFirstUse:
     def __get__(self, instance: object, owner: type) -> object:
         made = self._init() if self._name == "__init__" else self._by_dataclasses()
         setattr(self._cls, self._name, made)
-        return getattr(owner if instance is None else instance, self._name)
+        # `super().__init__` must return this method, although the subclass overrides it.
+        return made.__get__(instance, owner) if isinstance(made, FunctionType) else made
 
     def _by_dataclasses(self) -> Any:  # noqa: ANN401 - a method or an attribute
         """Let `dataclasses` work on a class with the same fields and no methods."""
@@ -81,7 +84,7 @@ class _OnFirstUse:
     def _init(self) -> Any:  # noqa: ANN401 - a function
         """Compile `__init__`. `dataclasses` would compile two further methods with it."""
         fields = self._fields()
-        space: dict[str, Any] = {_SET: object.__setattr__, _UNSET: _Unset(), "__name__": self._cls.__module__}
+        space = {**vars(sys.modules[self._cls.__module__]), _SET: object.__setattr__, _UNSET: _Unset()}
         lines, parameters = [], ["self"]
         for field in fields:
             value = field.name
@@ -136,3 +139,5 @@ def _make_lazy(cls: Any, options: dict[str, bool]) -> None:  # noqa: ANN401 - an
         super(cls, self).__delattr__(name)
 
     cls.__setattr__, cls.__delattr__ = set_attribute, delete_attribute
+    if sys.version_info >= (3, 13) and "__replace__" not in own:
+        cls.__replace__ = dataclasses._replace  # for `copy.replace`

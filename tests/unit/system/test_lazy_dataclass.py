@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import KW_ONLY, FrozenInstanceError, field
 from importlib import import_module
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_type_hints
 
 import pytest
 
@@ -111,3 +111,37 @@ def test_signatures_of_robochoc_are_those_of_dataclasses() -> None:
                 fields = [(one.name, one.type, one) for one in dataclasses.fields(cls)]
                 theirs = dataclasses.make_dataclass("Theirs", fields, frozen=True)
                 assert str(inspect.signature(cls)) == str(inspect.signature(theirs)), cls
+
+
+def test_methods_of_subclasses_call_those_of_lazy_base_classes() -> None:
+    @dataclass(frozen=True)
+    class Base:
+        x: int
+        domain: Domain | None = None
+
+    class Child(Base):
+        def __init__(self, word: str) -> None:
+            super().__init__(len(word))
+
+        def __eq__(self, other: object) -> bool:
+            return super().__eq__(other)
+
+        def __hash__(self) -> int:
+            return super().__hash__() + 1
+
+        def __repr__(self) -> str:
+            return super().__repr__() + "!"
+
+    assert (repr(Child("abc")).count("!"), Child("abc")) == (1, Child("abc"))
+    assert [hash(Child("abc")) - hash(Base(3)) for _ in range(2)] == [1, 1]
+
+
+def test_annotations_of_constructors_can_be_resolved() -> None:
+    assert get_type_hints(Domain.__init__)["name"] is str
+    signature = inspect.signature(Domain, eval_str=True)
+    assert signature.parameters["name"].annotation is str
+
+
+@pytest.mark.skipif(sys.version_info < (3, 13), reason="copy.replace was added in Python 3.13")
+def test_instances_can_be_copied_with_changes() -> None:
+    assert copy.replace(Domain("D", (range(1, 3),)), name="E").name == "E"  # type: ignore[attr-defined]
