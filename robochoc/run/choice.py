@@ -254,5 +254,7 @@ def _in_words(facts: Facts) -> Iterator[str]:
     yield f"{counted(facts.values, 'value')} in all, {facts.largest_domain:,} of a robot at most"
     if not facts.has_costs:
         yield f"a constrainedness of about {facts.constrainedness:.2f}"
+        if facts.crowd:
+            yield f"{facts.crowd.robots} robots need different values, and have only {facts.crowd.values}"
     if facts.has_costs and facts.tree.cells <= LARGE:
         yield f"a pseudo-tree of induced width {facts.tree.width}, tables of {facts.tree.cells:,.0f} entries at most"

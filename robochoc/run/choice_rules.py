@@ -103,6 +103,11 @@ NOT_COMPLETE = Condition(
     f"at most {SMALL_TEAM} robots, or less than {NEARLY_ALL:.0%} of all pairs linked, or more than 100 values",
     f"{NEARLY_ALL:.0%} or more of all pairs of robots are linked",
 )
+NO_CROWD = Condition(
+    lambda f: f.crowd is None,
+    "no group of robots that need more different values than they have",
+    "a group of robots needs more different values than it has",
+)
 ANY_SOLUTION = (NO_COSTS, NO_WITHDRAWAL, MORE_THAN_FEW, NOT_COMPLETE)
 NOT_HARD = Condition(
     lambda f: f.constrainedness < (HARD_LARGE if f.robots > LARGE_TEAM else HARD),
@@ -295,6 +300,7 @@ RULES = (
                 f"at most {SMALL_TEAM} robots, or no constraint over more than two",
                 f"there are more than {SMALL_TEAM} robots, and constraints over more than two",
             ),
+            NO_CROWD,
         ),
         "constraints exclude little: robots that search at the same time soon agree, also in the order of the files",
     ),
@@ -312,13 +318,14 @@ RULES = (
                 f"a constrainedness below {HARD_SMALL[0]}, or of {HARD_SMALL[1]} or more",
                 f"the constrainedness is from {HARD_SMALL[0]} to {HARD_SMALL[1]}",
             ),
+            NO_CROWD,
         ),
         "there are few robots: it computes nothing before the search",
         Order.MAX_DEGREE,
     ),
     Rule(
         "abt",
-        (*ANY_SOLUTION, NOT_HARD),
+        (*ANY_SOLUTION, NOT_HARD, NO_CROWD),
         "constraints do not exclude much: robots search at the same time, with short messages",
         Order.MAX_DEGREE,
     ),

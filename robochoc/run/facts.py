@@ -12,6 +12,7 @@ from random import Random
 from robochoc.model.change import team_after_events
 from robochoc.model.orders import Graph, constraint_graph
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
+from robochoc.run.pigeonholes import Crowd, find_crowd
 from robochoc.solver.encoding import MAX_TUPLES, cost_function, is_soft
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -188,6 +189,11 @@ class Facts:
             if parents * examined[same] >= 1:
                 return False
         return True
+
+    @cached_property
+    def crowd(self) -> Crowd | None:
+        """A group of robots that need different values of which there are too few; None if no group was found."""
+        return find_crowd(self.first)
 
     @cached_property
     def tree(self) -> TreeTables:

@@ -13,6 +13,7 @@ import pytest
 
 from robochoc.generators.coloring import coloring, coloring_of
 from robochoc.generators.graphs import grid, tree
+from robochoc.generators.meetings import meetings
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp, random_on
 from robochoc.generators.scenario import random_scenario
@@ -168,6 +169,8 @@ def test_each_epoch_of_a_problem_that_changes_is_that_of_brute_force(many: int) 
 
 
 PART = pkc_part("AB", (0, 0))
+CROWDED = meetings(23, 32, 3, 7, 395737, max_value=None, model="eav")
+"""32 meetings. Eight of them have common participants, and there are seven slots."""
 
 
 def test_what_is_chosen() -> None:
@@ -185,6 +188,8 @@ def test_what_is_chosen() -> None:
         (coloring_of(grid(8, 8), 3, conflicts="hard"), {}, "sbt", None),
         (coloring(200, 3, 3.5, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
         (coloring(200, 3, 4.5, conflicts="hard"), {}, "sfb", Order.MIN_WIDTH),
+        (CROWDED, {}, "sfb", Order.MIN_WIDTH),
+        (CROWDED, {"order": Order.GIVEN}, "sfb", None),
         (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MINIMUM}, "sfb", Order.DOM_DEG),
         (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MAXIMAL}, "sfb", None),
         (random_csp(10, 4, 0.5, 0, max_cost=9), {}, "dpop", None),
@@ -223,6 +228,14 @@ def test_what_is_chosen() -> None:
                 assert found.facts
                 assert protocol not in dict(found.rejected)
                 assert choose(team, found.options).options == found.options
+
+
+def test_a_crowd_is_reported_and_the_search_ends() -> None:
+    outcome = solve(CROWDED, Options(runtime=Runtime.SIMULATOR, cache=False))
+    assert (outcome.protocol, outcome.verdict) == ("sfb", Verdict.NO_SOLUTION)
+    found = choose(CROWDED, Options())
+    assert "8 robots need different values, and have only 7" in found.facts
+    assert "a group of robots needs more different values than it has" in dict(found.rejected)["abt"]
 
 
 def test_what_was_asked_for_is_not_changed() -> None:
