@@ -178,15 +178,20 @@ class Facts:
 
     @cached_property
     def needs_no_backtracking(self) -> bool:
-        """True if a robot's parents leave it a value, whatever they choose, in the order of the files."""
-        parents = max((len(robot.parents) for robot in self.first.robots), default=0)
+        """True if a robot's parents leave it a value, whatever they choose, in the order of the files.
+
+        False if this is not easily seen: of robots with several variables, and of constraints over more robots.
+        """
+        if any(len(robot.variables) > 1 for robot in self.first.robots):
+            return False
+        most_constraints = max((len(robot.shared) for robot in self.first.robots), default=0)
         examined: dict[tuple[object, ...], float] = {}
         for constraint in self.first.constraints():
             places = (one if isinstance(one, int) else id(self._domains[one]) for one in constraint.parameters)
             same = (id(constraint.definition), constraint.cost, *places)
             if same not in examined:
                 examined[same] = _largest_share_excluded(constraint, self._domains)
-            if parents * examined[same] >= 1:
+            if most_constraints * examined[same] >= 1:
                 return False
         return True
 

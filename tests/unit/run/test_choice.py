@@ -20,6 +20,7 @@ from robochoc.generators.scenario import random_scenario
 from robochoc.model.orders import Order
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, AddAgent, Change, ProblemKind, Team
+from robochoc.modelling.model import Model
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
 from robochoc.run.choice import ACCEPTS, choose, choose_for_private_team
 from robochoc.run.facts import Facts, TreeTables
@@ -278,6 +279,22 @@ def test_how_much_is_forbidden_is_what_counting_says() -> None:
     assert Facts(random_csp(2, 40, 1, 0.5)).constrainedness == pytest.approx(1 / (2 * log2(40)), rel=0.3)  # by drawing
     assert Facts(team_of({"A": (1,), "B": (1,)}, [])).constrainedness == 0
     assert Facts(random_csp(2, 5, 1, 1)).constrainedness > 1
+
+
+def test_parents_leave_a_value_only_if_all_constraints_together_leave_it() -> None:
+    """Three constraints of a pair may exclude a third of the values each, and a robot's variables exclude others'."""
+    model = Model("chain")
+    first, second = (model.robot(name).variable(name, range(3)) for name in "AB")
+    model.add(first != second, first != second + 1)
+    assert Facts(model.team).needs_no_backtracking
+    model.add(first != second + 2, first != second - 1, first != second - 2)
+    assert not Facts(model.team).needs_no_backtracking
+    assert model.solve(runtime="simulator").verdict == Verdict.NO_SOLUTION
+    model = Model("two variables of a robot")
+    first, robot = model.robot("A").variable("A", range(2)), model.robot("B")
+    second, third = (robot.variable(name, range(2)) for name in "CD")
+    model.add(first != second, first != third, second != third)
+    assert not Facts(model.team).needs_no_backtracking
 
 
 def test_what_something_outside_changes_is_left_to_who_keeps_what_holds() -> None:
