@@ -318,7 +318,11 @@ RULES = (
                 f"a constrainedness below {HARD_SMALL[0]}, or of {HARD_SMALL[1]} or more",
                 f"the constrainedness is from {HARD_SMALL[0]} to {HARD_SMALL[1]}",
             ),
-            NO_CROWD,
+            Condition(
+                lambda f: f.constrainedness >= HARD_SMALL[1] or f.crowd is None,
+                f"{NO_CROWD.text}, or a constrainedness of {HARD_SMALL[1]} or more",
+                NO_CROWD.otherwise,
+            ),
         ),
         "there are few robots: it computes nothing before the search",
         Order.MAX_DEGREE,

@@ -189,6 +189,7 @@ def test_what_is_chosen() -> None:
         (coloring_of(grid(8, 8), 3, conflicts="hard"), {}, "sbt", None),
         (coloring(200, 3, 3.5, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
         (coloring(200, 3, 4.5, conflicts="hard"), {}, "sfb", Order.MIN_WIDTH),
+        (queens3d(3), {}, "sbt", Order.MAX_DEGREE),
         (CROWDED, {}, "sfb", Order.MIN_WIDTH),
         (CROWDED, {"order": Order.GIVEN}, "sfb", None),
         (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MINIMUM}, "sfb", Order.DOM_DEG),
