@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hatch_build import kernels_library, may_compile
 from robochoc.communication.arrays import compiled, kernels
 from robochoc.communication.arrays.array_runs import array_run_for
 from robochoc.communication.arrays.cycle_run import cycles_of
@@ -28,7 +27,12 @@ COSTS = ((0, 1), (0, 0, 1, 2, 70_000), (0, 1, 2**40), (0, 3, np.inf), (0, 5, 2**
 
 @pytest.fixture(scope="module")
 def functions(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
-    """The functions, compiled as for a wheel."""
+    """The functions of the installed wheel, or compiled as for a wheel."""
+    installed = compiled.compiled_functions()
+    if installed is not None:
+        return installed
+    from hatch_build import kernels_library, may_compile  # noqa: PLC0415 - it is beside the sources, not in a wheel
+
     if not may_compile():
         pytest.skip("no C compiler, or no headers of Python")
     return ctypes.CDLL(str(kernels_library(ROOT, tmp_path_factory.mktemp("kernels"))))
