@@ -5,11 +5,17 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
+from threading import Lock
 
 RARE_THRESHOLD = 100_000
 """The number of new objects minus deleted ones that starts a collection of the youngest. Python's default is 700."""
 _active_freezes: list[None] = []
 """One item for each active `garbage_frozen` block."""
+_active_pauses: list[None] = []
+"""One item for each active `collection_paused` block that has disabled the collector."""
+_usual_thresholds: list[tuple[int, int, int]] = []
+"""For each active `collection_seldom` block, the thresholds before the first one. Threads may end in any order."""
+_thresholds_lock = Lock()
 
 
 @contextmanager
@@ -18,12 +24,14 @@ def collection_paused() -> Iterator[None]:
     if not gc.isenabled():
         yield
         return
+    _active_pauses.append(None)
     gc.disable()
     try:
         yield
     finally:
         count_as_old()
         gc.enable()
+        _active_pauses.pop()
 
 
 @contextmanager
@@ -33,12 +41,17 @@ def collection_seldom() -> Iterator[None]:
     This is meant for a search in one thread: it has many more pending messages than Python expects young objects, and
     each collection would visit all of them.
     """
-    before = gc.get_threshold()
-    gc.set_threshold(max(RARE_THRESHOLD, before[0]) if before[0] else 0, *before[1:])
+    with _thresholds_lock:
+        before = _usual_thresholds[0] if _usual_thresholds else gc.get_threshold()
+        _usual_thresholds.append(before)
+        gc.set_threshold(max(RARE_THRESHOLD, before[0]) if before[0] else 0, *before[1:])
     try:
         yield
     finally:
-        gc.set_threshold(*before)
+        with _thresholds_lock:
+            _usual_thresholds.pop()
+            if not _usual_thresholds:
+                gc.set_threshold(*before)
 
 
 @contextmanager
@@ -55,6 +68,14 @@ def garbage_frozen() -> Iterator[None]:
     finally:
         _active_freezes.pop()
         gc.unfreeze()
+
+
+def resume_in_child() -> None:
+    """Undo, in a forked process, the blocks of threads that only the parent has."""
+    if _active_pauses:
+        gc.enable()
+    if _usual_thresholds:
+        gc.set_threshold(*_usual_thresholds[0])
 
 
 def count_as_old() -> None:

@@ -15,7 +15,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from distributed import CancelledError, Client, Future, Worker, get_worker, wait
+from distributed import CancelledError, Client, Future, Worker, get_worker, secede, wait
 
 from robochoc.communication.arrays.blocks import Block, BlockLostError, BlockReport, RunBlock, joined, split_team
 from robochoc.communication.arrays.cluster_client import SchedulerLostError, connect
@@ -138,8 +138,12 @@ async def _receive(key: str, number: int, sender: int, content: bytes | None) ->
 
 
 def _run(block: Block, run: RunBlock, key: str, addresses: list[str]) -> BlockReport:
-    """Run a block in a thread of a worker."""
+    """Run a block in a thread of a worker.
+
+    The block leaves the worker's pool of threads, where the blocks of two runs could wait for each other forever.
+    """
     channel = _WorkerChannel(get_worker(), key, block.number, addresses)
+    secede()
     try:
         return run(block, channel)
     finally:

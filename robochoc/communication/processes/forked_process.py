@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from typing import NoReturn, Protocol
 
+from robochoc.system.garbage import resume_in_child
+
 
 class ChildProcess(Protocol):
     """The runtime's interface to a robot's process, for every start method."""
@@ -80,6 +82,7 @@ class ForkedProcess:
         status = 1
         try:
             gc.freeze()  # a garbage collection would write to inherited memory
+            resume_in_child()
             self._close()
             self._act()
             status = 0

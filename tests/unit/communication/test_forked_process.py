@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.processes.forked_process import ForkedProcess, ranges_of
+from robochoc.system.garbage import collection_paused, collection_seldom
 from tests.support.cases import looped
 from tests.support.leftovers import nothing_left_behind
 
@@ -51,6 +52,12 @@ def fails() -> None:
 )
 def test_it_ends_as_what_it_runs_ends(act: Callable[[], None], exitcode: int) -> None:
     assert ended(act) == exitcode
+
+
+def test_the_garbage_collector_is_not_paused_as_in_another_thread() -> None:
+    thresholds = gc.get_threshold()
+    with collection_paused(), collection_seldom():
+        assert ended(lambda: sys.exit(gc.isenabled() and gc.get_threshold() == thresholds)) == 1
 
 
 def test_an_error_is_printed(capfd: pytest.CaptureFixture[str]) -> None:

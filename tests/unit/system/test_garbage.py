@@ -75,3 +75,15 @@ def test_looks_are_seldom_and_then_as_before(before: int, meanwhile: int) -> Non
     with collection_seldom():
         assert gc.get_threshold() == (meanwhile, 10, 10)
     assert gc.get_threshold() == (before, 10, 10)
+
+
+def test_searches_in_threads_restore_the_thresholds() -> None:
+    """The first search ends before the second one."""
+    gc.set_threshold(700, 10, 10)
+    first, second = collection_seldom(), collection_seldom()
+    first.__enter__()
+    second.__enter__()
+    first.__exit__(None, None, None)
+    assert gc.get_threshold() == (RARE_THRESHOLD, 10, 10)
+    second.__exit__(None, None, None)
+    assert gc.get_threshold() == (700, 10, 10)

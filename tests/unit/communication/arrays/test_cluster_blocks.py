@@ -76,3 +76,13 @@ def test_a_loss_ends_the_run(cluster: Cluster, team: Path, victim: str) -> None:
     if victim == "worker":  # the others are free again
         done = robochoc_within("solve", team, "--runtime", "arrays", "--protocol", "dsa", "--cluster", cluster.file)
         assert done.returncode == 0
+
+
+def test_two_runs_use_a_cluster_at_the_same_time(cluster: Cluster, team: Path) -> None:
+    """Each worker has one thread. The second run does not wait for the first, so they cannot wait for each other."""
+    words = ["--runtime", "arrays", "--protocol", "dsa", "--cluster", str(cluster.file)]
+    with running([PROGRAM, "solve", str(team), *words, "--set", "cycles=1000000"], team.parent / "run") as run:
+        time.sleep(8)
+        assert not run.is_over, run.errors()
+        assert robochoc("solve", team, *words).returncode == 0
+        assert not run.is_over, run.errors()
