@@ -91,8 +91,11 @@ def _loss(client: Client, addresses: list[str], error: BaseException) -> Cluster
 
 
 def _workers(client: Client) -> set[str]:
-    """Return the addresses of the cluster's workers."""
-    return {*client.scheduler_info(n_workers=-1)["workers"]}
+    """Return the addresses of the cluster's workers. Raises `OSError` if the scheduler is lost."""
+    known = client.scheduler_info(n_workers=-1)
+    if "workers" not in known:
+        raise OSError("the scheduler is lost")
+    return {*known["workers"]}
 
 
 def _are_running(futures: list[Future]) -> bool:
