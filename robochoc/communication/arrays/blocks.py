@@ -174,7 +174,7 @@ def _part(
     starts = np.cumsum(given.degrees) - given.degrees
     sizes = given.sizes[robots]
     values = _entries(np.cumsum(given.sizes) - given.sizes, given.sizes, robots)
-    charges = None if given.charges is None else given.charges[values] * np.repeat(is_own, sizes)
+    charges = None if given.charges is None else np.where(np.repeat(is_own, sizes), given.charges[values], 0)
     lengths, domains, checks = given.value_bytes, given.domain_bytes, given.table_checks
     return Description(
         names=[given.names[robot] for robot in robots.tolist()],

@@ -35,6 +35,9 @@ def connect(address: str | None, file: Path | None, name: str) -> Client:
         address = _address_in(file) if file else address
         resolve_address(address)  # Dask reports an invalid address late, and in several lines
         return Client(address, set_as_default=False, name=name)
+    except FileNotFoundError:
+        hint = "; an address has a scheme, as in tcp://10.0.0.1:8786"
+        raise SchedulerLostError(f"there is no scheduler file {file or address}{hint}") from None
     except (OSError, ValueError) as error:
         raise SchedulerLostError(f"the scheduler at {file or address} cannot be reached: {error}") from None
 
