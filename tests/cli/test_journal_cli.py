@@ -391,6 +391,18 @@ def test_a_journal_in_a_pipe_is_shown_and_exported(file: Path) -> None:
         assert piped.stdout == journal(arguments[0], file, *arguments[1:]).stdout
 
 
+def test_a_named_pipe_is_opened_once(file: Path, tmp_path: Path) -> None:
+    """The writer of a short journal has ended before the pipe could be opened again."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for arguments in (("show",), ("export", "--format", "csv")):
+        writer = threading.Thread(target=pipe.write_bytes, args=(file.read_bytes(),))
+        writer.start()
+        piped = journal(arguments[0], pipe, *arguments[1:])
+        writer.join()
+        assert piped.stdout == journal(arguments[0], file, *arguments[1:]).stdout
+
+
 def _write_all(descriptor: int, content: bytes) -> None:
     with os.fdopen(descriptor, "wb") as stream:
         stream.write(content)

@@ -42,10 +42,10 @@ journal_team_option = click.option(
 )
 
 
-def saved_content(file: Path, next_step: str) -> bytes:
-    """Return the content of `file`. Raises `Failure`, whose message ends with `next_step`."""
+def saved_content(file: Path, next_step: str, opened: BinaryIO | None = None) -> bytes:
+    """Return the content of `file`, which may be `opened` already. Raises `Failure`, which ends with `next_step`."""
     try:
-        with file.open("rb") as stream:
+        with opened or file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
     except OSError as error:
         raise _failure(file, str(error.strerror or error), next_step) from error
@@ -54,11 +54,11 @@ def saved_content(file: Path, next_step: str) -> bytes:
     return content
 
 
-def saved_journal(file: Path) -> Journal:
-    """Return the journal in `file`. Raises `Failure`."""
+def saved_journal(file: Path, opened: BinaryIO | None = None) -> Journal:
+    """Return the journal in `file`, which may be `opened` already. Raises `Failure`."""
     from robochoc.journal.journal import JournalError, read_journal
 
-    content = saved_content(file, JOURNAL_STEP)
+    content = saved_content(file, JOURNAL_STEP, opened)
     try:
         return read_journal(content)
     except JournalError as error:
@@ -82,10 +82,11 @@ def saved_trace(file: Path) -> Iterator[SavedTrace]:
 
     with ExitStack() as stack:
         try:
+            stream = stack.enter_context(file.open("rb"))
             try:
-                saved = _read_trace(file, stack.enter_context(file.open("rb")))
+                saved = _read_trace(file, stream)
             except NoFileError:
-                journal = saved_journal(file)
+                journal = saved_journal(file, stream)  # to open a FIFO again would wait for a second writer
                 saved = SavedTrace(Trace.of(journal), lambda: journal.events, lambda: journal)
         except TraceTooLargeError as large:
             raise Failure(USAGE, f"{file}: {large}") from large
