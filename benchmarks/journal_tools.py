@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import resource
@@ -100,5 +101,12 @@ def _search(session: Any) -> None:  # noqa: ANN401 - imported late
         first = json.loads(session.search("cannot", first, count))["to"]
 
 
+def main() -> None:
+    """Measure the sniffer in this process, and print the rows as JSON."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("journal", type=Path, metavar="JOURNAL")
+    print(json.dumps(_sniffer(parser.parse_args().journal)))
+
+
 if __name__ == "__main__":
-    print(json.dumps(_sniffer(Path(sys.argv[1]))))
+    main()

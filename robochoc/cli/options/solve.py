@@ -82,8 +82,8 @@ preprocess_option = click.option(
 )
 cluster_option = click.option(
     "--cluster",
-    metavar="ADDRESS|FILE",
-    help="Arrays: the Dask cluster of this scheduler, or scheduler file.",
+    metavar="ADDRESS",
+    help="Arrays: address or file of a Dask scheduler.",
 )
 messages_option = click.option(
     "--messages",

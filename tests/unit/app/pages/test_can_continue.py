@@ -20,7 +20,8 @@ from tests.support.cases import looped
     [
         ("channels", RobotFails("Radio1"), ""),
         ("coverage", RobotFails("Eye1"), ""),
-        ("hangar", RobotJoins(Cell(0, 0)), "This team decides from scratch after a change"),
+        ("hangar", RobotJoins(Cell(0, 0)), ""),
+        ("cube", RobotFails("D11"), "This team decides from scratch after a change"),
         ("charging", RobotFails("Ada"), "This team has rules with costs"),
         ("secrets", RobotFails("Press"), "This team has private rules"),
     ],
