@@ -274,7 +274,7 @@ def _section(rows: list[Measured]) -> Section:
         f" derived from the seeds up to {HELD_BACK[0] - 1}. Counted is what depends on the choice: reordering"
         f" and search. Each candidate is stopped at {CUT} times the fastest so far, the choice of `auto` at"
         f" {LIMIT_S:.0f} s; runs up to {REPEATED_S * 1e3:.0f} ms are the fastest of three. Left out are problems that"
-        f" no candidate decided: {len(rows) - len(proven)}. All runs: [the table](results/choice.csv)."
+        f" no candidate decided: {len(rows) - len(proven)}. All runs: `benchmarks/results/choice.csv`."
     )
     held_back = [row for row in proven if row["seed"] in HELD_BACK]
     known = [row for row in proven if row["seed"] not in HELD_BACK]
