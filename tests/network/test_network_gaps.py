@@ -137,7 +137,7 @@ def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
 def test_why_a_robot_fails_reaches_other_owners_as_plain_text(tmp_path: Path) -> None:
     with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
         transport.send(MASTER, frame(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))
-        run.wait_until(lambda: "RX3" in run.master.members.robots, "it is not registered")
+        run.wait_until(lambda: len(run.master.members.robots) == len(CHAIN.robots), "they are not all registered")
         transport.send(MASTER, frame(run, "RX3", MASTER, RobotFailed("\x1b[2J\u202e" + "x" * 1_000_000)))
         with pytest.raises(RobotsLostError) as lost:
             run.wait_for_result()
