@@ -7,19 +7,21 @@ import math
 from collections import deque
 from collections.abc import Iterator
 from random import Random
+from typing import cast
 
 import pytest
 
 from robochoc.communication.arrays.session import ArraysRun
 from robochoc.communication.search_result import SearchResult
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.journal.events import AnyEvent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Team
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings import SettingsError, read_settings
-from robochoc.protocols.shared.anytime import Anytime, Best, BreadthFirstTree, Paid, Place, Step
+from robochoc.protocols.shared.anytime import Best, BreadthFirstTree, Paid, Place, Step
 from robochoc.protocols.shared.cycles import CycleProtocol, Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.compatibility.setting_rules import refuse_settings
@@ -28,7 +30,6 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
-from robochoc.system.compiled_core import kind_of_core
 from robochoc.verification.objective import Objective, withdrawal_cost
 from tests.support.agents import assert_refused, robot_of, sent, started
 from tests.support.cases import cases, looped
@@ -169,27 +170,36 @@ def _by_distance(root: str, linked: dict[str, tuple[str, ...]], distances: dict[
     yield from distances
 
 
-@pytest.mark.skipif(kind_of_core() == "compiled core", reason="replaces a method that compiled code calls directly")
-def test_a_robot_remembers_twice_the_height_and_a_few(monkeypatch: pytest.MonkeyPatch) -> None:
-    most = 0
-    record = Anytime.record
-
-    def looked_at(self: Anytime, step: int, index: int) -> list[tuple[str, Message]]:
-        nonlocal most
-        sent = record(self, step, index)
-        assert self.tree.height is not None
-        assert self.remembered <= 2 * self.tree.height + 4
-        most = max(most, self.remembered)
-        return sent
-
-    monkeypatch.setattr(Anytime, "record", looked_at)
+def test_a_robot_remembers_twice_the_height_and_a_few() -> None:
+    team = path(6)
     with cases() as each:
         for name in ("dsa", "mgm2", "maxsum"):
-            most = 0
             with each(name):
-                for seed in range(6):
-                    run(path(6), name, Random(seed), seed, cycles="60", anytime="yes")
-                assert most > 3
+                remembered = [most for seed in range(6) for most in remembered_in(team, name, seed)]
+                assert max(remembered) > 3
+
+
+def remembered_in(team: Team, name: str, seed: int) -> list[int]:
+    """Return how many steps the robots remember, at each event of a run. Checks that each remembers few."""
+    found: list[int] = []
+
+    def look(_: AnyEvent) -> None:
+        for host in simulation._hosts.values():  # noqa: SLF001 - what a robot remembers is nobody else's
+            anytime = cast("CycleProtocol", host.protocol)._anytime  # noqa: SLF001
+            if anytime is not None and anytime.tree.height is not None:
+                assert anytime.remembered <= 2 * anytime.tree.height + 4
+                found.append(anytime.remembered)
+
+    settings = {"cycles": "60", "anytime": "yes"}
+    simulation = Simulation(
+        team,
+        protocol_named(name),
+        any_schedule(Random(seed)),
+        observer=look,
+        parameters=RunParameters(seed, settings),
+    )
+    simulation.search()
+    return found
 
 
 def robot(cycles: str = "3", **settings: str) -> DSA:

@@ -118,7 +118,7 @@ _SECTIONS: Sections = {
     "--channel",
     type=CHANNEL_TYPE,
     metavar="NAME|FILE",
-    help=f"Simulator: model of radio and computing time: {', '.join(CHANNEL_NAMES)} or a TOML file.",
+    help=f"Simulator: times as on {', '.join(CHANNEL_NAMES)} or FILE.",
 )
 @click.option(
     "--message-loss",

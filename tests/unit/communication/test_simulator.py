@@ -141,8 +141,8 @@ def test_a_cycle_takes_no_longer_than_those_before() -> None:
         parameters = RunParameters(settings={"cycles": str(cycles)})
         return steps_of(Simulation(team, DSA, Concurrent(0), parameters=parameters).search)
 
-    ten, thirty, fifty = (taken_by(cycles) for cycles in (10, 30, 50))
-    assert fifty - thirty < 1.2 * (thirty - ten)  # of a compiled protocol, only calls back into Python are counted
+    _, thirty, fifty, seventy = (taken_by(cycles) for cycles in (30, 30, 50, 70))  # the first one fills caches
+    assert seventy - fifty < 1.1 * (fifty - thirty)
 
 
 def test_one_by_one_abt_needs_more() -> None:
