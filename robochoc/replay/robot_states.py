@@ -54,13 +54,14 @@ def states_of(
     options: ReplayOptions | None = None,
     *,
     header: Header | None = None,
-    since: int = 0,
+    since: int | Callable[[], int] = 0,
     everything: Callable[[], Iterable[AnyEvent]] | None = None,
     teams: RecordedTeams | None = None,
 ) -> Iterator[RobotState]:
     """Yield the states of `robot` after its complete steps.
 
-    If the journal lacks the next messages to the robot, `more` of the last state contains the reason.
+    If the journal lacks the next messages to the robot, `more` of the last state of the run contains the reason. A
+    later run may continue; then there is such a state for each step in between, so that no step number is missing.
 
     Args:
         journal: A journal, or events sorted as in a journal. Events of `robot` and messages to it are sufficient if
@@ -68,50 +69,22 @@ def states_of(
         robot: The robot's name.
         options: Inputs besides the journal.
         header: The journal's header, if `journal` is only events.
-        since: The number of the first step for which a state is yielded.
+        since: The number of the first step for which a state is yielded; or a function that returns this number, which
+            may increase during the replay in order to skip states.
         everything: Returns the events of all robots; called only if they are needed.
         teams: The teams of the journal, if several robots of one journal are replayed one after the other.
 
     Raises:
         CannotReplayError: if there is nothing to replay, or the installed protocol is not the recorded one.
     """
-    return StateReplay(journal, robot, options, header=header, since=since, everything=everything, teams=teams)
-
-
-class StateReplay(Iterator[RobotState]):
-    """The iterator of `states_of`. `since` can be increased during the replay, in order to skip states."""
-
-    def __init__(
-        self,
-        journal: Journal | Iterable[AnyEvent],
-        robot: str,
-        options: ReplayOptions | None = None,
-        *,
-        header: Header | None = None,
-        since: int = 0,
-        everything: Callable[[], Iterable[AnyEvent]] | None = None,
-        teams: RecordedTeams | None = None,
-    ) -> None:
-        self.since = since
-        if isinstance(journal, Journal):
-            header, journal = journal.header, journal.events
-        self._states = self._replayed(
-            journal, _Player(header, robot, options or ReplayOptions(), teams, self), everything
-        )
-
-    def __next__(self) -> RobotState:
-        return next(self._states)
-
-    def _replayed(
-        self, events: Iterable[AnyEvent], player: _Player, everything: Callable[[], Iterable[AnyEvent]] | None
-    ) -> Iterator[RobotState]:
-        events = tuple(events)
-        try:
-            for state in player.states(events, alone=True):
-                yield state
-                self.since = max(self.since, state.step + 1)
-        except _MissingContentError:
-            yield from player.states(tuple(everything()) if everything else events, alone=False)
+    if isinstance(journal, Journal):
+        header, journal = journal.header, journal.events
+    events = tuple(journal)
+    player = _Player(header, robot, options or ReplayOptions(), teams, since)
+    try:
+        yield from player.states(events, alone=True)
+    except _MissingContentError:
+        yield from player.states(tuple(everything()) if everything else events, alone=False)
 
 
 class TeamStates:
@@ -142,12 +115,15 @@ class TeamStates:
         )
 
 
+_INCOMPLETE = {"replay": "ends here: the journal lacks events of this step, or of an earlier step in this run"}
+
+
 class _MissingContentError(Exception):
     """A message to the robot can only be restored by replaying its sender."""
 
 
 class _Player:
-    """Replays the robot's steps, `alone` or with all other robots, and inspects it after those since `replay.since`."""
+    """Replays the robot's steps, `alone` or with all other robots, and inspects it after those from `since` on."""
 
     def __init__(
         self,
@@ -155,14 +131,19 @@ class _Player:
         robot: str,
         options: ReplayOptions,
         teams: RecordedTeams | None,
-        replay: StateReplay,
+        since: int | Callable[[], int],
     ) -> None:
         self._header = header
         self._robot = robot
         self._options = options
         self._teams = teams
-        self._replay = replay
+        self._since = since
         self._step = 0
+        self._yielded = 0
+
+    def _first(self) -> int:
+        """Return the number of the first step whose state is still to be yielded."""
+        return max(self._yielded, self._since if isinstance(self._since, int) else self._since())
 
     def states(self, events: Sequence[AnyEvent], *, alone: bool) -> Iterator[RobotState]:
         self._step = 0
@@ -189,7 +170,11 @@ class _Player:
                     gone.add(step.robot)
                     state = self._last(step, str(stops))
                 if state is not None:
+                    yield from (
+                        RobotState(step=number, more=_INCOMPLETE) for number in range(self._first(), state.step)
+                    )
                     yield state
+                    self._yielded = state.step + 1
 
     def _play_step(self, replay: RunReplay, inspector: Inspector, step: RecordedStep) -> RobotState | None:
         """Return the state after `step`; None if the step is another robot's, partial, or before `since`."""
@@ -198,7 +183,7 @@ class _Player:
             return None
         number, protocol = self._step, replay.robots.hosts[self._robot].protocol
         self._step += 1
-        wanted = step.is_complete and number >= self._replay.since
+        wanted = step.is_complete and number >= self._first()
         reasons = Reasons(inspector, protocol) if wanted else None
         difference = replay.play(step, number, reasons.record_sent) if reasons else replay.play(step, number)
         if difference is not None:
@@ -222,9 +207,5 @@ class _Player:
         """Return a last state that contains only the reason why the replay ends."""
         if step.robot != self._robot:
             return None
-        self._step += 1
-        return (
-            RobotState(step=self._step - 1, more={"replay": f"ends here: {why}"})
-            if self._step > self._replay.since
-            else None
-        )
+        number, self._step = self._step, self._step + 1
+        return RobotState(step=number, more={"replay": f"ends here: {why}"}) if number >= self._first() else None

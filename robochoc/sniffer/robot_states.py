@@ -11,7 +11,6 @@ because protocols cannot be copied.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from io import BufferedReader
 from itertools import islice
 from operator import attrgetter
@@ -20,9 +19,8 @@ import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Concluded, Decided, Given, Heard, Received, Sent, Settled
 from robochoc.journal.journal import Ended, Follower, Header, JournalEntry, sorted_by_time
-from robochoc.replay import CannotReplayError
+from robochoc.replay import CannotReplayError, RobotState, states_of
 from robochoc.replay.rebuild import RecordedTeams
-from robochoc.replay.robot_states import RobotState, StateReplay
 from robochoc.sniffer.cache import Cache
 from robochoc.sniffer.growing_file import GrowingFile
 from robochoc.sniffer.live_trace import entries_of, next_entries
@@ -38,49 +36,69 @@ _BEFORE, _SHARE_BEFORE = 4, 8
 
 
 class _Playing:
-    """A replay of a robot. `chunk`: the chunk of its next state."""
+    """A replay of a robot in `events`. `chunk`: the chunk of its next state, which can be increased to skip states."""
 
-    def __init__(self, states: StateReplay) -> None:
+    def __init__(self, events: _RobotEvents) -> None:
         self.chunk = 0
-        self._states = states
-
-    def skip_to(self, chunk: int) -> None:
-        """Continue with `chunk`, which must not be before the current one."""
-        self._states.since = chunk * STATES
-        self.chunk = chunk
+        self._states = states_of(
+            events.events,
+            events.robot,
+            header=events.header,
+            since=lambda: self.chunk * STATES,
+            everything=events.of_all_robots,
+            teams=events.teams,
+        )
 
     def next_states(self) -> list[RobotState]:
         """Return the states in the next chunk. Raises `BadRequestError`."""
-        self.chunk += 1
         try:
-            return list(islice(self._states, STATES))
+            states = list(islice(self._states, STATES))
         except CannotReplayError as reason:
             raise BadRequestError(str(reason)) from reason
+        self.chunk += 1
+        return states
 
 
 class _RobotEvents:
     """The events of `robot` in `file`, with the robots' problems. In a growing file, only new entries are read."""
 
-    def __init__(self, file: GrowingFile, robot: str) -> None:
+    def __init__(self, file: GrowingFile, robot: str, is_stopped: Callable[[], bool]) -> None:
         self.robot = robot
         self.size = 0
+        self._is_stopped = is_stopped
         self._here = file.again()
         self._follower = Follower(BufferedReader(self._here))
         self._read: list[AnyEvent] = []
         self.header: Header | None = None
         self.teams = RecordedTeams(None)
         self.events: Sequence[AnyEvent] = ()
+        self._of_all_robots: Sequence[AnyEvent] = ()
 
-    def read_to(self, end: int, is_stopped: Callable[[], bool]) -> None:
+    def read_to(self, end: int) -> None:
         """Read up to the position `end`. Raises `BadRequestError`."""
-        while not is_stopped() and (lines := next_entries(self._follower, self._here, end)):
+        while not self._is_stopped():
+            _check_number(len(self._read), f"the states of {self.robot}")
+            if not (lines := next_entries(self._follower, self._here, end)):
+                break
             if self.header is None and isinstance(lines[0], Header):
                 self.header = lines[0]
                 self.teams = RecordedTeams(self.header)
             self._read += _events_of(lines, self.robot)
-            _check_number(len(self._read), f"the states of {self.robot}")
         self.events = tuple(sorted_by_time(self._read))
+        self._of_all_robots = ()
         self.size = end
+
+    def of_all_robots(self) -> Sequence[AnyEvent]:
+        """Return the events of all robots, which are read on the first call. Raises `BadRequestError`."""
+        if not self._of_all_robots:
+            read: list[AnyEvent] = []
+            for lines in entries_of(self._here):
+                if self._is_stopped():
+                    break
+                read += (line for line in lines if not isinstance(line, Header | Ended))
+                _check_number(len(read), "all robots together")
+            self._of_all_robots = tuple(sorted_by_time(read))
+        return self._of_all_robots
 
 
 class RobotStates:
@@ -105,7 +123,7 @@ class RobotStates:
         if kept is not None:
             return kept
         playing = self._playing_before(file, robot, number)
-        playing.skip_to(max(playing.chunk, number - (max(_BEFORE, number // _SHARE_BEFORE) if final else 0)))
+        playing.chunk = max(playing.chunk, number - (max(_BEFORE, number // _SHARE_BEFORE) if final else 0))
         answer = b"[]"
         while playing.chunk <= number and not self.stopped:
             chunk = playing.chunk
@@ -122,30 +140,17 @@ class RobotStates:
         """Remove and return the last replay that has not passed chunk `number`, or return a new one."""
         events = self._events
         if events is None or events.robot != robot or events.size > file.end:
-            events = self._events = _RobotEvents(file, robot)
+            events = self._events = _RobotEvents(file, robot, lambda: self.stopped)
         if events.size != file.end:
             self._playing.clear()
-            events.read_to(file.end, lambda: self.stopped)
+            events.read_to(file.end)
         suitable = [playing for playing in self._playing if playing.chunk <= number]
         if suitable:
             playing = max(suitable, key=attrgetter("chunk"))
             self._playing.remove(playing)
             return playing
         del self._playing[: -_MOST_PLAYING + 1]
-        everything = partial(self._all_events, file)
-        return _Playing(
-            StateReplay(events.events, robot, header=events.header, everything=everything, teams=events.teams)
-        )
-
-    def _all_events(self, file: GrowingFile) -> Iterator[AnyEvent]:
-        """Return the events of all robots, sorted by time within each run."""
-        read: list[AnyEvent] = []
-        for lines in entries_of(file):
-            if self.stopped:
-                break
-            read += (line for line in lines if not isinstance(line, Header | Ended))
-            _check_number(len(read), "all robots together")
-        return sorted_by_time(read)
+        return _Playing(events)
 
 
 def _check_number(events: int, whose: str) -> None:
