@@ -229,8 +229,10 @@ def test_large_domains_are_shown_in_part() -> None:
 def test_a_robot_whose_news_is_lost_says_where_it_ends() -> None:
     journal = recorded(pair(), SIMULATED)
     events = [event for event in journal.events if actor(event) != "RA"]
-    began, last = states_of(with_events(journal, events), "RB")
+    began, partial, last = states_of(with_events(journal, events), "RB")
     assert began.value == {"B": 1}
+    assert partial.more["replay"].startswith("ends here: the journal lacks events of this step")
+    assert [state.step for state in (began, partial, last)] == [0, 1, 2]
     assert last.more == {"replay": "ends here: the message Ok from RA is not in the journal"}
 
 
