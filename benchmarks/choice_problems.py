@@ -183,4 +183,4 @@ PROBLEMS: Mapping[str, Callable[[Random], Team]] = {
         "tracking", chance, agents=chance.randint(8, 16), targets=chance.randint(4, 8), side=9
     ),
 }  # fmt: skip
-"""What makes a problem of each family from a random number generator."""
+"""For each family, the function that makes a problem from a random number generator."""

@@ -244,7 +244,7 @@ def _in_words(facts: Facts) -> Iterator[str]:
     mean = 2 * facts.links / max(facts.robots, 1)
     pairs = f"{counted(facts.links, 'pair')} of neighbours ({mean:.3g} each in the mean)"
     yield f"{counted(facts.robots, 'robot')}, {pairs}"
-    yield "costs are minimised" if facts.has_costs else "no costs: any solution will do"
+    yield _objective(facts)
     if facts.partially_known:
         yield "constraints are partially known"
     if facts.changes:
@@ -258,3 +258,9 @@ def _in_words(facts: Facts) -> Iterator[str]:
             yield f"{facts.crowd.robots} robots need different values, and have only {facts.crowd.values}"
     if facts.has_costs and facts.tree.cells <= LARGE:
         yield f"a pseudo-tree of induced width {facts.tree.width}, tables of {facts.tree.cells:,.0f} entries at most"
+
+
+def _objective(facts: Facts) -> str:
+    if not facts.has_costs:
+        return "no costs: any solution will do"
+    return "utilities are maximised" if facts.team.user_units.maximize else "costs are minimised"

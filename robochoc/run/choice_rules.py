@@ -79,14 +79,23 @@ class Rule(NamedTuple):
         return next((one.otherwise for one in self.conditions if not one.holds(facts)), "")
 
 
+def _at_most(robots: int) -> Condition:
+    return Condition(
+        lambda f: f.robots <= robots, f"at most {robots:,} robots", f"there are more than {robots:,} robots"
+    )
+
+
+def _more_than(robots: int) -> Condition:
+    return Condition(
+        lambda f: f.robots > robots, f"more than {robots:,} robots", f"there are {robots:,} robots or fewer"
+    )
+
+
 COSTS = Condition(lambda f: f.has_costs, "costs", "there are no costs")
 NO_COSTS = Condition(lambda f: not f.has_costs, "no costs", "there are costs")
 CHANGES = Condition(lambda f: f.changes, "a problem that changes", "the problem does not change")
 PARTIAL = Condition(
     lambda f: f.partially_known, "partially known constraints (PKC)", "no constraint is partially known (PKC)"
-)
-MANY = Condition(
-    lambda f: f.robots > MANY_ROBOTS, f"more than {MANY_ROBOTS} robots", f"there are {MANY_ROBOTS} robots or fewer"
 )
 FORBIDS_NOTHING = Condition(lambda f: not f.forbids, "nothing is forbidden", "some constraints forbid something")
 LARGE_TABLE = Condition(
@@ -94,9 +103,7 @@ LARGE_TABLE = Condition(
     f"a constraint of more than {MAX_TUPLES:,} combinations of values",
     f"no constraint has more than {MAX_TUPLES:,} combinations of values",
 )
-MORE_THAN_FEW = Condition(
-    lambda f: f.robots > FEW_ROBOTS, f"more than {FEW_ROBOTS} robots", f"there are {FEW_ROBOTS} robots or fewer"
-)
+MORE_THAN_FEW = _more_than(FEW_ROBOTS)
 NO_WITHDRAWAL = Condition(lambda f: not f.withdrawal, "no --withdraw", "robots may withdraw")
 NOT_COMPLETE = Condition(
     lambda f: f.robots <= SMALL_TEAM or f.share_linked < NEARLY_ALL or f.declared_table > LARGE_PAIR,
@@ -118,11 +125,7 @@ LOSSY = Condition(lambda f: f.loss > 0, "messages may be lost", "no message is l
 NEARLY_A_TREE = (
     COSTS,
     MORE_THAN_FEW,
-    Condition(
-        lambda f: f.robots <= MOST_IN_A_TREE,
-        f"at most {MOST_IN_A_TREE:,} robots",
-        f"there are more than {MOST_IN_A_TREE:,} robots",
-    ),
+    _at_most(MOST_IN_A_TREE),
     Condition(
         lambda f: f.tree.cells <= NARROW_CELLS,
         f"tables of at most {NARROW_CELLS:,} entries on the pseudo-tree",
@@ -208,11 +211,7 @@ RULES = (
             CHANGES,
             NO_COSTS,
             Condition(lambda f: not f.environment, "changes that files name", "an environment changes the problem"),
-            Condition(
-                lambda f: f.robots <= FEW_TO_BEGIN_ANEW,
-                f"at most {FEW_TO_BEGIN_ANEW} robots",
-                f"there are more than {FEW_TO_BEGIN_ANEW} robots",
-            ),
+            _at_most(FEW_TO_BEGIN_ANEW),
             Condition(
                 lambda f: f.constrainedness >= TIGHT,
                 f"a constrainedness of {TIGHT} or more",
@@ -242,11 +241,7 @@ RULES = (
             COSTS,
             MORE_THAN_FEW,
             Condition(lambda f: not f.changes, "a problem that does not change", "the problem changes"),
-            Condition(
-                lambda f: f.robots <= MANY_ROBOTS,
-                f"at most {MANY_ROBOTS} robots",
-                f"there are more than {MANY_ROBOTS} robots",
-            ),
+            _at_most(MANY_ROBOTS),
             Condition(
                 lambda f: f.share_linked < DENSE,
                 f"less than {DENSE:.0%} of all pairs linked",
@@ -269,7 +264,7 @@ RULES = (
         "dsa",
         (
             COSTS,
-            MANY,
+            _more_than(MANY_ROBOTS),
             FORBIDS_NOTHING,
         ),
         "there are too many robots for a proof, and nothing is forbidden: local search ends, with a good answer",
@@ -308,11 +303,7 @@ RULES = (
         "sbt",
         (
             *ANY_SOLUTION,
-            Condition(
-                lambda f: f.robots <= SMALL_TEAM,
-                f"at most {SMALL_TEAM} robots",
-                f"there are more than {SMALL_TEAM} robots",
-            ),
+            _at_most(SMALL_TEAM),
             Condition(
                 lambda f: not HARD_SMALL[0] <= f.constrainedness < HARD_SMALL[1],
                 f"a constrainedness below {HARD_SMALL[0]}, or of {HARD_SMALL[1]} or more",

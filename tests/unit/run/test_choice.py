@@ -315,3 +315,11 @@ def test_the_tree_is_the_one_that_robots_build(many: int) -> None:
         sizes = Facts(team).declared_sizes
         cells = [prod(sizes[one] for one in (name, *above)) for name, above in found.items()]
         assert Facts(team).tree == TreeTables(max(map(len, found.values())), max(cells))
+
+
+@pytest.mark.parametrize(("maximise", "fact"), [(False, "costs are minimised"), (True, "utilities are maximised")])
+def test_the_facts_name_the_objective_of_the_files(maximise: bool, fact: str) -> None:  # noqa: FBT001 - a parameter
+    model = Model("m")
+    one = model.robot("r").variable("x", range(3))
+    (model.maximize if maximise else model.minimize)(one)
+    assert fact in choose(model.team, Options(protocol="auto", runtime=Runtime.SIMULATOR)).facts
