@@ -1,11 +1,15 @@
 """The cost array of a constraint for all combinations of values, for protocols that compute with tables.
 
+A robot may have several variables, of which a constraint contains some. A table has an entry for each combination that
+the constraint distinguishes, however many values the robots have.
+
 Costs are floats, since a violated hard constraint costs `inf`; integers up to 2^53 are exact (`exact_costs.py`). Tables
 have at most `MAX_TUPLES` entries.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -13,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.problem import Value
-from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
+from robochoc.solver.shared_constraint import SharedConstraint, refuse_large
 
 Array = NDArray[np.float64]
 
@@ -21,33 +25,58 @@ Array = NDArray[np.float64]
 class CostTable(NamedTuple):
     """The costs of the constraint called `key`: one axis for each robot in `agents`, the last axis for this robot.
 
-    The indices on an axis follow the order of the robot's values. Equal constraints share one array, which must not be
-    modified.
+    Equal constraints share one array, which must not be modified.
+
+    Attributes:
+        key: The constraint's name in explanations.
+        agents: The other robots, in priority order.
+        places: For each axis, the indices of the robot's variables in the constraint, among its interface variables.
+        charges: The costs. The indices on an axis are the codes of the robot's values: values that agree on `places`
+            have the same code, and codes follow the order of the values. Withdrawal has a code of its own.
+        codes: For each axis, the code of each of the robot's values.
     """
 
     key: str
     agents: tuple[str, ...]
+    places: tuple[tuple[int, ...], ...]
     charges: Array
+    codes: tuple[Sequence[int], ...]
+
+    def joined(self) -> Array:
+        """Return the costs with one index for each value of each robot, in the order of the values.
+
+        If the constraint distinguishes all values, this is `charges`. Otherwise, the array is created at each call.
+
+        Raises:
+            TooLargeError: if the array is too large.
+        """
+        shape = tuple(map(len, self.codes))
+        if shape == self.charges.shape:  # codes are numbered from 0, so they are the indices of the values
+            return self.charges
+        refuse_large(self.key, math.prod(shape))
+        joined: Array = self.charges[np.ix_(*self.codes)]
+        joined.flags.writeable = False
+        return joined
 
 
-def cost_table(
-    constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]], size: int
-) -> tuple[int, CostTable]:
-    """Return the number of checks, and the table of `constraint` over `domains` and the `size` own values.
+def cost_table(constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]]) -> tuple[int, CostTable]:
+    """Return the number of checks, and the table of `constraint` over `domains` and this robot's values.
 
     Raises:
-        UnsupportedError: if the table is too large.
+        TooLargeError: if the table is too large.
     """
     equal = constraint.seen, tuple([tuple(domains[agent]) for agent in constraint.agents])
     found = constraint.evaluations.tables.get(equal)
     if found is None:
-        combinations = [*constraint.combinations(domains, size)]
-        charges = np.zeros([*(len(domains[agent]) for agent in constraint.agents), size], np.float64)
-        seen: set[OtherValues] = set()
-        for place, others in combinations:
-            seen.add(others)
-            charges[place] = constraint.costs(others)
+        axes = constraint.axes(domains)
+        charges = np.zeros([len(one.parts) for one in axes], np.float64)
+        evaluated = 0
+        for place, others in constraint.combinations(axes[:-1]):
+            evaluated += 1
+            charges[place] = constraint.distinct_costs(others)
         charges.flags.writeable = False
-        found = constraint.evaluations.tables[equal] = len(seen) * size, charges
-    checks, charges = found
-    return checks, CostTable(constraint.key, constraint.agents, charges)
+        places, codes, _ = zip(*axes, strict=True)
+        table = CostTable(constraint.key, constraint.agents, places, charges, codes)
+        found = constraint.evaluations.tables[equal] = evaluated * len(constraint.codes), table
+    checks, table = found
+    return checks, table._replace(key=constraint.key, agents=constraint.agents)

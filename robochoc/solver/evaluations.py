@@ -14,9 +14,7 @@ from robochoc.model.constraint import Constraint, Definition
 from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
-    from numpy import float64
-    from numpy.typing import NDArray
-
+    from robochoc.solver.cost_table import CostTable
     from robochoc.solver.encoding import Cost
     from robochoc.solver.shared_constraint import OtherValues
 
@@ -29,13 +27,14 @@ class Evaluations:
         definition: The definition, which stays alive as long as its `id` is a key.
         costs: The cost of each own value.
         masks: The consistent own values: bit i for the i-th value.
-        tables: The number of checks and the cost array, by the domains of the other robots (`solver/cost_table.py`).
+        tables: The number of checks and the table, by the domains of the other robots. Equal constraints have other
+            robots and another name.
     """
 
     definition: Definition
     costs: dict[OtherValues, list[Cost]] = field(default_factory=dict)
     masks: dict[OtherValues, int] = field(default_factory=dict)
-    tables: dict[Hashable, tuple[int, NDArray[float64]]] = field(default_factory=dict)
+    tables: dict[Hashable, tuple[int, CostTable]] = field(default_factory=dict)
 
 
 class SharedEvaluations:

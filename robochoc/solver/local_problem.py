@@ -32,6 +32,7 @@ from robochoc.solver.shared_constraint import (
     OwnValues,
     SharedConstraint,
     by_robot,
+    refuse_large,
     sorted_by_lowest_agent,
 )
 
@@ -398,7 +399,7 @@ class LocalProblem:
         found = []
         for constraint in self._constraints if lowest is None else self._with_lowest(lowest):
             if set(constraint.agents) <= domains.keys():
-                checks, table = cost_table(constraint, domains, len(self.values))
+                checks, table = cost_table(constraint, domains)
                 self.checks += checks
                 found.append(table)
         return found
@@ -423,9 +424,21 @@ class LocalProblem:
         for constraint in self._with_lowest(lowest):
             if not domains.keys() >= set(constraint.agents):
                 continue
-            combinations = [*constraint.combinations(domains, len(self.values))]
-            self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
-            found.append((constraint.agents, {place: constraint.mask(others) for place, others in combinations}))
+            *axes, own = constraint.axes(domains)
+            refuse_large(constraint.key, math.prod(len(axis.codes) for axis in axes) * len(own.codes))
+            combinations = dict(constraint.combinations(axes))
+            self.checks += constraint.evaluate(combinations.values()) * len(self.values)
+            codes = zip(
+                itertools.product(*(range(len(axis.codes)) for axis in axes)),
+                itertools.product(*(axis.codes for axis in axes)),
+                strict=True,
+            )
+            found.append(
+                (
+                    constraint.agents,
+                    {place: constraint.mask(combinations[code]) for place, code in codes if code in combinations},
+                )
+            )
         return found
 
     def look_ahead(self) -> None:

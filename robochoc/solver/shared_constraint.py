@@ -41,7 +41,7 @@ class OwnValues:
     def __init__(self, names: Sequence[str], values: Sequence[Value]) -> None:
         self._names = names
         self._values = values
-        self._coded: dict[tuple[int, ...], tuple[list[int], list[Value]]] = {}
+        self._axes: dict[tuple[int, ...], Axis] = {}
         self._numbers: dict[tuple[int, ...], int] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
@@ -49,24 +49,52 @@ class OwnValues:
         places = tuple([place for place, name in enumerate(self._names) if name in scope])
         return places, [self._names[place] for place in places]
 
-    def codes(self, places: tuple[int, ...]) -> tuple[list[int], list[Value]]:
-        """Return the code of each value, and, for each code, the values at `places`."""
-        if places not in self._coded:
-            codes: dict[Value, int] = {}
-            coded = [codes.setdefault(tuple([value[place] for place in places]), len(codes)) for value in self._values]
-            self._coded[places] = coded, list(codes)
-        return self._coded[places]
+    def axis(self, places: tuple[int, ...]) -> Axis:
+        """Return the axis of the variables at `places`. Many constraints share it."""
+        if places not in self._axes:
+            self._axes[places] = axis(self._values, places)
+        return self._axes[places]
 
     def number(self, places: tuple[int, ...], shared: SharedEvaluations) -> int:
-        """Return a number in `shared` that determines the `codes` for `places`."""
+        """Return a number in `shared` that determines the `axis` for `places`."""
         if places not in self._numbers:
-            coded, distinct = self.codes(places)
-            self._numbers[places] = shared.number((tuple(coded), tuple(distinct)))
+            _, codes, parts = self.axis(places)
+            self._numbers[places] = shared.number((tuple(codes), tuple(parts)))
         return self._numbers[places]
 
     def shown(self, index: int, places: Container[int]) -> Value:
         """Return the value at `index`, with None outside `places`."""
         return tuple([part if place in places else None for place, part in enumerate(self._values[index])])
+
+
+class Axis(NamedTuple):
+    """A robot's values as a constraint distinguishes them.
+
+    Attributes:
+        places: The indices of the robot's variables in the constraint, among its interface variables.
+        codes: The code of each value: its index in `parts`. If all values are distinguished, these are 0, 1, 2, ...
+        parts: The distinct values of these variables, in the order of their first occurrence.
+    """
+
+    places: tuple[int, ...]
+    codes: Sequence[int]
+    parts: Sequence[Value]
+
+
+def axis(values: Iterable[Value], places: tuple[int, ...]) -> Axis:
+    """Return the axis for the variables at `places` of a robot with these `values`."""
+    found: dict[Value, int] = {}
+    codes = [found.setdefault(tuple([value[place] for place in places]), len(found)) for value in values]
+    return Axis(places, codes, list(found))
+
+
+def refuse_large(key: str, entries: int) -> None:
+    """Raise `TooLargeError` if the table of the constraint called `key` has more than `MAX_TUPLES` entries."""
+    if entries > MAX_TUPLES:
+        raise TooLargeError(
+            f"the table of constraint {key} has {entries:,} entries, more than {MAX_TUPLES:,}: split the constraint,"
+            " or choose another protocol"
+        )
 
 
 def _plain(domain: Domain) -> Domain | range:
@@ -127,7 +155,7 @@ class SharedConstraint:
         self._own = own
         self._places, names = own.seen(self._scope)
         self._all_names = [*self._names, *names]
-        self.codes, self._distinct = own.codes(self._places)
+        _, self.codes, self._distinct = own.axis(self._places)
         shared = self._known.evaluations
         domains = tuple([self._known.domains[name].ranges for name in self._names])
         self.evaluations = shared.of(self._constraint, self._all_names, (domains, own.number(self._places, shared)))
@@ -290,28 +318,43 @@ class SharedConstraint:
         rows = [self.costs(others) for others in itertools.product(*columns)]
         return entries, min(map(min, rows)), max(map(max, rows))
 
-    def combinations(
-        self, domains: Mapping[str, Sequence[Value]], size: int
-    ) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
-        """Yield, for each combination of the others' values in `domains`, their indices and the values in the scope.
-
-        Combinations that drop the constraint are skipped; `size` is the number of own values.
+    def axes(self, domains: Mapping[str, Sequence[Value]]) -> list[Axis]:
+        """Return the axes of the constraint's table: one for each other robot with its values in `domains`, own last.
 
         Raises:
-            TooLargeError: if there are too many combinations.
+            TooLargeError: if the table is too large.
+            ValueError: if a value has too few parts.
         """
-        columns = [domains[agent] for agent in self.agents]
-        entries = math.prod(map(len, columns)) * size
-        if entries > MAX_TUPLES:
-            raise TooLargeError(
-                f"the table of constraint {self.key} has {entries:,} entries, more than {MAX_TUPLES:,}: split the"
-                " constraint, or choose another protocol"
-            )
-        for place in itertools.product(*(range(len(column)) for column in columns)):
-            chosen = (column[index] for column, index in zip(columns, place, strict=True))
-            others = self.other_values(dict(zip(self.agents, chosen, strict=True)))
-            if others is not None:
+        found = []
+        for agent in self.agents:
+            places = tuple([place for owner, place in self._seen if owner == agent])
+            try:
+                found.append(axis(domains[agent], places))
+            except IndexError:
+                short = next(value for value in domains[agent] if len(value) <= places[-1])
+                raise self._refusal_of_width({agent: short}) from None
+        found.append(Axis(self._places, self.codes, self._distinct))
+        refuse_large(self.key, math.prod(len(one.parts) for one in found))
+        return found
+
+    def combinations(self, axes: Iterable[Axis]) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
+        """Yield, for each combination of the others' `axes`, its indices on them and the values in the scope.
+
+        Combinations that drop the constraint are skipped.
+        """
+        parts = [one.parts for one in axes]
+        places = itertools.product(*(range(len(column)) for column in parts))
+        for place, chosen in zip(places, itertools.product(*parts), strict=True):
+            others = tuple(itertools.chain.from_iterable(chosen))
+            if None not in others or self._counts_when_absent:
                 yield place, others
+
+    def distinct_costs(self, others: OtherValues) -> list[Cost]:
+        """Return the cost of each own value that the constraint distinguishes, together with the values `others`."""
+        if len(self._distinct) == len(self.codes):
+            return self.costs(others)
+        self._refuse_undeclared(others)
+        return [self._cost((*others, *own)) for own in self._distinct]
 
     def mask(self, others: OtherValues) -> int:
         """Return this robot's values that are consistent with `others`: bit i for the i-th value."""

@@ -19,7 +19,7 @@ from robochoc.protocols.inference.maxsum_factor import MOST, Factor, from_zero
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import shared_constraint
-from robochoc.solver.cost_table import CostTable
+from robochoc.solver.cost_table import Array, CostTable
 from robochoc.solver.errors import UnsupportedError
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
@@ -55,9 +55,13 @@ def informed(**settings: float) -> MaxSum:
     return robot
 
 
+def table(key: str, agents: tuple[str, ...], charges: Array) -> CostTable:
+    return CostTable(key, agents, ((0,),) * charges.ndim, charges, tuple(map(range, charges.shape)))
+
+
 def test_functions_over_the_same_robots_are_one_and_what_no_other_robot_is_in_is_none() -> None:
     alone, pair = np.array([9.0, 9.0]), np.array([[3.0, 1.0], [4.0, 6.0]])
-    tables = [CostTable("P", (), alone), CostTable("F", ("RA",), pair), CostTable("S", ("RA",), pair)]
+    tables = [table("P", (), alone), table("F", ("RA",), pair), table("S", ("RA",), pair)]
     (function,) = Factor.joined(tables)
     assert function.agents == ("RA",)
     assert function.r([[0, 0], [0, 0]]) == [[2, 8], [6, 2]]

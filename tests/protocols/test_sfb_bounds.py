@@ -111,8 +111,8 @@ def plainly_extended(
             chosen = dict(zip(names, row[VALUES : VALUES + rank], strict=False))
             for name, start in zip(names[rank + 1 :], accumulate([0, *sizes]), strict=False):
                 known = {other: domains[other] for other in [*names[:rank], name]}
-                for _, others, charges in problem.tables(known, lowest=name):
-                    at = tuple(chosen[other] for other in others[:-1])
+                for table in problem.tables(known, lowest=name):
+                    at, charges = tuple(chosen[other] for other in table.agents[:-1]), table.joined()
                     for place in range(len(domains[name])):
                         vectors[start + place] += int(min(charges[(*at, place, value)], ceiling))
             vectors = [min(entry, ceiling) for entry in vectors]

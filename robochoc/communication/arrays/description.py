@@ -125,8 +125,9 @@ class _Draft:
     ) -> None:
         """Add the constraints known by the robot with index `place`."""
         for number, table in enumerate(problem.tables(domains)):
-            shape = self._shapes.setdefault(table.charges.shape, _Shape())
-            shape.add(place, [rank[name] for name in table.agents], table.charges, number)
+            charges = table.joined()
+            shape = self._shapes.setdefault(charges.shape, _Shape())
+            shape.add(place, [rank[name] for name in table.agents], charges, number)
 
     def held(self) -> list[KnownConstraints]:
         """Return the constraints."""

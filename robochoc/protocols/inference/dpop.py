@@ -495,7 +495,7 @@ class DPOP(TreeProtocol):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._joined = [self._aligned(table.charges, (*table.agents, self.problem.agent)) for table in tables]
+        self._joined = [self._aligned(table.joined(), (*table.agents, self.problem.agent)) for table in tables]
         del tables
         if not self.children:
             self._compute_utils()

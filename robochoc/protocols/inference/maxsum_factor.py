@@ -44,7 +44,8 @@ class Factor:
         for table in tables:
             if table.agents:
                 before = sums.get(table.agents)
-                sums[table.agents] = table.charges if before is None else before + table.charges
+                charges = table.joined()
+                sums[table.agents] = charges if before is None else before + charges
         return [cls(agents, charges) for agents, charges in sums.items()]
 
     def split(self, shares: Array) -> tuple[Factor, Factor]:

@@ -303,7 +303,7 @@ class MBDPOP(DPOP):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; compute at once if there is nothing to wait for."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
+        self._own_tables = [(table.joined(), (*table.agents, self.problem.agent)) for table in tables]
         self._start_inference()
         self._compute_if_complete()
 

@@ -157,7 +157,7 @@ class ODPOP(DPOP):
         self._local = np.zeros((len(self.problem.values), *shape))
         self._local += np.array(self.problem.charges, np.float64).reshape(-1, *(1 for _ in shape))
         for table in self.problem.tables({name: self.domains[name] for name in self.ancestors}):
-            self._local += self._aligned(table.charges, (*table.agents, self.problem.agent))
+            self._local += self._aligned(table.joined(), (*table.agents, self.problem.agent))
         for child in self.children:
             sizes = self.dimensions[child].separator
             self.goods[child] = np.full([sizes[name] for name in self._axes[child]], np.nan)

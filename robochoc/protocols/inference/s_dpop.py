@@ -337,7 +337,7 @@ class SDPOP(DPOP, DynamicProtocol):
                 self._let_proceed(child)
         if self._inputs != self._tabulated:
             tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-            self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
+            self._own_tables = [(table.joined(), (*table.agents, self.problem.agent)) for table in tables]
             self._tabulated = self._inputs
         self._compute_if_complete()
 

@@ -430,7 +430,7 @@ class KOpt(CycleProtocol):
         lower = {name: values for name, values in domains.items() if self.order.rank[name] > own}
         tables = []
         for table in self.problem.tables(lower):
-            costs: list[float] = table.charges.reshape(-1, len(self.problem.values)).T.ravel().tolist()
+            costs: list[float] = table.joined().reshape(-1, len(self.problem.values)).T.ravel().tolist()
             tables.append(CostList([self.problem.agent, *table.agents], [self._exact(cost) for cost in costs]))
         part = ProblemPart(list(self.problem.charges), tables)
         self._spread(Region, {self.problem.agent: part}, self.radius + 1, self._find_groups)

@@ -370,7 +370,7 @@ class HSCAI(BranchingProtocol):
             self.search(self.limit, self.problem.charges)
             return
         made = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._own_tables = [RobotTable((*table.agents, self.problem.agent), table.charges) for table in made]
+        self._own_tables = [RobotTable((*table.agents, self.problem.agent), table.joined()) for table in made]
         axes, costs = self._least({}, self.tables)
         dropped = [axis for name, axis in self._axes.items() if axis not in axes]
         self.send(self.parent, PreUtil(axes, dropped, dearest, costs))

@@ -70,10 +70,10 @@ class ForwardBounds:
         ranks = [(order.rank[name], name) for name in problem.neighbours]
         above = {name: domains[rank] for rank, name in ranks if rank < self.rank}
         found = [
-            (rank, agents, charges)
+            (rank, table.agents, table.joined())
             for rank, name in ranks
             if rank > self.rank
-            for _, agents, charges in problem.tables({**above, name: domains[rank]}, lowest=name)
+            for table in problem.tables({**above, name: domains[rank]}, lowest=name)
         ]
         changed = [*dict.fromkeys([rank for rank, _, _ in found])]
         few = self._total <= FEW_COLUMNS

@@ -176,7 +176,7 @@ def own_costs(problem: LocalProblem) -> Costs:
     """Return the cost of each of this robot's values that does not depend on other robots."""
     own = np.array(problem.charges, np.float64)
     for table in problem.tables({}):
-        own = own + table.charges
+        own = own + table.joined()
     return own
 
 
@@ -215,7 +215,7 @@ def costs_to_add(problem: LocalProblem, place: EliminationStep, codename: str, i
     added += _aligned(np.array(problem.charges, np.float64)[list(indices)], [codename], onto)
     for table in problem.tables({name: axis.values for name, axis in place.later.items()}):
         names = [*(place.later[agent].codename for agent in table.agents), codename]
-        added += _aligned(table.charges.take(list(indices), -1), names, onto)
+        added += _aligned(table.joined().take(list(indices), -1), names, onto)
     return added.reshape(len(indices), -1)
 
 

@@ -374,9 +374,10 @@ class PDPOP(AnonymousTreeProtocol):
             joined += self._aligned(np.array(numbers(one.keys), object), [one.codename])
         domains = {name: codes.values for name, codes in self.above.items()}
         for charged in self.problem.tables(domains):
-            numbered = np.array([_number(cost) for cost in charged.charges.reshape(-1)], object)
+            costs = charged.joined()
+            numbered = np.array([_number(cost) for cost in costs.reshape(-1)], object)
             names = [*(self.above[name].codename for name in charged.agents), self.codename]
-            joined += self._aligned(numbered.reshape(charged.charges.shape), names)
+            joined += self._aligned(numbered.reshape(costs.shape), names)
         return joined
 
     def _aligned(self, table: CellTable, axes: Sequence[str]) -> CellTable:

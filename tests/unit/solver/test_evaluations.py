@@ -67,7 +67,7 @@ def asked(problem: LocalProblem, values: dict[str, Sequence[Value]], chance: Ran
             lambda: problem.lower_bounds(values),
             problem.look_ahead,
             lambda: [problem.least_and_most(number) for number in range(len(problem.scopes(values)))],
-            lambda: [(one.agents, one.charges.tolist()) for one in problem.tables(values)],
+            lambda: [(one.agents, one.joined().tolist()) for one in problem.tables(values)],
         ]
         if index is not None:
             questions += [
@@ -123,5 +123,5 @@ def test_the_costs_of_a_robot_are_those_of_its_constraints_one_by_one(teams: int
                 assert problem.cost(index, view) == sum(paid)
             places = {other: values[other].index(view[other]) for other in above}
             tables = problem.tables({other: values[other] for other in above})
-            rows = [table.charges[tuple(places[other] for other in table.agents)] for table in tables]
+            rows = [table.joined()[tuple(places[other] for other in table.agents)] for table in tables]
             assert (sum(rows) + np.array(problem.charges, np.float64)).tolist() == problem.costs(view)

@@ -1,0 +1,70 @@
+"""Tables of constraints over the variables that they name, of robots with several variables."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robochoc.model.problem import Value
+from robochoc.solver import shared_constraint
+from robochoc.solver.agent_problem import RunParameters, agent_problems
+from robochoc.solver.errors import TooLargeError
+from robochoc.solver.local_problem import LocalProblem
+from tests.support.cost_problems import random_complex_cost_team
+from tests.support.examples import count, drawn
+from tests.support.solver_networks import compiled_by_brute_force
+
+
+@count("teams", 60, 2000)
+@pytest.mark.parametrize("withdrawal_cost", [None, 9])
+def test_values_that_agree_on_the_named_variables_share_an_entry(teams: int, withdrawal_cost: int | None) -> None:
+    smaller = 0
+    for number in range(teams):
+        parts = agent_problems(
+            compiled_by_brute_force(random_complex_cost_team(drawn(f"tables {number}"))),
+            RunParameters(withdrawal_cost=withdrawal_cost),
+        )
+        problems = {name: LocalProblem(part) for name, part in parts.items()}
+        values: dict[str, Sequence[Value]] = {name: problem.values for name, problem in problems.items()}
+        for name, problem in problems.items():
+            others = {other: values[other] for other in values if other != name}
+            for table in problem.tables(others):
+                for robot, places, coded, size in zip(
+                    [*table.agents, name], table.places, table.codes, table.charges.shape, strict=True
+                ):
+                    named = [tuple([value[place] for place in places]) for value in values[robot]]
+                    distinct = list(dict.fromkeys(named))
+                    assert size == len(distinct)
+                    assert [distinct[code] for code in coded] == named
+                joined = table.joined()
+                assert joined.shape == tuple([len(values[robot]) for robot in (*table.agents, name)])
+                for place in np.ndindex(joined.shape):
+                    codes = [one[at] for one, at in zip(table.codes, place, strict=True)]
+                    assert joined[place] == table.charges[tuple(codes)]
+                smaller += table.charges.size < joined.size
+                if table.charges.shape == joined.shape:
+                    assert joined is table.charges
+    assert smaller
+
+
+def test_only_the_named_variables_count_for_the_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    refused = 0
+    for number in range(40):
+        parts = agent_problems(compiled_by_brute_force(random_complex_cost_team(drawn(f"limit {number}"))))
+        problems = {name: LocalProblem(part) for name, part in parts.items()}
+        values: dict[str, Sequence[Value]] = {name: problem.values for name, problem in problems.items()}
+        tables = [table for problem in problems.values() for table in problem.tables(values)]
+        most = max([table.charges.size for table in tables], default=1)
+        monkeypatch.setattr(shared_constraint, "MAX_TUPLES", most)
+        for part in parts.values():
+            LocalProblem(part._replace(known=replace(part.known))).tables(values)
+        for table in tables:
+            if np.prod([len(codes) for codes in table.codes]) > most:
+                with pytest.raises(TooLargeError, match=f"the table of constraint {table.key} has"):
+                    table.joined()
+                refused += 1
+        monkeypatch.undo()
+    assert refused
