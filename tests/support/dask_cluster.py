@@ -28,6 +28,17 @@ class Cluster:
         words = ["dask_worker", "--scheduler-file", str(self.file), "--nthreads", "1", "--no-dashboard", "--no-nanny"]
         return self._start(name, [*words, "--local-directory", str(self._home / f"{name}-files")])
 
+    def wait_for_blocks(self, run: Run) -> None:
+        """Wait until each worker has begun its block of the team that `run` solves."""
+        from distributed import Client  # noqa: PLC0415 - an extra
+
+        with Client(scheduler_file=str(self.file), set_as_default=False) as client:
+            wait_until(
+                lambda: sum(map(len, client.call_stack().values())) == len(self.workers) or run.is_over,
+                lambda: f"the blocks never run: {run.errors()}",
+            )
+        assert not run.is_over, run.errors()
+
     def _start(self, name: str, words: list[str]) -> Run:
         command = [sys.executable, "-m", f"distributed.cli.{words[0]}", *words[1:]]
         return self._stack.enter_context(running(command, self._home / name))

@@ -15,7 +15,7 @@ from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
-from distributed import CancelledError, Client, Future, Worker, get_worker, secede, wait
+from distributed import CancelledError, Client, Future, Status, Worker, fire_and_forget, get_worker, secede, wait
 
 from robochoc.communication.arrays.blocks import Block, BlockLostError, BlockReport, RunBlock, joined, split_team
 from robochoc.communication.arrays.cluster_client import SchedulerLostError, connect
@@ -58,27 +58,38 @@ def run_on_cluster(place: str, description: Description, run: RunBlock) -> Block
 def _run_blocks(client: Client, blocks: list[Block], run: RunBlock, addresses: list[str]) -> BlockReport:
     """Run each block on the worker at its address."""
     key = uuid.uuid4().hex
-    futures = []
+    futures: list[Future] = []
     try:
         for block, address in zip(blocks, addresses, strict=True):
-            client.run(_prepare, key, block.number, workers=[address])
+            name = f"robochoc-prepare-{key}-{block.number}"
+            futures.append(client.submit(_prepare, key, block.number, key=name, workers=[address]))
+        _finish(client, futures, addresses)
+        prepared = len(futures)
         for block, address in zip(blocks, addresses, strict=True):
             content = client.scatter(block, workers=[address])
             name = f"robochoc-{key}-{block.number}"
-            futures.append(client.submit(_run, content, run, key, addresses, key=name, workers=[address], pure=False))
-        while _are_running(futures):
-            if lost := {*addresses} - _workers(client):
-                raise BlockLostError(_lost(min(lost)))
-            if stop_requested():
-                raise BlockLostError("the run was stopped: on a cluster, its values are lost")
-        _raise_error(futures)
-        return joined(client.gather(futures))
+            futures.append(client.submit(_run, content, run, key, addresses, key=name, workers=[address]))
+        _finish(client, futures, addresses)
+        return joined(client.gather(futures[prepared:]))
     except (CancelledError, OSError, KeyError) as error:  # Dask's errors after a loss
         raise _loss(client, addresses, error) from None
     finally:
         with suppress(CancelledError, OSError):
             client.cancel(futures)
-            client.run(_discard, key, workers=[*_workers(client) & {*addresses}], on_error="ignore")
+            for number, address in enumerate(addresses):
+                if address in _workers(client):
+                    name = f"robochoc-discard-{key}-{number}"
+                    fire_and_forget(client.submit(_discard, key, key=name, workers=[address]))
+
+
+def _finish(client: Client, futures: list[Future], addresses: list[str]) -> None:
+    """Wait for the tasks. Raises the error of a failed task, and `BlockLostError` if a worker is lost meanwhile."""
+    while _are_running(futures):
+        if lost := {*addresses} - _workers(client):
+            raise BlockLostError(_lost(min(lost)))
+        if stop_requested():
+            raise BlockLostError("the run was stopped: on a cluster, its values are lost")
+    _raise_error(futures)
 
 
 def _loss(client: Client, addresses: list[str], error: BaseException) -> ClusterLostError:
@@ -120,13 +131,14 @@ def _lost(address: str) -> str:
     return f"the worker at {address} was lost during the run: repeat the command"
 
 
-def _prepare(key: str, number: int, dask_worker: Worker) -> None:
-    """Let a worker receive the borders for a block."""
-    dask_worker.handlers[_OPERATION] = _receive
+async def _prepare(key: str, number: int) -> None:
+    """Let this worker receive the borders for a block. Runs in the worker's event loop, since it is asynchronous."""
+    get_worker().handlers[_OPERATION] = _receive
     _mail[key, number] = defaultdict(asyncio.Queue)
 
 
-def _discard(key: str) -> None:
+async def _discard(key: str) -> None:
+    """Let the blocks of a run on this worker end."""
     for run, number in list(_mail):
         if run == key:
             del _mail[run, number]
@@ -162,7 +174,15 @@ class _WorkerChannel:
 
     def swap(self, outgoing: Mapping[int, bytes], senders: Collection[int]) -> Mapping[int, bytes]:
         """See `Channel.swap`."""
-        return asyncio.run_coroutine_threadsafe(self._swap(outgoing, senders), self.loop).result()
+        swapped = asyncio.run_coroutine_threadsafe(self._swap(outgoing, senders), self.loop)
+        while True:
+            try:
+                return swapped.result(PING_S)
+            except TimeoutError:
+                if swapped.done():
+                    raise
+                if self._worker.status != Status.running:  # its event loop may have ended
+                    raise BlockLostError(_lost(self._worker.address)) from None
 
     async def _swap(self, outgoing: Mapping[int, bytes], senders: Collection[int]) -> Mapping[int, bytes]:
         await asyncio.gather(*(self._send(other, content) for other, content in outgoing.items()))
