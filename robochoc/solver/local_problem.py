@@ -62,6 +62,20 @@ class Charged(NamedTuple):
     costs: Sequence[Cost]
 
 
+class TableScope(NamedTuple):
+    """The axes of a constraint's table, before the table is made (`CostTable`).
+
+    Attributes:
+        agents: The other robots, in priority order.
+        places: For each of them, then for this robot: its variables in the constraint, among its interface variables.
+        max_cost: The constraint's maximum finite cost.
+    """
+
+    agents: tuple[str, ...]
+    places: tuple[tuple[int, ...], ...]
+    max_cost: Cost
+
+
 MIN_TABLE_VALUES = 64
 """The number of values from which numpy computes the conflicts of all values at once."""
 
@@ -347,6 +361,11 @@ class LocalProblem:
         """
         known = {*robots}
         return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
+
+    def scopes_in_tables(self, robots: Iterable[str]) -> list[TableScope]:
+        """Return the result of `scopes`, with the variables that each constraint names: nothing is checked."""
+        known = {*robots}
+        return [TableScope(c.agents, c.places, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
     def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
         """Return the data that determine `tables` for these `robots`, except domains: equal data give equal tables.

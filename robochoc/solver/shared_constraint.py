@@ -171,6 +171,12 @@ class SharedConstraint:
         """The other robots' variables in the scope: the index of each robot in `agents`, and of its variable."""
         return tuple([(self.agents.index(agent), place) for agent, place in self._seen])
 
+    @property
+    def places(self) -> tuple[tuple[int, ...], ...]:
+        """For each robot in `agents`, then for this robot: its variables in the scope, as in `Axis`."""
+        others = [tuple([place for owner, place in self._seen if owner == agent]) for agent in self.agents]
+        return (*others, self._places)
+
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
         """Return the values of the scope in `view`. None: a value is unknown, or the constraint is dropped."""
         try:
@@ -326,8 +332,7 @@ class SharedConstraint:
             ValueError: if a value has too few parts.
         """
         found = []
-        for agent in self.agents:
-            places = tuple([place for owner, place in self._seen if owner == agent])
+        for agent, places in zip(self.agents, self.places[:-1], strict=True):
             try:
                 found.append(axis(domains[agent], places))
             except IndexError:

@@ -18,12 +18,15 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Predicate, Team
 from robochoc.protocols.inference import dpop_tables
 from robochoc.protocols.inference.dpop_tables import (
+    CoarseTable,
     Extent,
     IncomingTable,
     Table,
     aligned,
     are_all_infinite,
     bytes_of,
+    coarse,
+    expanded,
     packed_costs,
     project,
 )
@@ -48,6 +51,16 @@ def random_table(chance: np.random.Generator, shape: list[int], most: int, *, co
     codes = costs.astype(f"<u{width}")
     codes[broken] = 2 ** (8 * width) - 1
     return codes
+
+
+def random_coarse_table(chance: np.random.Generator, shape: list[int], most: int) -> Table | CoarseTable:
+    """A random table that does not distinguish all indices on some of its axes."""
+    stored = [int(chance.integers(1, size + 1)) if size > 1 and chance.random() < 0.3 else size for size in shape]
+    table = random_table(chance, stored, most, coded=bool(chance.random() < 0.5))
+    return coarse(
+        table,
+        [None if there == size else chance.integers(0, there, size) for there, size in zip(stored, shape, strict=True)],
+    )
 
 
 def plain(table: Table) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
@@ -77,10 +90,10 @@ def test_a_projection_is_the_least_of_the_sum(
         tables = []
         for _ in range(chance.integers(0, 4)):
             lengths = [own, *(size if chance.random() < 0.6 else 1 for size in shape)]
-            tables.append(random_table(chance, lengths, most, coded=bool(chance.random() < 0.5)))
+            tables.append(random_coarse_table(chance, lengths, most))
         costs, choices = project(shape, charges, tables, most * (len(tables) + 1))
         start = np.array(charges).reshape(-1, *(1 for _ in shape))
-        joined = np.broadcast_to(sum(map(plain, tables), start=start), (own, *shape))
+        joined = np.broadcast_to(sum((plain(expanded(table)) for table in tables), start=start), (own, *shape))
         np.testing.assert_array_equal(plain(costs), joined.min(axis=0))
         np.testing.assert_array_equal(choices, joined.argmin(axis=0))
         assert are_all_infinite(costs) == bool(np.isinf(joined).all())

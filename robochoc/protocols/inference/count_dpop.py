@@ -49,7 +49,7 @@ from numpy.typing import NDArray
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Need, Proceed, TableSettings
-from robochoc.protocols.inference.dpop_tables import PIECE, Codes, Extent, Table, costs_for
+from robochoc.protocols.inference.dpop_tables import PIECE, CoarseTable, Codes, Extent, Table, costs_for
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -120,7 +120,11 @@ def bytes_to_count(cells: int, bits: int, below: int) -> int:
 
 
 def count_attaining(
-    least: Codes, charges: Sequence[float], tables: Sequence[Table], own: Numbers, below: Sequence[Numbers]
+    least: Codes,
+    charges: Sequence[float],
+    tables: Sequence[Table | CoarseTable],
+    own: Numbers,
+    below: Sequence[Numbers],
 ) -> Numbers:
     """Return the number of assignments that attain each cost in `least`: 0 if the cost is infinite.
 

@@ -55,16 +55,19 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from typing import Annotated, Any, ClassVar, TypeVar, assert_never, cast
+from typing import Annotated, Any, ClassVar, TypeVar, assert_never, cast, overload
 
 import msgspec
+import numpy as np
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, HasOnly, HasValue, Proof, Reception, table_proves
 from robochoc.protocols.findings import Findings
+from robochoc.protocols.inference.dpop_groups import Partition, length_of, partition_of
 from robochoc.protocols.inference.dpop_tables import (
+    CoarseTable,
     Codes,
     Extent,
     IncomingTable,
@@ -74,6 +77,7 @@ from robochoc.protocols.inference.dpop_tables import (
     are_all_infinite,
     bytes_of,
     cells_of,
+    coarse,
     packed_costs,
     piece_in_words,
     project,
@@ -86,9 +90,10 @@ from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording, cost_text
+from robochoc.solver.cost_table import CostTable
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.exact_costs import EXACT, check_exact
-from robochoc.solver.local_problem import LocalProblem
+from robochoc.solver.local_problem import LocalProblem, TableScope
 from robochoc.system.compiling import mypyc_attr
 from robochoc.system.plain_text import counted, listed
 from robochoc.system.stored_arrays import free_disk_bytes
@@ -314,11 +319,13 @@ class DPOP(TreeProtocol):
         self.utils: dict[str, IncomingTable] = {}
         self.choices: Codes | None = None
         self.optimum: int | None = None
+        self._checked: list[TableScope] = []
+        self._partitions: dict[tuple[str, tuple[int, ...]], Partition] = {}
         self._sizes: dict[str, int] = {}
         self._dearest = 0
         self._need = Need(0, problem.agent)
         self._axes: dict[str, tuple[str, ...]] = {}
-        self._joined: list[Table] = []
+        self._joined: list[Table | CoarseTable] = []
 
     def start_in_tree(self) -> None:
         """Send the domain to the neighbours below."""
@@ -358,9 +365,10 @@ class DPOP(TreeProtocol):
 
     def _compute_dimensions(self) -> None:
         """Compute the dimensions of this robot's table, and announce them."""
-        checked = self.problem.scopes(self.ancestors)
-        self._sizes = self._separator_sizes([scope for scope, _ in checked])
-        self._dearest = self._upper_bound([charge for _, charge in checked])
+        self._partitions.clear()  # in S-DPOP, the domains above may have changed
+        self._checked = self.problem.scopes_in_tables(self.ancestors)
+        self._sizes = self._separator_sizes([one.agents for one in self._checked])
+        self._dearest = self._upper_bound([one.max_cost for one in self._checked])
         self._plan()
         self._announce_dimensions()
 
@@ -375,7 +383,7 @@ class DPOP(TreeProtocol):
 
     def _width_and_need(self) -> tuple[int, Need]:
         """Return the induced width and the largest memory need of this robot's subtree."""
-        self._need = self._memory_need([scope for scope, _ in self.problem.scopes(self.ancestors)])
+        self._need = self._memory_need()
         below = [self.dimensions[child] for child in self.children]
         width = max([len(self._sizes), *(one.induced_width for one in below)])
         return width, max([self._need, *(one.most for one in below)])
@@ -446,16 +454,34 @@ class DPOP(TreeProtocol):
         below = sum(self.dimensions[child].dearest for child in self.children)
         return min(int(own + sum(checked) + below), EXACT)
 
-    def _memory_need(self, checked: Sequence[Scope]) -> Need:
+    def _memory_need(self) -> Need:
         """Return the memory that this robot's tables need: an integer, if it is small enough for a message."""
         own = len(self.problem.values)
-        inputs = [Extent(own * math.prod(len(self.domains[name]) for name in scope), 8) for scope in checked]
+        inputs = [Extent(math.prod(self._lengths(scope)), 8) for scope in self._checked]
         inputs += [
             Extent(math.prod(self._child_sizes(child)), width_of(self.dimensions[child].dearest))
             for child in self.children
         ]
         need = bytes_of(self._own_sizes(), own, width_of(self._dearest), inputs) + self._additional_bytes(inputs)
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
+
+    def _lengths(self, scope: TableScope) -> list[int]:
+        """Return the shape of the table of a constraint that this robot checks."""
+        robots = (*scope.agents, self.problem.agent)
+        return [
+            length_of(self._partition(robot, places), len(self._values_of(robot)))
+            for robot, places in zip(robots, scope.places, strict=True)
+        ]
+
+    def _values_of(self, robot: str) -> Sequence[Value]:
+        """Return the values of this robot, or of a neighbour above."""
+        return self.problem.values if robot == self.problem.agent else self.domains[robot]
+
+    def _partition(self, robot: str, places: tuple[int, ...]) -> Partition:
+        """Return the partition of the values of this robot, or of a neighbour above, by some of its variables."""
+        if (robot, places) not in self._partitions:
+            self._partitions[robot, places] = partition_of(self._values_of(robot), places)
+        return self._partitions[robot, places]
 
     def _own_sizes(self) -> list[int]:
         """Return the shape of this robot's table, with its axes in any order."""
@@ -495,7 +521,7 @@ class DPOP(TreeProtocol):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._joined = [self._aligned(table.joined(), (*table.agents, self.problem.agent)) for table in tables]
+        self._joined = [self._aligned(costs_of(table), (*table.agents, self.problem.agent)) for table in tables]
         del tables
         if not self.children:
             self._compute_utils()
@@ -529,7 +555,13 @@ class DPOP(TreeProtocol):
         self.utils.clear()
         self._compute_utils()
 
-    def _aligned(self, table: Table, axes: Sequence[str]) -> Table:
+    @overload
+    def _aligned(self, table: Table, axes: Sequence[str]) -> Table: ...
+
+    @overload
+    def _aligned(self, table: Table | CoarseTable, axes: Sequence[str]) -> Table | CoarseTable: ...
+
+    def _aligned(self, table: Table | CoarseTable, axes: Sequence[str]) -> Table | CoarseTable:
         """Return `table` with this robot's axis first and the other axes in the order of its separator."""
         return aligned(table, axes, (self.problem.agent, *(self.separator or ())))
 
@@ -584,6 +616,16 @@ class DPOP(TreeProtocol):
     def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
         """Return the index of this robot's cheapest value for these values in the separator."""
         return int(choices[tuple(assignment)])
+
+
+def costs_of(table: CostTable) -> Table | CoarseTable:
+    """Return the costs of a constraint, whose axes belong to the other robots and then to this robot."""
+    lengths = table.charges.shape
+    places = [
+        None if len(codes) == length else np.array(codes, np.intp)
+        for codes, length in zip(table.codes, lengths, strict=True)
+    ]
+    return coarse(table.charges, places)
 
 
 def store_once(sender: str, item: T, received: dict[str, T], senders: Sequence[str]) -> None:

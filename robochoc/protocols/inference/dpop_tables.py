@@ -1,6 +1,7 @@
 """Tables of costs in DPOP: how they are joined, projected, stored and sent (see `dpop`).
 
-An axis belongs to a robot, an index on it to one of the robot's values. Costs are integers, or `inf` if a hard
+An axis belongs to a robot, an index on it to one of the robot's values, or to several values that the table does not
+distinguish (`CoarseTable`). Costs are integers, or `inf` if a hard
 constraint is broken; they are added up as the narrowest integers that can hold the sums, or in float64, which is
 exact below 2^53. Stored and sent tables contain unsigned integers, as narrow as the costs allow; the largest number
 represents `inf`. The memory that an operation needs is known before: `bytes_of`.
@@ -11,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, NamedTuple, cast, overload
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -24,6 +25,7 @@ from robochoc.system.stored_arrays import empty_array, is_on_disk, release_pages
 Array = NDArray[np.float64]
 Codes = NDArray[np.unsignedinteger[Any]]
 Table = Array | Codes
+Places = NDArray[np.intp]
 Width = Literal[1, 2, 4, 8]
 """The number of bytes of one cost."""
 
@@ -47,6 +49,63 @@ class Projection(NamedTuple):
 
     costs: Codes
     choices: Codes
+
+
+class CoarseTable(NamedTuple):
+    """A table that does not distinguish all values of some robots, for a join that does.
+
+    Attributes:
+        costs: The table.
+        places: For each axis of `costs`, the index on it for each index on the axis of the join. None: the same
+            indices, or a single one.
+    """
+
+    costs: Table
+    places: tuple[Places | None, ...]
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The shape of the table in the join."""
+        return tuple(
+            [
+                length if places is None else len(places)
+                for length, places in zip(self.costs.shape, self.places, strict=True)
+            ]
+        )
+
+    def part(self, index: Sequence[slice | int]) -> CoarseTable:
+        """Return the part at `index`: for each axis of the join all indices, one of them, or a slice of one."""
+        found: list[slice | int] = []
+        kept: list[Places | None] = []
+        for at, places in zip(index, self.places, strict=True):
+            whole = at == slice(None)
+            if places is None or whole:
+                found.append(at)
+            elif isinstance(at, slice):
+                found.append(slice(int(places[at.start]), int(places[at.start]) + 1))
+            else:
+                found.append(int(places[at]))
+            if isinstance(at, slice):
+                kept.append(places if whole else None)
+        return CoarseTable(self.costs[tuple(found)], tuple(kept))
+
+    def aligned(self, axes: Sequence[str], onto: Sequence[str]) -> CoarseTable:
+        """Return the result of the function `aligned`."""
+        places = dict(zip(axes, self.places, strict=True))
+        return CoarseTable(aligned(self.costs, axes, onto), tuple([places.get(name) for name in onto]))
+
+    def expanded(self) -> Table:
+        """Return the table with all indices of the join."""
+        table = self.costs
+        for axis, places in enumerate(self.places):
+            if places is not None:
+                table = table.take(places, axis)
+        return table
+
+
+def coarse(table: Table, places: Sequence[Places | None]) -> Table | CoarseTable:
+    """Return `table`, as a `CoarseTable` if there are any `places`."""
+    return table if all(one is None for one in places) else CoarseTable(table, tuple(places))
 
 
 class Extent(NamedTuple):
@@ -77,11 +136,21 @@ def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent
     return cells * (width + _choice(own).itemsize) + max(joining, sending)
 
 
-def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
+@overload
+def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table: ...
+
+
+@overload
+def aligned(table: Table | CoarseTable, axes: Sequence[str], onto: Sequence[str]) -> Table | CoarseTable: ...
+
+
+def aligned(table: Table | CoarseTable, axes: Sequence[str], onto: Sequence[str]) -> Table | CoarseTable:
     """Return a view of `table` with an axis for each robot in `onto`, of length 1 if the table has no such axis.
 
     `axes` are the robots of the table's axes; robots that are not in `onto` have a single value.
     """
+    if isinstance(table, CoarseTable):
+        return table.aligned(axes, onto)
     kept = [name for name in axes if name in onto]
     table = table[tuple([slice(None) if name in onto else 0 for name in axes])]
     table = table.transpose([kept.index(name) for name in onto if name in kept])
@@ -91,7 +160,7 @@ def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
 def project(
     shape: Sequence[int],
     charges: Sequence[float],
-    tables: Sequence[Table],
+    tables: Sequence[Table | CoarseTable],
     dearest: int,
     *,
     on_disk: bool = False,
@@ -111,14 +180,15 @@ def project(
         empty_table(shape, f"<u{width}", on_disk=on_disk), empty_table(shape, _choice(len(charges)), on_disk=on_disk)
     )
     split = _stepped(shape, len(charges))
-    steps: list[list[Table]] = [[] for _ in shape[:split]]
+    steps: list[list[Table | CoarseTable]] = [[] for _ in shape[:split]]
+    tables = [expanded(table) if math.prod(table.shape) <= SMALL else table for table in tables]
     fixed: Array = np.array(charges, np.float64).reshape(-1, *(1 for _ in shape[split:]))
     for table in sorted(tables, key=lambda table: [length > 1 for length in table.shape[split + 1 :]]):
         varying = [axis for axis, length in enumerate(table.shape[1 : split + 1]) if length > 1]
         if varying:
             steps[varying[-1]].append(table)
         else:
-            fixed = np.add(fixed, _floats(_part(table, [0] * split)))
+            fixed = np.add(fixed, _floats(expanded(_part(table, [0] * split))))
     codes = _Codes.least(len(charges), dearest, sum(map(len, steps)), math.prod(shape) * len(charges))
     numbers = codes.first(fixed)
     del fixed
@@ -160,8 +230,10 @@ class _Codes:
         np.add(numbers, places, out=numbers, where=numbers < self.infinite)
         return numbers
 
-    def further(self, table: Table) -> Any:  # noqa: ANN401 - integers or floats
+    def further(self, table: Table | CoarseTable) -> Any:  # noqa: ANN401 - integers or floats
         """Return numbers for the costs in `table`, to be added to numbers with values."""
+        if isinstance(table, CoarseTable):
+            return CoarseTable(self.further(table.costs), table.places)
         if not self.exact:
             return _floats(table)
         if table.dtype.kind == "u":
@@ -201,14 +273,16 @@ class _Join:
     tables without leading axes. A sum of tables is made again only if an index on one of their leading axes changes.
     """
 
-    def __init__(self, result: Projection, steps: Sequence[Sequence[Table]], codes: _Codes, fixed: Table) -> None:
+    def __init__(
+        self, result: Projection, steps: Sequence[Sequence[Table | CoarseTable]], codes: _Codes, fixed: Table
+    ) -> None:
         self._result = result
         self._codes = codes
         self._fixed = fixed
         self._joined = np.empty((codes.many, *result.costs.shape[len(steps) :]), codes.kind)
-        self._small = [[codes.further(table) for table in tables if table.size <= SMALL] for tables in steps]
-        self._large = [[table for table in tables if table.size > SMALL] for tables in steps]
-        tables: list[NDArray[Any]] = [*result, *(table for some in self._large for table in some)]
+        self._small = [[codes.further(table) for table in tables if _stored(table).size <= SMALL] for tables in steps]
+        self._large = [[table for table in tables if _stored(table).size > SMALL] for tables in steps]
+        tables: list[NDArray[Any]] = [*result, *(_stored(table) for some in self._large for table in some)]
         self._on_disk = [table for table in tables if is_on_disk(table)]
         self._resident = 0
 
@@ -230,10 +304,12 @@ class _Join:
         after = [0] * (len(self._small) - depth - 1)
         for index in range(costs.shape[depth]):
             full = (*place, index, *after)
-            blocks = [_part(table, full) for table in self._small[depth]]
-            blocks += [self._codes.further(_part(table, full)) for table in self._large[depth]]
             total = added
-            for block in blocks:
+            for table in self._small[depth]:
+                block = expanded(_part(table, full))
+                total = block if total is None else total + block
+            for large in self._large[depth]:
+                block = expanded(self._codes.further(_part(large, full)))
                 total = block if total is None else total + block
             self.fill((*place, index), total)
 
@@ -303,8 +379,21 @@ class IncomingTable:
         self._left -= codes.size
 
 
-def _part(table: Table, place: Sequence[int]) -> Table:
+def _stored(table: Table | CoarseTable) -> Table:
+    """Return the array in which `table` is stored."""
+    return table.costs if isinstance(table, CoarseTable) else table
+
+
+def expanded(table: Table | CoarseTable) -> Table:
+    """Return `table` with all indices of the join."""
+    return table.expanded() if isinstance(table, CoarseTable) else table
+
+
+def _part(table: Table | CoarseTable, place: Sequence[int]) -> Table | CoarseTable:
     """Return the part of `table` at these indices on the first axes after this robot's."""
+    if isinstance(table, CoarseTable):
+        leading = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
+        return table.part([slice(None), *leading, *[slice(None)] * (len(table.places) - 1 - len(leading))])
     steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
     index: tuple[slice | int, ...] = (slice(None), *steps)
     return table[index]
@@ -318,14 +407,30 @@ def _floats(table: Table) -> Array:
     return costs
 
 
-def costs_for(table: Table, value: int) -> Array:
+def part_of(table: Table | CoarseTable, index: Sequence[slice | int]) -> Table | CoarseTable:
+    """Return the part of `table` at `index`: for each axis of the join all indices, one of them, or a slice of one."""
+    return table.part(index) if isinstance(table, CoarseTable) else table[tuple(index)]
+
+
+def costs_for(table: Table | CoarseTable, value: int) -> Array:
     """Return, as floats, the part of `table` at one index of its first axis; all of it if the axis has length 1."""
+    if isinstance(table, CoarseTable):
+        rest = [slice(None)] * (len(table.places) - 1)
+        return _floats(table.part([value if table.shape[0] > 1 else 0, *rest]).expanded())
     return _floats(table[value : value + 1] if len(table) > 1 else table).reshape(table.shape[1:])
 
 
 def place_at(table: NDArray[Any], places: Sequence[int]) -> tuple[int, ...]:
     """Return the index in `table` for `places` on the axes that it is aligned to; an axis of length 1 has one entry."""
     return tuple([place if length > 1 else 0 for place, length in zip(places, table.shape, strict=True)])
+
+
+def cost_of(table: Table | CoarseTable, places: Sequence[int]) -> float:
+    """Return the cost in `table` for `places` on the axes that it is aligned to."""
+    if isinstance(table, CoarseTable):
+        mapped = zip(places, table.places, strict=True)
+        return cost_of(table.costs, [place if there is None else int(there[place]) for place, there in mapped])
+    return cost_at(table, place_at(table, places))
 
 
 def cost_at(table: Table, at: tuple[int, ...]) -> float:

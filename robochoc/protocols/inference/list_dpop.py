@@ -58,7 +58,16 @@ from robochoc.protocols.inference.count_dpop import (
     numbers_of,
 )
 from robochoc.protocols.inference.dpop import UTIL, Domain, Proceed, TableSettings
-from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, cost_at, place_at, width_of
+from robochoc.protocols.inference.dpop_tables import (
+    CoarseTable,
+    Codes,
+    Extent,
+    Table,
+    cost_at,
+    cost_of,
+    place_at,
+    width_of,
+)
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -106,7 +115,7 @@ class ListedValues(Message, frozen=True):
 class StoredTables(NamedTuple):
     """The joined tables (`costs`), the children's `numbers`, and this robot's tables (`least`, `ways`)."""
 
-    costs: Sequence[Table]
+    costs: Sequence[Table | CoarseTable]
     numbers: Mapping[str, Numbers]
     least: Codes
     ways: Numbers
@@ -225,7 +234,7 @@ class ListDPOP(CountDPOP):
         if least == math.inf or number >= int(kept.ways[at]):
             raise ValueError(f"{self.problem.agent}'s subtree has no optimum {number} under {assignment}")
         for place, charge in enumerate(self.problem.charges):
-            if charge + sum(cost_at(table, place_at(table, (place, *at))) for table in kept.costs) == least:
+            if charge + sum(cost_of(table, (place, *at)) for table in kept.costs) == least:
                 ways = {child: int(table[place_at(table, (place, *at))]) for child, table in kept.numbers.items()}
                 all_ways = math.prod(ways.values())
                 if number < all_ways:

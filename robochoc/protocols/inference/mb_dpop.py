@@ -68,9 +68,11 @@ from robochoc.protocols.inference.dpop import (
     Need,
     Proceed,
     Size,
+    costs_of,
     store_once,
 )
 from robochoc.protocols.inference.dpop_tables import (
+    CoarseTable,
     Codes,
     Extent,
     Projection,
@@ -79,6 +81,7 @@ from robochoc.protocols.inference.dpop_tables import (
     aligned,
     blocks_of,
     empty_table,
+    part_of,
     place_type,
     project,
     release,
@@ -205,7 +208,7 @@ class MBDPOP(DPOP):
         self.cut: Sizes = {}
         self.enumerated: Sizes = {}
         self.context: dict[str, int] | None = None
-        self._own_tables: list[tuple[Table, Sequence[str]]] = []
+        self._own_tables: list[tuple[Table | CoarseTable, Sequence[str]]] = []
         self._contexts: Iterator[tuple[int, ...]] = iter(())
         self._best: Codes | None = None
         self._best_context: Codes | None = None
@@ -303,7 +306,7 @@ class MBDPOP(DPOP):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; compute at once if there is nothing to wait for."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._own_tables = [(table.joined(), (*table.agents, self.problem.agent)) for table in tables]
+        self._own_tables = [(costs_of(table), (*table.agents, self.problem.agent)) for table in tables]
         self._start_inference()
         self._compute_if_complete()
 
@@ -367,23 +370,26 @@ class MBDPOP(DPOP):
 
     def _projected(self, axes: Sequence[str], context: Mapping[str, int]) -> Projection:
         """Join and project all tables in `context`; `axes` are the robots that are not fixed."""
-        children = [(table.costs, self._table_axes(child)) for child, table in self.utils.items()]
         onto = (self.problem.agent, *axes)
-        tables = [aligned(*self._fixed(table, over, context), onto) for table, over in [*self._own_tables, *children]]
+        children = [(table.costs, self._table_axes(child)) for child, table in self.utils.items()]
+        tables: list[Table | CoarseTable] = []
+        for table, over in [*self._own_tables, *children]:
+            index, left = self._fixed(over, context)
+            tables.append(aligned(part_of(table, index), left, onto))
         own = context.get(self.problem.agent)
         charges = self.problem.charges if own is None else self.problem.charges[own : own + 1]
         return project([self._sizes[name] for name in axes], charges, tables, self._dearest, on_disk=self._on_disk)
 
-    def _fixed(self, table: Table, axes: Sequence[str], context: Mapping[str, int]) -> tuple[Table, list[str]]:
-        """Return the part of `table` in `context`, and its axes; this robot's axis remains, with one index."""
+    def _fixed(self, axes: Sequence[str], context: Mapping[str, int]) -> tuple[list[slice | int], list[str]]:
+        """Return the index of the part in `context` of a table with these axes, and the axes of this part."""
         own = self.problem.agent
-        index = tuple(
+        index = [
             slice(None) if name not in context
             else slice(context[name], context[name] + 1) if name == own
             else context[name]
             for name in axes
-        )  # fmt: skip
-        return table[index], [name for name in axes if name not in context or name == own]
+        ]  # fmt: skip
+        return index, [name for name in axes if name not in context or name == own]
 
     # The enumeration of a cluster root
 

@@ -43,8 +43,18 @@ import numpy as np
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, Proof, Reception, table_proves
-from robochoc.protocols.inference.dpop import DPOP, VALUE, Cost, Dimensions, Domain, Proceed, TableSettings, axes_of
-from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
+from robochoc.protocols.inference.dpop import (
+    DPOP,
+    VALUE,
+    Cost,
+    Dimensions,
+    Domain,
+    Proceed,
+    TableSettings,
+    axes_of,
+    costs_of,
+)
+from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent, expanded
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -157,7 +167,7 @@ class ODPOP(DPOP):
         self._local = np.zeros((len(self.problem.values), *shape))
         self._local += np.array(self.problem.charges, np.float64).reshape(-1, *(1 for _ in shape))
         for table in self.problem.tables({name: self.domains[name] for name in self.ancestors}):
-            self._local += self._aligned(table.joined(), (*table.agents, self.problem.agent))
+            self._local += expanded(self._aligned(costs_of(table), (*table.agents, self.problem.agent)))
         for child in self.children:
             sizes = self.dimensions[child].separator
             self.goods[child] = np.full([sizes[name] for name in self._axes[child]], np.nan)

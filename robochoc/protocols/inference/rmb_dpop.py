@@ -540,8 +540,10 @@ class RMBDPOP(MBDPOP):
         onto = (self.problem.agent, *axes)
         rows = dict[str, Table]()
         for child, incoming in self._places.items():
+            at, left = self._fixed(self._table_axes(child), context)
+            index = tuple(at)
             for name, row in zip(self.inner[child], incoming.table, strict=True):
-                rows[name] = aligned(*self._fixed(row, self._table_axes(child), context), onto)
+                rows[name] = aligned(row[index], left, onto)
         return [rows[name] if name in rows else context[name] for name in self.below]
 
     def _end_contexts(self, found: BestTables) -> None:

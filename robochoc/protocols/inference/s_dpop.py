@@ -51,8 +51,17 @@ import numpy as np
 
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.dynamic import DynamicProtocol
-from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Proceed, store_once
-from robochoc.protocols.inference.dpop_tables import Codes, Extent, IncomingTable, Table, Width, project, width_of
+from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Domain, Proceed, costs_of, store_once
+from robochoc.protocols.inference.dpop_tables import (
+    CoarseTable,
+    Codes,
+    Extent,
+    IncomingTable,
+    Table,
+    Width,
+    project,
+    width_of,
+)
 from robochoc.protocols.message import Message, Value
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage, Wave
@@ -120,7 +129,7 @@ class SDPOP(DPOP, DynamicProtocol):
         self.sent_values: dict[str, list[int]] = {}
         self.known_values: list[Value] = []
         """The domain as robots below know it."""
-        self._own_tables: list[tuple[Table, tuple[str, ...]]] = []
+        self._own_tables: list[tuple[Table | CoarseTable, tuple[str, ...]]] = []
         self._tabulated: tuple[object, ...] = ()
         """The inputs to the tables of this robot's constraints."""
         self._has_new_values = False
@@ -337,7 +346,7 @@ class SDPOP(DPOP, DynamicProtocol):
                 self._let_proceed(child)
         if self._inputs != self._tabulated:
             tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-            self._own_tables = [(table.joined(), (*table.agents, self.problem.agent)) for table in tables]
+            self._own_tables = [(costs_of(table), (*table.agents, self.problem.agent)) for table in tables]
             self._tabulated = self._inputs
         self._compute_if_complete()
 
