@@ -158,7 +158,7 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     metrics = outcome.metrics
     row.status = Status.DONE
     if outcome.verdict == Verdict.UNKNOWN:
-        by_itself = (outcome.reason or "").endswith((GAVE_UP, FOUND_NOTHING))
+        by_itself = any(why in (outcome.reason or "") for why in (GAVE_UP, FOUND_NOTHING))
         row.status = Status.ENDED if by_itself else Status.LIMIT
     row.reason, row.verdict = outcome.reason, str(outcome.verdict)
     row.cost, row.bound = _exact(outcome.cost if team.kind == ProblemKind.DISWCSP else None), _exact(outcome.bound)

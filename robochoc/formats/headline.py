@@ -28,7 +28,8 @@ def describe_outcome(
     match outcome.verdict:
         case Verdict.UNKNOWN:
             so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.withdrawn_alive else ""
-            return f"no verdict, a limit was reached{so_far}"
+            why = f": the best assignment violates {outcome.violations}" if outcome.violations else ""
+            return f"no verdict{why or f', a limit was reached{so_far}'}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.count is not None:
             return counted_solutions(outcome.count, outcome)
         case Verdict.NO_SOLUTION:

@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from enum import StrEnum
 from functools import cached_property
+from typing import assert_never
 
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate
 from robochoc.system.lazy_dataclass import dataclass
@@ -240,6 +241,19 @@ class Constraint:
     def variables(self) -> tuple[str, ...]:
         """The distinct variables of the scope, in its order."""
         return tuple(dict.fromkeys([term for term in self.scope if isinstance(term, str)]))
+
+    @property
+    def is_hard(self) -> bool:
+        """True if some values violate the constraint by its definition. A function may also be undefined."""
+        match self.definition:
+            case Predicate():
+                return self.cost == INFINITE
+            case Relation() as relation:
+                return relation.semantics != Semantics.SOFT or INFINITE in {relation.default_cost, *relation.costs}
+            case Function():
+                return False
+            case never:
+                assert_never(never)
 
     def price(self, assignment: Assignment) -> float:
         """Return the cost of `assignment`, which must contain the scope. 0: the constraint is satisfied."""

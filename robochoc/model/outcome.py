@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
 from robochoc.system.lazy_dataclass import dataclass
+from robochoc.system.plain_text import counted
 
 RULED_OUT = "has ruled everything out"
 """The reason why a single robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty
@@ -153,6 +154,53 @@ class Preprocessing:
 
 
 @dataclass(frozen=True)
+class ViolatedConstraint:
+    """A hard constraint that an assignment violates.
+
+    Attributes:
+        name: The name of the constraint; empty in runs across machines, where robots report scopes only.
+        robot: The robot that holds the constraint.
+        variables: The variables in its scope; empty if no other robot may know them.
+    """
+
+    name: str
+    robot: str
+    variables: tuple[str, ...]
+
+    def __str__(self) -> str:
+        if self.name:
+            return f"{self.name} of {self.robot}"
+        return f"one of {self.robot}" + (f" over {' '.join(self.variables)}" if self.variables else "")
+
+
+@dataclass(frozen=True)
+class Violations:
+    """The hard constraints that an assignment violates.
+
+    Attributes:
+        number: The number of violated hard constraints.
+        hard: The number of all hard constraints in force.
+        first: The first violated constraints, at most `MOST_VIOLATIONS`.
+    """
+
+    number: int
+    hard: int
+    first: tuple[ViolatedConstraint, ...]
+
+    def __str__(self) -> str:
+        """Return the numbers and the first constraints in words."""
+        named = ", ".join(map(str, self.first))
+        more = self.number - len(self.first)
+        rest = f" and {more:,} more" if more > 0 else ""
+        total = counted(self.hard, "hard constraint")
+        return f"{self.number:,} of {total}{': ' * bool(named)}{named}{rest * bool(named)}"
+
+
+MOST_VIOLATIONS = 5
+"""The maximum number of violated constraints that are named."""
+
+
+@dataclass(frozen=True)
 class Answer:
     """The answer to a problem, given by a search, an epoch or a whole run. Costs are in the user's units.
 
@@ -183,6 +231,8 @@ class Answer:
         dropped_constraints: The constraints between robots that were dropped because robots are absent, if there is an
             assignment (`model/absence.py`). In runs across machines the list is empty, since no robot knows all these
             constraints.
+        violations: The hard constraints that the best complete assignment violates, if the verdict is `UNKNOWN` because
+            no known assignment satisfies all of them.
     """
 
     verdict: Verdict
@@ -205,6 +255,7 @@ class Answer:
     deadline: float | None = None
     improvements: tuple[Improvement, ...] = ()
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
+    violations: Violations | None = None
 
     def assignment_parts(self) -> dict[str, Any]:
         """Return the fields that describe the assignment, by name. These fields belong together."""

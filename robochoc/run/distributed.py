@@ -97,9 +97,17 @@ class Deployment(ABC):
         """Return the answer of `search`. If the options require it, the central solver confirms the answer."""
         deadline = self.options.deadline if self.left_s() == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.in_user_units, deadline))
+        if self._found_nothing(phase, search, answer):
+            answer = replace(answer, violations=search.violations())
         if answer.verdict in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
             return answer.confirmed_as(self.confirm(phase, answer))
         return answer
+
+    def _found_nothing(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> bool:
+        """Return whether the robots had values, but no known assignment satisfies all hard constraints."""
+        if answer.verdict != Verdict.UNKNOWN or answer.assignment or search.result.lost or phase.withdrawal:
+            return False
+        return answer.ended or phase.traits.costs or self.options.deadline is not None
 
     def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - as `confirm`
         """Return `answer`, the answer of `search`, or a better one found during the search."""
@@ -113,9 +121,10 @@ class Deployment(ABC):
             return f"{answer.witness} {GAVE_UP}"
         if answer.metrics.lost_messages and not phase.traits.bears_loss:
             return why_spoiled(phase, answer.metrics)
+        nearest = f"the best assignment violates {answer.violations}" if answer.violations else ""
         if answer.ended:
-            return f"{phase.name} {FOUND_NOTHING}"
-        return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))
+            return "; ".join(filter(None, [f"{phase.name} {FOUND_NOTHING}", nearest]))
+        return "; ".join(filter(None, [self._limit_reached(answer.metrics), nearest, self.unsettled]))
 
     def _limit_reached(self, spent: Metrics) -> str:
         """Return the limit that ended a search, in words."""

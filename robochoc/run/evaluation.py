@@ -13,10 +13,10 @@ from typing import NamedTuple
 from robochoc.communication.search_result import SearchResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import user_cost
-from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcome, Verdict
+from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcome, Verdict, Violations
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
-from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree
+from robochoc.run.incumbent import best_known, least_violating, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.listed_optima import combined_optima
 from robochoc.run.phases import RunPhase
 from robochoc.solver.compiled_team import CompiledTeam
@@ -27,6 +27,7 @@ from robochoc.verification.checker import (
     assignment_cost,
     needlessly_withdrawn,
     robots_without_values,
+    violated_constraints,
     violations,
 )
 
@@ -34,11 +35,20 @@ Check = Callable[[], Answer | None]
 """A function that checks the assignment of a search. Returns it with an undecided verdict, or None if it is invalid."""
 
 
+def _nothing_known() -> None:
+    """Return None: nothing is known about violated constraints."""
+
+
 class Search(NamedTuple):
-    """A finished search: its result, and the check of its assignment."""
+    """A finished search: its result, and the check of its assignment.
+
+    `violations` returns the hard constraints that the best assignment violates, if no known one satisfies all of them.
+    None: the robots never had values together, or it is unknown.
+    """
 
     result: SearchResult
     check: Check
+    violations: Callable[[], Violations | None] = _nothing_known
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -204,6 +214,13 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
         optima=listed,
         dropped_constraints=dropped,
     )
+
+
+@collection_paused()
+def violations_in_files(result: SearchResult, team: Team, compiled: CompiledTeam) -> Violations | None:
+    """Return the constraints in the files that the best assignment of a search violates; see `Search.violations`."""
+    nearest = least_violating(compiled, result)
+    return None if nearest is None else violated_constraints(team, nearest)
 
 
 def _checked_optima(

@@ -52,6 +52,25 @@ def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: fl
     return best
 
 
+def least_violating(compiled: CompiledTeam, result: SearchResult) -> dict[str, int] | None:
+    """Return the assignment of all robots in a result with the fewest violated constraints, then the least cost.
+
+    Used after `best_known` has found nothing. None: the robots never had values together.
+    """
+    objective = Objective(compiled.team)
+    best: tuple[tuple[int, float], dict[str, int]] | None = None
+    for own in (
+        result.assignments,
+        *_received_assignments(compiled, result.findings),
+        *_nearest_cycle(compiled, result, objective),
+    ):
+        objective.reset()
+        objective.change(own)
+        if objective.is_complete and (best is None or objective.shortfall < best[0]):
+            best = objective.shortfall, merged_values(own)
+    return best and best[1]
+
+
 def costs_by_cycle(
     compiled: CompiledTeam, trails: Mapping[str, Trail], withdrawal_cost: float | None = None
 ) -> Iterator[float]:
@@ -111,6 +130,23 @@ def _best_cycle(compiled: CompiledTeam, result: SearchResult, objective: Objecti
     if costs:
         own: _Own = {}
         for changed in itertools.islice(_changes(compiled, trails), costs.index(min(costs)) + 1):
+            own.update(changed)
+        yield own
+
+
+def _nearest_cycle(compiled: CompiledTeam, result: SearchResult, objective: Objective) -> Iterator[_Own]:
+    """Yield the robots' values in the first of the cycles with the fewest violated constraints."""
+    trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
+    if len(trails) < len(compiled.team.robots):
+        return
+    objective.reset()
+    shortfalls = []
+    for changed in _changes(compiled, trails):
+        objective.change(changed)
+        shortfalls.append(objective.shortfall)
+    if shortfalls:
+        own: _Own = {}
+        for changed in itertools.islice(_changes(compiled, trails), shortfalls.index(min(shortfalls)) + 1):
             own.update(changed)
         yield own
 

@@ -19,7 +19,7 @@ from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files
+from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, violations_in_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.options import Runtime
 from robochoc.run.phases import RunPhase
@@ -152,7 +152,7 @@ class ThisMachine(Deployment):
         with self._session(phase, epoch.compiled) as session:
             self._watch(phase, EpochStart(epoch), session)
             result = session.search(self.left_s(), self.options.messages)
-        return Search(result, partial(check_with_files, phase, result, self._scenario.team, epoch.compiled))
+        return _checkable(phase, result, self._scenario.team, epoch.compiled)
 
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:
         """See `Deployment.confirm`."""
@@ -294,8 +294,8 @@ class ThisMachine(Deployment):
 
     def _answer_of(self, phase: RunPhase, epoch: FinishedEpoch) -> PhaseAnswer:
         """Return the answer of an epoch, checked against the files."""
-        check = partial(check_with_files, phase, epoch.result, epoch.team, epoch.epoch.compiled)
-        answer = self.evaluated(phase, Search(epoch.result, check))
+        search = _checkable(phase, epoch.result, epoch.team, epoch.epoch.compiled)
+        answer = self.evaluated(phase, search)
         self._improvements = None
         return answer
 
@@ -351,3 +351,9 @@ class ThisMachine(Deployment):
         cost = None if withdrawal_cost is None else int(withdrawal_cost)
         solvers, team = self._context.second_opinions(), self._scenario.team
         return confirmed(solvers, team, self.options.protocol, alone, total=total, withdrawal_cost=cost)
+
+
+def _checkable(phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Search:
+    """Return a finished search whose assignment is checked against the files of `team`."""
+    check = partial(check_with_files, phase, result, team, compiled)
+    return Search(result, check, partial(violations_in_files, result, team, compiled))

@@ -13,6 +13,7 @@ from typing import assert_never
 from robochoc.model.absence import restated
 from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.expression import UndefinedValueError, evaluate
+from robochoc.model.outcome import MOST_VIOLATIONS, ViolatedConstraint, Violations
 from robochoc.model.problem import (
     INFINITE,
     Assignment,
@@ -55,6 +56,22 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
         ):
             values = ", ".join(f"{name} = {assignment[name]}" for name in constraint.variables)
             yield f"constraint {constraint.name} is broken by {values or 'the absence of a robot'}"
+
+
+def violated_constraints(team: Team, assignment: Assignment) -> Violations:
+    """Return the hard constraints of `team` that `assignment`, with values for all variables, violates."""
+    number = hard = 0
+    first: list[ViolatedConstraint] = []
+    for robot in team.robots:
+        for constraint in robot.constraints():
+            if constraint_cost(constraint, assignment) == INFINITE:
+                number += 1
+                if len(first) < MOST_VIOLATIONS:
+                    first.append(ViolatedConstraint(constraint.name, robot.name, constraint.variables))
+            elif not constraint.is_hard:
+                continue
+            hard += 1
+    return Violations(number, hard, tuple(first))
 
 
 def assignment_cost(team: Team, assignment: Assignment) -> float:

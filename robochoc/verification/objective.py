@@ -116,6 +116,16 @@ class Objective:
             return INFINITE
         return self._sum + self._weight * (self._withdrawal_cost or 0)
 
+    @property
+    def shortfall(self) -> tuple[int, float]:
+        """The number of violated hard constraints, and the cost of all others: comparable if `cost` is infinite."""
+        return self._broken, self._sum
+
+    @property
+    def is_complete(self) -> bool:
+        """True if all robots have values."""
+        return not self._absent
+
     def in_user_units(self, cost: float) -> Cost:
         """Convert `cost`, which includes withdrawal costs, to the user's units."""
         return self._in_user_units(cost)

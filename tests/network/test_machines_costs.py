@@ -67,3 +67,19 @@ def test_a_function_without_bounds_is_refused_where_domains_are_not_known(site: 
     assert robot.status() == 2, robot.errors
     assert "has no bounds" in one_line(robot)
     assert "max(0, min(..., 100))" in one_line(robot)
+
+
+def test_violated_constraints_are_reported_by_their_holders(site: Deployment) -> None:
+    different = Relation("R", 2, Semantics.CONFLICTS, ((0, 0), (1, 1), (2, 2)))
+    only = Domain("one", (range(1),))
+    variables = {"RA": [Variable("A", only)], "RB": [Variable("B", only)], "RC": [Variable("C", VALUES)]}
+    pairs = [("A", "B"), ("B", "C")]
+    constraints = [Constraint(f"C{number}", different, pair, pair) for number, pair in enumerate(pairs)]
+    files = written(assemble("impossible", variables, constraints), site)
+    master, _ = finished(site, files, "--team", files, "--protocol", "dsa", "--json", status=3)
+    assert master.object["violations"] == {
+        "number": 1,
+        "hard": 2,
+        "first": [{"name": "", "robot": "RB", "variables": ["A", "B"]}],
+    }
+    assert master.object["reason"].endswith("the best assignment violates 1 of 2 hard constraints: one of RB over A B")

@@ -79,7 +79,7 @@ def test_a_run_from_beginning_to_end() -> None:
     assert isinstance(account, DetailedReport)
     assert (account.assigned, account.assignment) == (True, {"B": 2})
     shared = (Charge("RB", ("A", "B"), 1, 0),)
-    assert transport.heard_of(CheckResult) == [CheckResult(1, allowed=True, cost=0, held=1, shared=shared)]
+    assert transport.heard_of(CheckResult) == [CheckResult(1, allowed=True, cost=0, held=1, shared=shared, hard=1)]
     assert account.exchanged == {"RA": Exchanged(0, 1, 5), "RC": Exchanged(2, 0, 0)}
     assert isinstance(transport.heard[-1], Bye)
     assert {receiver for receiver, _ in transport.sent} == {"RC"}

@@ -4,8 +4,16 @@ from __future__ import annotations
 
 from robochoc.communication.control import Conclusion, Counters, EpochMessage, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
-from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, ProtocolMessage
+from robochoc.communication.network.control_messages import (
+    Charge,
+    CheckResult,
+    DetailedReport,
+    Exchanged,
+    ProtocolMessage,
+)
+from robochoc.communication.network.plausibility import Declarations, fault_of_check
 from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NO_FINDINGS, Findings
 from tests.support.cases import looped
 
@@ -201,6 +209,19 @@ def test_all_have_to_check() -> None:
     assert checked(state)
     assert state.held
     assert state.cost == 5
+
+
+def test_violated_constraints_are_known_once_all_have_checked() -> None:
+    state = AuditedSearchState(1, ROBOTS)
+    all_hear(state, account(1, {"X": 1}))
+    shared = (Charge("R1", ("A", "B"), 1, INFINITE), Charge("R1", ("A", "C"), 1, 0))
+    state.handle("R1", CheckResult(1, allowed=False, cost=0, held=3, shared=shared, hard=3, broken=1))
+    state.handle("R2", CheckResult(1, allowed=False, cost=0, held=2, hard=1, broken=1))
+    assert state.violations is None
+    state.handle("R3", CheckResult(1, allowed=True, cost=0, held=1, hard=1))
+    assert str(state.violations) == "2 of 5 hard constraints: one of R1 over A B, one of R2"
+    impossible = CheckResult(1, allowed=True, cost=0, held=1, hard=1, broken=1)
+    assert "impossible number" in fault_of_check("R1", impossible, Declarations(), ROBOTS)
 
 
 def test_one_broken_constraint_is_enough() -> None:

@@ -253,20 +253,23 @@ def test_checking_is_by_the_own_file() -> None:
     assert one.check_constraints({"A": 1, "C": 1}) == judgement(price=0)
     assert one.check_constraints({"A": 2, "C": 2}) == judgement(price=INFINITE)
     assert one.check_constraints({"A": 1, "B": 1}) == judgement(price=0)  # its own value it knows itself
-    assert one.check_constraints({"C": 2}) == CheckResult(1, allowed=True, cost=0, held=1)  # RA has stepped aside
+    assert one.check_constraints({"C": 2}) == CheckResult(
+        1, allowed=True, cost=0, held=1, hard=1
+    )  # RA has stepped aside
 
 
-def judgement(price: float) -> CheckResult:
+def judgement(price: float, hard: int = 2) -> CheckResult:
     """Of RB's two constraints the private one holds, and RA can know the other."""
     allowed = price < INFINITE
-    return CheckResult(1, allowed, price if allowed else 0, held=2, shared=(Charge("RB", ("A", "B"), 1, price),))
+    shared = (Charge("RB", ("A", "B"), 1, price),)
+    return CheckResult(1, allowed, price if allowed else 0, held=2, shared=shared, hard=hard, broken=int(not allowed))
 
 
 def test_checking_adds_up_what_its_constraints_charge() -> None:
     _, one = begun(team=chain(4))
     assert one.assignment == {"B": 1}
-    assert one.check_constraints({"A": 1}) == judgement(price=4)
-    assert one.check_constraints({"A": 2}) == judgement(price=0)
+    assert one.check_constraints({"A": 1}) == judgement(price=4, hard=1)
+    assert one.check_constraints({"A": 2}) == judgement(price=0, hard=1)
 
 
 def test_who_steps_aside_answers_for_nothing() -> None:

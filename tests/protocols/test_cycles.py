@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 from pathlib import Path
 from random import Random
 
@@ -13,7 +13,7 @@ import pytest
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Trail
 from robochoc.protocols.local_search.a_dsa import ADSA
 from robochoc.protocols.local_search.cocoa import CoCoA
@@ -122,7 +122,25 @@ def test_the_answer_is_the_cheapest_cycle(protocol: type[CycleProtocol], teams: 
             costs = [sum(c.price(values) for c in team.constraints()) for values in assignments_by_cycle(team, result)]
             options = Options(protocol=NAMES[protocol], runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "12"})
             outcome = solve(team, options)
-            assert outcome.cost == (None if min(costs) == float("inf") else min(costs))
+            assert outcome.cost == (None if min(costs) == INFINITE else min(costs))
+
+
+@ALL
+def test_the_fewest_violations_of_any_cycle_are_reported(protocol: type[CycleProtocol]) -> None:
+    """Four robots with three values, all different: each cycle violates one of six constraints at least."""
+    pairs = [*combinations("ABCD", 2)]
+    team = team_of(dict.fromkeys("ABCD", range(1, 4)), [Constraint("".join(two), DIFFERENT, two, two) for two in pairs])
+    for seed in range(5):
+        result = played(team, protocol, Concurrent(seed), seed, cycles=2)
+        broken = [
+            sum(one.price(values) == INFINITE for one in team.constraints())
+            for values in assignments_by_cycle(team, result)
+        ]
+        options = Options(protocol=NAMES[protocol], runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "2"})
+        outcome = solve(team, options)
+        assert outcome.violations is not None
+        assert (outcome.violations.number, outcome.violations.hard) == (min(broken), 6)
+        assert len(outcome.violations.first) == min(broken) > 0
 
 
 @count("teams", 12, 60)
@@ -150,7 +168,10 @@ def test_where_no_cycle_is_a_solution_that_is_said_or_robots_withdraw() -> None:
     options = Options(protocol="maxsum", runtime=Runtime.SIMULATOR, settings={"cycles": "3"})
     outcome = solve(team, replace(options, protocol="dsa"))
     assert outcome.verdict is Verdict.UNKNOWN
-    assert outcome.reason == "dsa ended, and found no assignment that satisfies all hard constraints"
+    assert outcome.reason == (
+        "dsa ended, and found no assignment that satisfies all hard constraints; "
+        "the best assignment violates 1 of 1 hard constraint: C of RB"
+    )
     outcome = solve(team, replace(options, withdraw=Withdrawal.MAXIMAL))
     assert outcome.verdict is Verdict.SOLUTION
     assert len(outcome.withdrawn) == 1

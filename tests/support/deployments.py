@@ -209,20 +209,23 @@ def ended(programs: Mapping[str, Program], status: int = 0) -> None:
     assert not others, others
 
 
-def finished(site: Deployment, files: Path, *words: object, robots: Sequence[object] = ()) -> tuple[Program, Crew]:
-    """Return the master and the robots of a run that all have ended well.
+def finished(
+    site: Deployment, files: Path, *words: object, robots: Sequence[object] = (), status: int = 0
+) -> tuple[Program, Crew]:
+    """Return the master and the robots of a run that all have ended with `status`.
 
     Args:
         site: The machines.
         files: The folder of the team, all of whose robots are enrolled.
         words: Options of the master.
         robots: Options of each robot.
+        status: Their exit status.
     """
     tokens = site.enrol("--team", files)
     master = site.master(*words)
     crew = site.robots(files, tokens, *robots)
-    assert master.status() == 0, master.errors
-    ended(crew)
+    assert master.status() == status, master.errors
+    ended(crew, status)
     return master, crew
 
 

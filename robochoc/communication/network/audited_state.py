@@ -22,11 +22,12 @@ from robochoc.communication.network.plausibility import (
     objections,
     thoroughness,
     total_of,
+    violations_of,
     widest_gap,
 )
 from robochoc.communication.quiescence import MessageCounts
 from robochoc.communication.search_state import SearchState
-from robochoc.model.outcome import CheckCounts
+from robochoc.model.outcome import CheckCounts, Violations
 
 _ASKED_ENOUGH = 2
 _MOST_NAMED = 3
@@ -193,6 +194,11 @@ class AuditedSearchState(SearchState):
     def objections(self) -> tuple[str, ...]:
         """Descriptions of violated constraints, reported by the robots that hold them."""
         return tuple(islice(objections(self._checks), _MOST_NAMED))
+
+    @property
+    def violations(self) -> Violations | None:
+        """The violated constraints that all robots have reported; None if they hold, or some robot has not checked."""
+        return None if self.unchecked else violations_of(self._checks)
 
     @property
     def thoroughness(self) -> CheckCounts:

@@ -101,7 +101,7 @@ class CheckResult(EpochMessage, frozen=True):
 
     `held` is the number of these constraints. `shared` are those that other robots may know too; `copies` are
     constraints of other robots that this robot knows. `snapshot` is the number of the checked snapshot; 0: the final
-    reports.
+    reports. `hard` is the number of hard constraints among those held, and `broken` the number of violated ones.
     """
 
     allowed: bool
@@ -110,6 +110,8 @@ class CheckResult(EpochMessage, frozen=True):
     shared: tuple[Charge, ...] = ()
     copies: tuple[Charge, ...] = ()
     snapshot: int = 0
+    hard: int = 0
+    broken: int = 0
 
 
 class Objection(_Message, frozen=True):

@@ -22,7 +22,7 @@ from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
 from robochoc.communication.quiescence import MessageCounts
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
-from robochoc.model.outcome import CheckCounts
+from robochoc.model.outcome import MOST_VIOLATIONS, CheckCounts, ViolatedConstraint, Violations
 from robochoc.model.problem import INFINITE, Domain
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.traits import Traits
@@ -208,7 +208,10 @@ def fault_of_check(name: str, check: CheckResult, declared: Declarations, order:
     if not 0 <= check.cost <= declared.dearest.get(name, LARGEST_COUNT) * _ROUNDED < INFINITE:
         return "its constraints cost more than it has declared"
     if not (
-        len(judged) <= MOST_CHARGES and 0 <= sum(one.constraints for one in check.shared) <= check.held <= LARGEST_COUNT
+        len(judged) <= MOST_CHARGES
+        and 0 <= sum(one.constraints for one in check.shared) <= check.held <= LARGEST_COUNT
+        and 0 <= check.broken <= check.hard <= check.held
+        and not (check.allowed and check.broken)
     ):
         return "it has reported an impossible number of checked constraints"
     if any(one.constraints < 1 or not one.price >= 0 or not all(map(is_name, one.variables)) for one in judged):
@@ -308,6 +311,18 @@ def objections(checks: Mapping[str, CheckResult]) -> Iterator[str]:
             yield f"{name} finds its constraint over {broken[0]} broken"
         elif not check.allowed:
             yield f"{name} finds one of its constraints broken, which nobody else may know"
+
+
+def violations_of(checks: Mapping[str, CheckResult]) -> Violations | None:
+    """Return the violated constraints that the robots which hold them have reported; None if there are none."""
+    first: list[ViolatedConstraint] = []
+    for name, check in checks.items():
+        scopes = [one.variables for one in check.shared if one.price == INFINITE]
+        private = [()] * (check.broken > 0 and not scopes)
+        first += [ViolatedConstraint("", name, scope) for scope in (*scopes, *private)]
+    number = sum(check.broken for check in checks.values())
+    hard = sum(check.hard for check in checks.values())
+    return Violations(number, hard, tuple(first[:MOST_VIOLATIONS])) if number else None
 
 
 def _key(one: Charge) -> tuple[str, tuple[str, ...]]:

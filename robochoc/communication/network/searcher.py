@@ -71,13 +71,15 @@ def check_constraints(
     parts = [part for child in robot.children for part in child.constraints]
     known_to_it = (_in_force(one, values) for one in (*robot.private, *robot.shared, *parts))
     held = [one for one in known_to_it if one is not None]
-    cost = sum(constraint.price(values) for constraint in held)
+    prices = [constraint.price(values) for constraint in held]
+    cost, broken = sum(prices), prices.count(INFINITE)
+    hard = sum(one.is_hard or price == INFINITE for one, price in zip(held, prices, strict=True))
     shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model != ConstraintModel.PKC], values))
     known = [*((child.name, child.copies) for child in robot.children), *learnt.items()]
     charges = (one for holder, theirs in known for one in _charges(holder, theirs, values))
     copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have sent any number
     allowed = cost < INFINITE
-    return CheckResult(epoch, allowed, cost if allowed else 0, len(held), shared, copies)
+    return CheckResult(epoch, allowed, cost if allowed else 0, len(held), shared, copies, hard=hard, broken=broken)
 
 
 def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:

@@ -127,7 +127,7 @@ class Machines(Deployment):
         )
         if not result.lost:
             self._refuse_contradictions()
-        return Search(result, partial(self._check, phase, result))
+        return Search(result, partial(self._check, phase, result), lambda: self._master.state.violations)
 
     # Answers while the robots search
 

@@ -23,6 +23,7 @@ from robochoc.verification.checker import (
     constraint_cost,
     has_local_solution,
     needlessly_withdrawn,
+    violated_constraints,
     violations,
 )
 from robochoc.verification.second_opinion import total_cost
@@ -163,3 +164,31 @@ def test_a_protocol_that_lies_is_refuted(monkeypatch: pytest.MonkeyPatch, runtim
     monkeypatch.setattr(robochoc.run.orchestrator, "protocol_named", lambda _name: Liar)
     with pytest.raises(RefutedError, match=r"broken by V1\.1 = 1, V1\.2 = 1"):
         solve(queens3d(3), Options(runtime=runtime))
+
+
+@given(teams)
+@examples(40)
+def test_violated_constraints_are_those_that_cost_infinity(team: Team) -> None:
+    for assignment in some_assignments(team):
+        found = violated_constraints(team, assignment)
+        broken = [one for one in team.constraints() if constraint_cost(one, assignment) == INFINITE]
+        assert found.number == len(broken)
+        assert [one.name for one in found.first] == [one.name for one in broken[:5]]
+        assert found.hard >= found.number
+
+
+def test_soft_constraints_are_not_hard() -> None:
+    y = ("A", "B")
+    hard = Relation("R", 2, Semantics.SOFT, ((0, 0), (1, 1)), (INFINITE, 3), 0)
+    soft = Relation("S", 2, Semantics.SOFT, ((0, 0),), (5,), 1)
+    same = Predicate("P", ("X", "Y"), parse("eq(X,Y)", ("X", "Y"), Type.BOOLEAN))
+    constraints = [
+        Constraint("hard", hard, y, y),
+        Constraint("soft", soft, y, y),
+        Constraint("costly", same, y, y, cost=7),
+        Constraint("same", same, y, y),
+    ]
+    team = team_of(dict.fromkeys("AB", range(2)), constraints)
+    assert str(violated_constraints(team, {"A": 0, "B": 0})) == "1 of 2 hard constraints: hard of RB"
+    assert str(violated_constraints(team, {"A": 0, "B": 1})) == "1 of 2 hard constraints: same of RB"
+    assert violated_constraints(team, {"A": 1, "B": 1}).number == 0
