@@ -76,6 +76,34 @@ class TableScope(NamedTuple):
     max_cost: Cost
 
 
+class AllowedValues(NamedTuple):
+    """The values that one constraint allows, as bit masks.
+
+    Attributes:
+        key: The constraint's name in explanations.
+        agents: The other robots, in priority order.
+        codes: For each of `agents`, and last for this robot, the code of each value: as in a `CostTable`.
+        masks: The values of this robot (bit i for the i-th) that are consistent with each combination of the others'
+            codes.
+    """
+
+    key: str
+    agents: tuple[str, ...]
+    codes: tuple[Sequence[int], ...]
+    masks: dict[tuple[int, ...], int]
+
+    def joined(self) -> dict[tuple[int, ...], int]:
+        """Return the `masks` by the indices of the others' values.
+
+        Raises:
+            TooLargeError: if there are too many combinations.
+        """
+        refuse_large(self.key, math.prod(map(len, self.codes)))
+        others = self.codes[:-1]
+        places = itertools.product(*(range(len(codes)) for codes in others))
+        return {place: self.masks[chosen] for place, chosen in zip(places, itertools.product(*others), strict=True)}
+
+
 MIN_TABLE_VALUES = 64
 """The number of values from which numpy computes the conflicts of all values at once."""
 
@@ -428,36 +456,24 @@ class LocalProblem:
         """True if costs or withdrawals are minimised."""
         return self._part.robot.kind == ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
 
-    def allowed(
-        self, domains: Mapping[str, Sequence[Value]], lowest: str
-    ) -> list[tuple[tuple[str, ...], dict[tuple[int, ...], int]]]:
+    def allowed(self, domains: Mapping[str, Sequence[Value]], lowest: str) -> list[AllowedValues]:
         """Return the result of `tables` for `lowest` as bit masks, for problems without costs.
 
-        For each constraint: its other robots, and the values of this robot (bit i for the i-th) that are consistent
-        with each combination of indices of their values. No robot may withdraw.
+        No robot may withdraw.
 
         Raises:
-            UnsupportedError: if there are too many combinations.
+            TooLargeError: if there are too many combinations.
         """
         found = []
         for constraint in self._with_lowest(lowest):
             if not domains.keys() >= set(constraint.agents):
                 continue
-            *axes, own = constraint.axes(domains)
-            refuse_large(constraint.key, math.prod(len(axis.codes) for axis in axes) * len(own.codes))
-            combinations = dict(constraint.combinations(axes))
-            self.checks += constraint.evaluate(combinations.values()) * len(self.values)
-            codes = zip(
-                itertools.product(*(range(len(axis.codes)) for axis in axes)),
-                itertools.product(*(axis.codes for axis in axes)),
-                strict=True,
-            )
-            found.append(
-                (
-                    constraint.agents,
-                    {place: constraint.mask(combinations[code]) for place, code in codes if code in combinations},
-                )
-            )
+            axes = constraint.axes(domains)
+            combinations = [*constraint.combinations(axes[:-1])]
+            self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
+            masks = {place: constraint.mask(others) for place, others in combinations}
+            codes = tuple([axis.codes for axis in axes])
+            found.append(AllowedValues(constraint.key, constraint.agents, codes, masks))
         return found
 
     def look_ahead(self) -> None:

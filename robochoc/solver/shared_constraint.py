@@ -42,6 +42,7 @@ class OwnValues:
         self._names = names
         self._values = values
         self._axes: dict[tuple[int, ...], Axis] = {}
+        self._code_values: dict[tuple[int, ...], list[int]] = {}
         self._numbers: dict[tuple[int, ...], int] = {}
 
     def seen(self, scope: Container[str]) -> tuple[tuple[int, ...], list[str]]:
@@ -54,6 +55,16 @@ class OwnValues:
         if places not in self._axes:
             self._axes[places] = axis(self._values, places)
         return self._axes[places]
+
+    def code_values(self, places: tuple[int, ...]) -> list[int]:
+        """Return, for each code for `places`, its values: bit i for the i-th value."""
+        if places not in self._code_values:
+            axis = self.axis(places)
+            found = [0] * len(axis.parts)
+            for index, code in enumerate(axis.codes):
+                found[code] |= 1 << index
+            self._code_values[places] = found
+        return self._code_values[places]
 
     def number(self, places: tuple[int, ...], shared: SharedEvaluations) -> int:
         """Return a number in `shared` that determines the `axis` for `places`."""
@@ -156,6 +167,7 @@ class SharedConstraint:
         self._places, names = own.seen(self._scope)
         self._all_names = [*self._names, *names]
         _, self.codes, self._distinct = own.axis(self._places)
+        self._code_values = own.code_values(self._places)
         shared = self._known.evaluations
         domains = tuple([self._known.domains[name].ranges for name in self._names])
         self.evaluations = shared.of(self._constraint, self._all_names, (domains, own.number(self._places, shared)))
@@ -368,7 +380,7 @@ class SharedConstraint:
             mask = self.evaluations.masks.get(others)
             if mask is None:
                 holds = self.holds(others)
-                mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
+                mask = sum([values for values, allowed in zip(self._code_values, holds, strict=True) if allowed])
                 self.evaluations.masks[others] = mask
             self._masks[others] = mask
         return mask

@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.local_problem import LocalProblem
+from robochoc.solver.local_problem import AllowedValues, LocalProblem
 
 Row = tuple[bytes, int]
 Places = tuple[int, ...]
@@ -27,6 +28,20 @@ Domain = tuple[Value, ...]
 
 CEILING = 1
 """The ceiling without costs."""
+
+
+class _NAry(NamedTuple):
+    """The values that an n-ary constraint rules out for its lowest robot.
+
+    Attributes:
+        others: The ranks of the other robots above, each with the code of each of its values.
+        own: The code of each value of this robot.
+        ruled_out: For the codes of the robots above, the bits that each code of this robot rules out.
+    """
+
+    others: Sequence[tuple[int, Sequence[int]]]
+    own: Sequence[int]
+    ruled_out: Mapping[Places, list[int]]
 
 
 class ForwardBits:
@@ -48,18 +63,22 @@ class ForwardBits:
         largest = max(map(len, domains.distinct))
         self._place_bytes = 1 if largest <= 1 << 8 else 2 if largest <= 1 << 16 else 4
         self._left = [self._full] * self._own
-        self._n_ary: list[tuple[Places, Mapping[Places, list[int]]]] = []
+        self._n_ary: list[_NAry] = []
         ranks = [(order.rank[name], name) for name in problem.neighbours]
         above = {name: domains[rank] for rank, name in ranks if rank < self.rank}
         for rank, name in ranks:
             if rank <= self.rank:
                 continue
-            for agents, allowed in problem.allowed({**above, name: domains[rank]}, lowest=name):
-                ruled_out = self._ruled_out(allowed, columns.start(rank - self.rank - 1))
-                if len(agents) == 1:
-                    self._left = [left & ~out for left, out in zip(self._left, ruled_out[()], strict=True)]
+            for table in problem.allowed({**above, name: domains[rank]}, lowest=name):
+                start = columns.start(rank - self.rank - 1)
+                ruled_out = _ruled_out(table, start)
+                *others, _, own = table.codes
+                if others:
+                    ranked = [(order.rank[one], codes) for one, codes in zip(table.agents, others, strict=False)]
+                    self._n_ary.append(_NAry(ranked, own, ruled_out))
                 else:
-                    self._n_ary.append((tuple(order.rank[one] for one in agents[:-1]), ruled_out))
+                    outs = ruled_out[()]
+                    self._left = [left & ~outs[code] for left, code in zip(self._left, own, strict=True)]
 
     def count_up_to(self, ceiling: int) -> None:
         """Check the `ceiling`. Raises `ValueError` if there are costs."""
@@ -117,13 +136,13 @@ class ForwardBits:
         found: list[tuple[int, Row]] = []
         for chosen, fields in rows:
             left, own = fields >> shift, fields & own_bits
-            tables = [table[self._chosen(chosen, ranks)] for ranks, table in self._n_ary]
+            tables = [(one.own, one.ruled_out[self._chosen(chosen, one.others)]) for one in self._n_ary]
             while own:
                 value = (own & -own).bit_length() - 1
                 own &= own - 1
                 after = left & self._left[value]
-                for table in tables:
-                    after &= ~table[value]
+                for codes, ruled_out in tables:
+                    after &= ~ruled_out[codes[value]]
                 if ((after | guards) - lowest) & guards == guards:
                     found.append((-after.bit_count(), (chosen + named[value], after)))
         found.sort(key=_count)
@@ -138,23 +157,38 @@ class ForwardBits:
                 return 0, [*places, (own & -own).bit_length() - 1]
         return CEILING, []
 
-    def _ruled_out(self, allowed: Mapping[Places, int], start: int) -> dict[Places, list[int]]:
-        """Return the values that each value of this robot rules out, for a robot whose field begins at `start`.
-
-        `allowed` has the values of this robot that are consistent with the indices of the others' values, the lowest
-        robot's index last.
-        """
-        found: dict[Places, list[int]] = {}
-        for (*above, place), own in allowed.items():
-            ruled_out = found.setdefault(tuple(above), [0] * self._own)
-            for value in range(self._own):
-                if not own >> value & 1:
-                    ruled_out[value] |= 1 << start + place
-        return found
-
-    def _chosen(self, chosen: bytes, ranks: Places) -> Places:
+    def _chosen(self, chosen: bytes, others: Sequence[tuple[int, Sequence[int]]]) -> Places:
         size = self._place_bytes
-        return tuple([int.from_bytes(chosen[rank * size : (rank + 1) * size], "little") for rank in ranks])
+        return tuple(
+            [codes[int.from_bytes(chosen[rank * size : (rank + 1) * size], "little")] for rank, codes in others]
+        )
+
+
+def _ruled_out(table: AllowedValues, start: int) -> dict[Places, list[int]]:
+    """Return the values that each value of this robot rules out, for a robot whose field begins at `start`.
+
+    Values are represented by their codes in `table`, except the values that are ruled out: these are bits of the field.
+    """
+    *_, lowest, own = table.codes
+    firsts = [own.index(code) for code in range(max(own, default=-1) + 1)]
+    fields = [0] * (max(lowest, default=-1) + 1)
+    for place, code in enumerate(lowest):
+        fields[code] |= 1 << start + place
+    codes: dict[Places, list[int]] = {}
+    for (*above, code), allowed in table.masks.items():
+        ruled_out = codes.setdefault(tuple(above), [0] * len(firsts))
+        for value, first in enumerate(firsts):
+            if not allowed >> first & 1:
+                ruled_out[value] |= 1 << code
+    bits: dict[int, int] = {}  # equal integers are one object: tables may be large
+    return {above: [_joined(out, fields, bits) for out in ruled_out] for above, ruled_out in codes.items()}
+
+
+def _joined(codes: int, fields: Sequence[int], known: dict[int, int]) -> int:
+    """Return the union of the `fields` of all `codes` (bits); `known` are the results so far."""
+    if codes not in known:
+        known[codes] = sum([field for code, field in enumerate(fields) if codes >> code & 1])
+    return known[codes]
 
 
 def _lowest_and_guards(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.cost_table import CostTable
 from robochoc.solver.local_problem import LocalProblem
 
 Domain = tuple[Value, ...]
@@ -38,13 +39,21 @@ _SIZES = ("<u1", "<u2", "<u4", "<i8")
 class _NAry(NamedTuple):
     """The costs that an n-ary constraint adds to `columns`, the vector of its lowest robot among those that change.
 
-    `table` has an axis for the value of each robot in `ranks` (all above), then this robot's axis and the vector's
-    axis.
+    `table` has an axis for each robot in `ranks` (all above), then this robot's axis and the vector's axis. `codes`
+    contains, for each axis, the index on it of each of the robot's values; None if the values are the indices.
     """
 
     ranks: tuple[int, ...]
     columns: slice
     table: NDArray[Any]
+    codes: tuple[NDArray[np.intp] | None, ...]
+
+    def costs(self, above: Sequence[NDArray[Any]], own: NDArray[np.intp]) -> NDArray[Any]:
+        """Return the costs of all values of the lowest robot, for each row of values `above` and of `own` values."""
+        *places, lowest = self.codes
+        chosen = [at if codes is None else codes[at] for codes, at in zip(places, (*above, own), strict=True)]
+        found: NDArray[Any] = self.table[tuple(chosen)]
+        return found if lowest is None else found[:, lowest]
 
 
 class ForwardBounds:
@@ -70,12 +79,12 @@ class ForwardBounds:
         ranks = [(order.rank[name], name) for name in problem.neighbours]
         above = {name: domains[rank] for rank, name in ranks if rank < self.rank}
         found = [
-            (rank, table.agents, table.joined())
+            (rank, table)
             for rank, name in ranks
             if rank > self.rank
             for table in problem.tables({**above, name: domains[rank]}, lowest=name)
         ]
-        changed = [*dict.fromkeys([rank for rank, _, _ in found])]
+        changed = [*dict.fromkeys([rank for rank, _ in found])]
         few = self._total <= FEW_COLUMNS
         if few or MANY_COLUMNS * sum([len(domains[rank]) for rank in changed]) >= self._total:
             changed = [*range(self.rank + 1, len(domains))]
@@ -90,14 +99,13 @@ class ForwardBounds:
         self._prices: NDArray[Any] = np.zeros((self._own, self._starts[-1]))
         self._n_ary: list[_NAry] = []
         place = {rank: place for place, rank in enumerate(changed)}
-        for rank, agents, charges in found:
-            self.most += int(charges[np.isfinite(charges)].max(initial=0))
+        for rank, table in found:
+            self.most += int(table.charges[np.isfinite(table.charges)].max(initial=0))
             vector = slice(int(self._starts[place[rank]]), int(self._starts[place[rank] + 1]))
-            table = np.moveaxis(charges, -1, -2)
-            if len(agents) == 1:
-                self._prices[:, vector] += table
+            if len(table.agents) == 1:
+                self._prices[:, vector] += table.joined().T
             else:
-                self._n_ary.append(_NAry(tuple(order.rank[one] for one in agents[:-1]), vector, table))
+                self._n_ary.append(_n_ary(table, tuple([order.rank[one] for one in table.agents[:-1]]), vector))
 
     def count_up_to(self, ceiling: int) -> None:
         """Set the `ceiling`, to which all larger costs are reduced from now on."""
@@ -187,10 +195,9 @@ class ForwardBounds:
         vectors = old[row]
         vectors += self._prices[value]
         np.minimum(vectors, self.ceiling, out=vectors)
-        for ranks, columns, table in self._n_ary:
-            chosen = tuple(rows[row, VALUES + rank] for rank in ranks)
-            priced = vectors[:, columns] + table[(*chosen, value)]
-            vectors[:, columns] = np.minimum(priced, self.ceiling)
+        for one in self._n_ary:
+            costs = one.costs([rows[row, VALUES + rank] for rank in one.ranks], value)
+            vectors[:, one.columns] = np.minimum(vectors[:, one.columns] + costs, self.ceiling)
         return vectors
 
     def _cheapest(self, vectors: Rows) -> Rows:
@@ -212,6 +219,15 @@ class ForwardBounds:
     def _first(self) -> int:
         """The column after the values of the robots above: that of this robot's value, or the first in its vector."""
         return VALUES + self.rank
+
+
+def _n_ary(table: CostTable, ranks: tuple[int, ...], columns: slice) -> _NAry:
+    """Return `table` with its last axis for the lowest robot, not for this robot."""
+    *above, lowest, own = [
+        None if len(codes) == size else np.array(codes, np.intp)
+        for codes, size in zip(table.codes, table.charges.shape, strict=True)
+    ]
+    return _NAry(ranks, columns, np.moveaxis(table.charges, -1, -2), (*above, own, lowest))
 
 
 def _sizes(domains: Sequence[tuple[Domain, int]]) -> NDArray[Any] | int:

@@ -156,7 +156,7 @@ class DisAC(Protocol):
         found: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
         for lowest in self.linked:
             try:
-                tables = self.problem.allowed(self.domains, lowest)
+                tables = [(table.agents, table.joined()) for table in self.problem.allowed(self.domains, lowest)]
             except UnsupportedError:  # too large for a table, so fewer values are removed
                 continue
             for others, masks in tables:

@@ -50,7 +50,8 @@ def own_tables(
     """Return the constraints of `problem` with robots in `linked`, with one table for each set of robots."""
     allowed: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
     for lowest in linked:
-        for others, masks in problem.allowed(domains, lowest):
+        for table in problem.allowed(domains, lowest):
+            others, masks = table.agents, table.joined()
             known = allowed.get(others)
             allowed[others] = {p: mask & known[p] for p, mask in masks.items()} if known else masks
     return tuple([_table(problem, domains, others, masks) for others, masks in allowed.items()])
