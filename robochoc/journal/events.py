@@ -24,12 +24,17 @@ class Began(Event, frozen=True):
 
     Withdrawal is a separate run after the search. All counts restart at 0. Times can be compared only within a run or
     an epoch. `minimises`: the run minimises costs, so there may be `Improved` events.
+
+    `start`: the values from which the search begins, by variable, if they are known (null: the robot withdraws).
+    `upper_bound`: the cost of these values, if the robots know it; they search for lower costs only.
     """
 
     protocol: str
     epoch: int | UnsetType = UNSET
     opened_by: str | UnsetType = UNSET
     minimises: bool | UnsetType = UNSET
+    start: dict[str, int | None] | UnsetType = UNSET
+    upper_bound: float | int | UnsetType = UNSET
 
 
 class Given(Event, frozen=True):

@@ -16,7 +16,7 @@ from msgspec import UNSET, UnsetType
 
 from robochoc.formats import InvalidInputError, robot_in
 from robochoc.formats.names import is_name
-from robochoc.journal.events import Given
+from robochoc.journal.events import Began, Given
 from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Team, Variable
@@ -119,8 +119,16 @@ def _units(units: CostUnits) -> tuple[bool, int, int] | UnsetType:
 
 
 def run_parameters_of(given: Given) -> RunParameters:
-    """Return the parameters of the run."""
+    """Return the parameters of the run, without its start."""
     return RunParameters(given.seed, given.settings, given.aside)
+
+
+def with_start(parameters: RunParameters, began: Began | None) -> RunParameters:
+    """Return `parameters` with the start of the run that `began`."""
+    if began is None or began.start is UNSET:
+        return parameters
+    bound = None if began.upper_bound is UNSET else began.upper_bound
+    return parameters._replace(start=began.start, upper_bound=bound)
 
 
 def cost_in_user_units(given: Given | None, cost: float) -> Cost | float:

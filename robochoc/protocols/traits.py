@@ -24,6 +24,8 @@ class Traits:
         complete: It terminates on every problem, with a solution or a proof that there is none.
         synchronous: One robot acts at a time.
         costs: It minimises costs (a DCOP).
+        upper_bound: It can begin with a known upper bound of the cost, and then searches for lower costs only. If there
+            are none, it concludes that there is no solution (`LocalProblem.upper_bound`).
         n_ary: Constraints may be over more than two robots.
         partially_known: It accepts partially known constraints (PKC).
         asymmetric: The parts of partially known constraints may have costs: each side pays its own part, and the sum is
@@ -59,6 +61,7 @@ class Traits:
     complete: bool = True
     synchronous: bool = False
     costs: bool = False
+    upper_bound: bool = False
     n_ary: bool = True
     partially_known: bool = False
     asymmetric: bool = False

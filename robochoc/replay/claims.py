@@ -12,6 +12,7 @@ from functools import partial
 from itertools import chain
 
 import msgspec
+from msgspec import UNSET
 
 from robochoc.communication.search_result import SearchResult
 from robochoc.journal.entries import STAMPED_LATE
@@ -28,6 +29,7 @@ from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evalu
 from robochoc.run.improvement import Rank
 from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_by_class
+from robochoc.run.starts import start_in
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.system.lazy_dataclass import dataclass
@@ -207,6 +209,8 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseA
     team = robots.compiled.team
     withdrawal = given.aside is not None or _places(run, outcome)
     phase = RunPhase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
+    if run.began is not None and run.began.start is not UNSET:
+        phase = phase.beginning_with(start_in(team, run.began.start, given.aside))
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
         return evaluate_search(phase, Search(result, check), team.kind, partial(user_cost, team), ANY_DEADLINE)

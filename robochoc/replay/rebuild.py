@@ -11,7 +11,7 @@ from robochoc.communication.host import Host
 from robochoc.communication.session import Epoch
 from robochoc.journal.events import AnyEvent, Given, Lost
 from robochoc.journal.journal import Header
-from robochoc.journal.team_events import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
+from robochoc.journal.team_events import GivenProblemError, TeamReader, invalidated_of, run_parameters_of, with_start
 from robochoc.model.change import team_after_events
 from robochoc.model.costs import normalized
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
@@ -192,9 +192,9 @@ class Rebuilder:
             raise CannotReplayError(str(unknown)) from unknown
 
     def _epoch(self, run: RecordedRun, protocol: type[Protocol]) -> Epoch:
-        if (given := self._given(run)) is not None:
-            return self._from_event(given)
-        return self._from_files(run, protocol)
+        given = self._given(run)
+        epoch = self._from_files(run, protocol) if given is None else self._from_event(given)
+        return epoch._replace(parameters=with_start(epoch.parameters, run.began))
 
     def _given(self, run: RecordedRun) -> Given | None:
         """Return the event with the robots' problems; None if the team's files are used instead."""

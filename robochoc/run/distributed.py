@@ -73,6 +73,10 @@ class Deployment(ABC):
     def remove(self, lost: Mapping[str, str]) -> None:
         """Remove lost robots from the team; `lost` maps their names to the reasons."""
 
+    def started(self, phase: RunPhase) -> RunPhase:
+        """Return `phase`, which begins with the start assignment in the options, if there is one."""
+        return phase
+
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
         """Return the central solvers that confirm `answer`. Raises `RefutedError` if a solver refutes it."""
         return ()
@@ -183,10 +187,10 @@ def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: 
         RefutedError: if a check refutes the answer.
     """
     options = deployment.options
-    phase = first_phase(options, protocol, deployment.withdrawal_cost)
+    phase = deployment.started(first_phase(options, protocol, deployment.withdrawal_cost))
     answer = deployment.solve(phase)
     if answer.verdict == Verdict.NO_SOLUTION and options.withdraw is not None and not phase.withdrawal:
-        phase = second_phase(options, deployment.withdrawal_cost)
+        phase = deployment.started(second_phase(options, deployment.withdrawal_cost))
         answer = answer.then(deployment.solve(phase))
         header = replace(header, placed_by=phase.name)
     return deployment.outcome(header, answer)

@@ -19,6 +19,7 @@ from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, least_violating, lower_bound, merged_values, optima, pseudo_tree
 from robochoc.run.listed_optima import combined_optima
 from robochoc.run.phases import RunPhase
+from robochoc.run.starts import robots_values
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
 from robochoc.system.lazy_dataclass import dataclass
@@ -104,6 +105,10 @@ def evaluate_search(
     if is_spoiled(phase, search.result):
         return _evaluate_spoiled(phase, search, kind)
     result = search.result
+    if keeps_start(phase, result):
+        result = replace(result, verdict=Verdict.SOLUTION, witness=None)
+    elif result.verdict == Verdict.NO_SOLUTION and phase.start_cost is not None:
+        raise RefutedError("the protocol claims that there is no solution, but the start assignment is a solution")
     ended = result.verdict == Verdict.SOLUTION
     cut = deadline is not None and result.verdict == Verdict.UNKNOWN and result.witness is None
     tree = pseudo_tree(result.findings)
@@ -130,6 +135,11 @@ def evaluate_search(
         optima=found.optima,
         **found.assignment_parts(),
     )
+
+
+def keeps_start(phase: RunPhase, result: SearchResult) -> bool:
+    """Return whether the protocol claims that no assignment costs less than the start assignment."""
+    return result.verdict == Verdict.NO_SOLUTION and phase.parameters.upper_bound is not None
 
 
 def is_spoiled(phase: RunPhase, result: SearchResult) -> bool:
@@ -191,11 +201,14 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
     Raises:
         RefutedError: if the assignment violates a constraint, or a robot withdrew unnecessarily.
     """
+    start = robots_values(team, phase.parameters.start) if phase.start_cost is not None else None
+    if start is not None and keeps_start(phase, result):
+        result = replace(result, verdict=Verdict.SOLUTION, assignments=start)
     proven = is_proven(phase, result)
     if proven:
         assignment = merged_values(result.assignments)
     else:
-        best = best_known(compiled, result, phase.parameters.withdrawal_cost)
+        best = best_known(compiled, result, phase.parameters.withdrawal_cost, start)
         if best is None:
             return None
         assignment = best.assignment

@@ -27,13 +27,19 @@ class BestKnown(NamedTuple):
     cost: float
 
 
-def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: float | None = None) -> BestKnown | None:
-    """Return the cheapest assignment in a result.
+def best_known(
+    compiled: CompiledTeam,
+    result: SearchResult,
+    withdrawal_cost: float | None = None,
+    start: Mapping[str, Mapping[str, int]] | None = None,
+) -> BestKnown | None:
+    """Return the cheapest assignment in a result, or the start assignment if no other is cheaper.
 
     Args:
         compiled: The team of the search.
         result: The result of the search.
         withdrawal_cost: The withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
+        start: The start assignment, by robot (None: there is none).
 
     Returns:
         The assignment, or None if all violate hard constraints.
@@ -41,6 +47,7 @@ def best_known(compiled: CompiledTeam, result: SearchResult, withdrawal_cost: fl
     best: BestKnown | None = None
     objective = Objective(compiled.team, withdrawal_cost)
     for own in (
+        *([] if start is None else [start]),
         result.assignments,
         *_received_assignments(compiled, result.findings),
         *_best_cycle(compiled, result, objective),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from msgspec import UNSET
+
 from robochoc.journal.events import AnyEvent, Began, Bounded, Decided, Heard
 from robochoc.model.cost_units import Cost
 from robochoc.model.problem import INFINITE
@@ -55,6 +57,8 @@ class KnownCosts:
         self._least = INFINITE
         self._bounds.clear()
         self.best = self.bound = None
+        if self._minimises and began.upper_bound is not UNSET:
+            self._improve(began.upper_bound)
 
     def _improve(self, cost: float) -> None:
         if 0 <= cost < self._least and cost <= EXACT:

@@ -122,6 +122,16 @@ def texts_by_name(name: str, value: object) -> Mapping[str, str]:
     return {text(f"a name in {name}", key): str(one) for key, one in value.items()}
 
 
+def start_values(name: str, value: object) -> Mapping[str, int | None]:
+    """Convert a mapping of the names of variables to integers, or to None for variables of withdrawn robots."""
+    if not isinstance(value, Mapping):
+        raise OptionTypeError(_refusal(name, value, "a mapping of variables to values"))
+    return {
+        text(f"a name in {name}", key): None if one is None else integer(f"{name}[{key!r}]", one)
+        for key, one in value.items()
+    }
+
+
 def priority_order(name: str, value: object) -> object:
     """Accept the name of an order, or the names of robots."""
     if isinstance(value, str):

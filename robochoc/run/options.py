@@ -24,6 +24,7 @@ from robochoc.run.option_values import (
     protocol_name,
     real,
     seconds,
+    start_values,
     text,
     texts_by_name,
 )
@@ -133,6 +134,10 @@ class Options:
         preprocess: The preprocessing before the protocol (None: no preprocessing).
         cluster: The Dask cluster on which arrays are computed: the address of its scheduler, or the path of the
             scheduler's file (None: this process).
+        start: The values from which the search begins, by variable (None: the variable's robot withdraws). Variables
+            without a start value begin as in any run.
+        warm: True if each later epoch begins from the previous epoch's assignment. Dynamic protocols begin with their
+            own knowledge in any case.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
@@ -166,6 +171,8 @@ class Options:
     bounds: bool = False
     preprocess: Preprocess | None = None
     cluster: str | None = None
+    start: Mapping[str, int | None] = field(default_factory=dict)
+    warm: bool = True
 
     def __post_init__(self) -> None:
         for name, given in vars(self).copy().items():
@@ -241,6 +248,8 @@ _CONVERTERS = MappingProxyType(
         "bounds": flag,
         "preprocess": optional(one_of(Preprocess)),
         "cluster": optional(text),
+        "start": start_values,
+        "warm": flag,
     }
 )
 """The converter for each field of `Options`. A field without a converter cannot be set."""

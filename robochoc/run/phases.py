@@ -7,12 +7,14 @@ With other protocols a second phase with another protocol follows when it is kno
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import Options, Withdrawal
 from robochoc.run.registry import protocol_or_stage
+from robochoc.run.starts import Start
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -22,7 +24,8 @@ class RunPhase:
     """A phase of a run.
 
     `name` is the protocol's name, `parameters` are common to all robots. If `withdrawal` is set, robots may withdraw.
-    `takes_over` is true in the second phase, in which another protocol replaces the chosen one.
+    `takes_over` is true in the second phase, in which another protocol replaces the chosen one. `start_cost` is the
+    cost of the start assignment, if it is a solution (`run/starts.py`).
     """
 
     name: str
@@ -30,6 +33,13 @@ class RunPhase:
     parameters: RunParameters
     withdrawal: bool = False
     takes_over: bool = False
+    start_cost: float | None = None
+
+    def beginning_with(self, start: Start) -> RunPhase:
+        """Return this phase, which begins with `start`. Its cost is passed to robots that can use it."""
+        bound = start.cost if self.traits.upper_bound else None
+        parameters = self.parameters._replace(start=start.values, upper_bound=bound)
+        return replace(self, parameters=parameters, start_cost=start.cost)
 
     @property
     def traits(self) -> Traits:

@@ -104,6 +104,7 @@ class ScenarioRun:
         messages: int | None = None,
         spares: int = 0,
         parameters: RunParameters = DEFAULT_PARAMETERS,
+        next_parameters: Callable[[Team], RunParameters] | None = None,
         prepare: Prepare | None = None,
         with_files: bool = False,
     ) -> None:
@@ -117,7 +118,8 @@ class ScenarioRun:
             messages: The limit on messages in all epochs together (None: no limit).
             spares: The number of lost robots that return. Their files are read again, past events are applied to them,
                 and they join at the end of the order.
-            parameters: The parameters common to all robots.
+            parameters: The parameters of the robots.
+            next_parameters: Returns the parameters of a later epoch for its team (None: `parameters`).
             prepare: The preparation before each search (None: no preparation).
             with_files: True if the constraints held by lost robots are lost with them.
         """
@@ -132,6 +134,7 @@ class ScenarioRun:
         self._messages = messages
         self._spares = spares
         self._parameters = parameters
+        self._next_parameters = next_parameters or (lambda _: parameters)
         self._prepare = prepare
         self._with_files = with_files
         self._held_in = order if with_files else None
@@ -155,15 +158,19 @@ class ScenarioRun:
         compiled, self.found = self._prepare()
         return compiled
 
-    def epochs(self, session: Session, on_start: Callable[[EpochStart], None]) -> Iterator[FinishedEpoch]:
+    def epochs(
+        self, session: Session, on_start: Callable[[EpochStart], None], parameters: RunParameters | None = None
+    ) -> Iterator[FinishedEpoch]:
         """Yield the epochs one by one. The verdict of the last epoch counts. A limit may end the run earlier.
 
         Args:
             session: A session opened with the team returned by `prepared`.
             on_start: Called before each epoch.
+            parameters: The parameters of the robots in the first epoch, with which the session was opened (None: those
+                of all epochs).
         """
         opened = "the start"
-        epoch = Epoch(session.compiled, parameters=self._parameters)
+        epoch = Epoch(session.compiled, parameters=self._parameters if parameters is None else parameters)
         for number in count():
             if self.found is None:
                 on_start(EpochStart(epoch, number, opened))
@@ -183,7 +190,7 @@ class ScenarioRun:
             try:
                 epoch = self._change(session, joining)
             except TeamCompileTimeoutError:
-                yield FinishedEpoch(self.team, epoch, opened, NOT_SEARCHED)
+                yield FinishedEpoch(self.team, epoch._replace(parameters=self._parameters), opened, NOT_SEARCHED)
                 return
 
     def _search(self, session: Session) -> SearchResult:
@@ -294,12 +301,13 @@ class ScenarioRun:
         """
         compiled = self._compile(session.usable_team(self.ordered_team())) if self._prepare is None else self.prepared()
         self._joining.update(joining)
+        parameters = self._next_parameters(self.team)
         if self.found is not None:
-            return Epoch(compiled, parameters=self._parameters)
+            return Epoch(compiled, parameters=parameters)
         fresh = frozenset(name for name in self._joining if name in compiled.team)
         self._joining.clear()
         keys, agents = invalidated_by(session.compiled.team, compiled.team)
-        epoch = Epoch(compiled, Invalidated(keys, agents | fresh), fresh, self._parameters)
+        epoch = Epoch(compiled, Invalidated(keys, agents | fresh), fresh, parameters)
         session.change(epoch)
         return epoch
 

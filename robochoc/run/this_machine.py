@@ -26,6 +26,7 @@ from robochoc.run.phases import RunPhase
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
+from robochoc.run.starts import Start, start_in
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam
@@ -53,6 +54,10 @@ class StartEvents:
         detail: dict[str, Any] = {"epoch": number, "opened_by": opened_by} if number else {}
         if protocol.traits.costs:
             detail["minimises"] = True
+        if epoch.parameters.start:
+            detail["start"] = dict(epoch.parameters.start)
+        if epoch.parameters.upper_bound is not None:
+            detail["upper_bound"] = epoch.parameters.upper_bound
         self._observer(Began(t=0, protocol=protocol.__name__, **detail))
         fresh = epoch.team.order if session and session.starts_fresh else epoch.restarted
         lossless = session is None or session.lossless
@@ -89,11 +94,14 @@ class ThisMachine(Deployment):
             messages=options.messages,
             spares=options.spares,
             parameters=RunParameters(options.seed, options.settings, message_loss=options.dropped),
+            next_parameters=self._next_parameters,
             prepare=None if options.preprocess is None else self._preprocessed,
             with_files=options.runtime == Runtime.NETWORK,
         )
         self._searched = CompiledTeam(team, only=())
         """The compiled team of the last `search`. Before the first search, none of its robots is compiled."""
+        self._phase: RunPhase | None = None
+        """The phase of the current epoch, with its start."""
         self._preprocessings: list[Preprocessing] = []
         self._cut_short = ""
         """The reason why the last preprocessing did not finish."""
@@ -125,6 +133,13 @@ class ThisMachine(Deployment):
     def withdrawal_cost(self) -> float:
         """See `Deployment.withdrawal_cost`."""
         return withdrawal_cost(self._team)
+
+    def started(self, phase: RunPhase) -> RunPhase:
+        """See `Deployment.started`."""
+        if not self.options.start:
+            return phase
+        cost = phase.parameters.withdrawal_cost
+        return phase.beginning_with(start_in(self._scenario.team, self.options.start, cost))
 
     def left_s(self) -> float | None:
         """See `Deployment.left_s`."""
@@ -177,6 +192,7 @@ class ThisMachine(Deployment):
     def _solve_epochs(self, phase: RunPhase) -> PhaseAnswer:
         """Return the answer of the last epoch, with the metrics of all epochs."""
         scenario = self._scenario
+        self._phase = phase
         answer, lost = PhaseAnswer(Verdict.UNKNOWN), dict[str, str]()
         try:
             compiled = scenario.compiled()
@@ -188,7 +204,8 @@ class ThisMachine(Deployment):
             if scenario.found is not None and not self._dynamic:
                 return self._settled(phase, scenario.found)
         with self._session(phase, compiled) as session:
-            for epoch in scenario.epochs(session, partial(self._start_epoch, phase, session)):
+            start_epoch = partial(self._start_epoch, phase, session)
+            for epoch in scenario.epochs(session, start_epoch, phase.parameters):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
                 self.epochs.append(answer.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
                 if self._dynamic or lost:
@@ -227,7 +244,17 @@ class ThisMachine(Deployment):
     def _start_epoch(self, phase: RunPhase, session: Session, start: EpochStart) -> None:
         """Report the start of an epoch, and watch its search."""
         self._start_events.report(phase.protocol, start, session)
-        self._watch(phase, start, session)
+        self._watch(self._phase or phase, start, session)
+
+    def _next_parameters(self, team: Team) -> RunParameters:
+        """Return the parameters of the next epoch, whose team is `team`. It begins from the previous assignment.
+
+        Dynamic protocols begin with their own knowledge instead.
+        """
+        assert self._phase is not None  # noqa: S101 - for mypy: set before the first epoch
+        warm = self.options.warm and not self._phase.traits.dynamic
+        self._phase = self._phase.beginning_with(start_in(team, self.epochs[-1].assignment if warm else {}))
+        return self._phase.parameters
 
     def _restart(self) -> None:
         """Restart the clock if there is a deadline, since each epoch has its own deadline."""
@@ -294,6 +321,11 @@ class ThisMachine(Deployment):
 
     def _answer_of(self, phase: RunPhase, epoch: FinishedEpoch) -> PhaseAnswer:
         """Return the answer of an epoch, checked against the files."""
+        current = self._phase
+        if current is not None and epoch.epoch.parameters is current.parameters:
+            phase = current
+        else:  # the team could not be compiled in time
+            phase = phase.beginning_with(Start({}))
         search = _checkable(phase, epoch.result, epoch.team, epoch.epoch.compiled)
         answer = self.evaluated(phase, search)
         self._improvements = None

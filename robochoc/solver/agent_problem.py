@@ -26,9 +26,15 @@ Links = Mapping[str, tuple[str, ...]]
 _NO_SETTINGS: Mapping[str, str] = {}
 """A plain dictionary, because it is sent to other processes; never modified."""
 
+StartValues = Mapping[str, int | None]
+"""The values from which a search begins, by variable; None: the variable's robot withdraws."""
+
+NO_START: StartValues = {}
+"""A plain dictionary, like `_NO_SETTINGS`."""
+
 
 class RunParameters(NamedTuple):
-    """The parameters of a run, the same for all robots.
+    """The parameters of a run, the same for all robots except for `start`.
 
     Attributes:
         seed: The seed of the robots' random numbers.
@@ -36,12 +42,17 @@ class RunParameters(NamedTuple):
         withdrawal_cost: The cost of withdrawing a robot of weight 1, whose constraints, private ones included, then no
             longer apply. None: robots must not withdraw.
         message_loss: The probability that a robot drops a received message, as if it had been lost.
+        start: The start values that are known. A robot receives only the values of its own interface variables.
+        upper_bound: The cost of the assignment `start`, in normalised costs (`model/costs.py`) and including withdrawal
+            costs: only lower costs are of interest (None: unknown, or the protocol cannot use it).
     """
 
     seed: int = 0
     settings: Mapping[str, str] = _NO_SETTINGS
     withdrawal_cost: int | float | None = None
     message_loss: float = 0.0
+    start: StartValues = NO_START
+    upper_bound: int | float | None = None
 
 
 DEFAULT_PARAMETERS = RunParameters()
@@ -160,7 +171,15 @@ class AgentProblems:
         """Return the problem of the agent with the robot `own`."""
         name = own.robot.name
         copies, pkc_holders = tuple(self._copies[name]), tuple(self._pkc_holders[name])
-        return AgentProblem(own, self._everyone, copies, pkc_holders, self._parameters)
+        parameters = self._parameters
+        if parameters.start:
+            parameters = parameters._replace(start=only_values_of(own.robot, parameters.start))
+        return AgentProblem(own, self._everyone, copies, pkc_holders, parameters)
+
+
+def only_values_of(robot: Robot, start: StartValues) -> StartValues:
+    """Return the start values of the robot's interface variables."""
+    return {name: start[name] for name in robot.interface if name in start}
 
 
 def agent_problems(

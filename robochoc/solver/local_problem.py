@@ -179,6 +179,25 @@ class LocalProblem:
         self._filtering = by_robot([*copies, *below, *parts_above])
         self._made_filters: Filters | None = None
 
+    @property
+    def start(self) -> int | None:
+        """The index of the value from which the search begins; None: no start value is known, or it is not possible.
+
+        If the values of some variables are known, it is the cheapest of the values that contain them.
+        """
+        given, names = self._part.parameters.start, self._part.robot.interface
+        known = [(place, given[name]) for place, name in enumerate(names) if name in given]
+        if len(known) == len(names):
+            return self._place_of.get(tuple([part for _, part in known])) if known else None
+        fitting = [i for i, own in enumerate(self.values) if known and all(own[place] == part for place, part in known)]
+        return min(fitting, key=self.charges.__getitem__, default=None)
+
+    @property
+    def upper_bound(self) -> Cost:
+        """The cost that a solution must stay below; infinite if no bound is known. See `RunParameters`."""
+        bound = self._part.parameters.upper_bound
+        return INFINITE if bound is None else bound
+
     def allow_undeclared(self) -> None:
         """Evaluate constraints for undeclared values of others from now on, because domains may have changed."""
         for constraint in self._constraints:

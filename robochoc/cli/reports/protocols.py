@@ -114,6 +114,7 @@ def _in_a_line(traits: Traits) -> str:
     words = [
         "minimises costs" if traits.costs else "satisfaction",
         "complete" if traits.complete else "incomplete",
+        *(["can begin with a known upper bound of the cost"] if traits.upper_bound else []),
         "one robot acts at a time" if traits.synchronous else "robots act at the same time",
         "constraints between any number of robots" if traits.n_ary else "constraints between two robots",
         *(["also partially known constraints"] if traits.partially_known else []),

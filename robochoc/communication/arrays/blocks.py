@@ -186,6 +186,7 @@ def _part(
         value_bytes=lengths[values] if isinstance(lengths, np.ndarray) else lengths,
         domain_bytes=domains[robots] if isinstance(domains, np.ndarray) else domains,
         table_checks=None if checks is None else checks[robots],
+        starts=None if given.starts is None else given.starts[robots],
     )
 
 

@@ -180,11 +180,16 @@ class CycleRun(ABC):
 
     # Values
 
-    def choose_random_values(self) -> None:
-        """Choose a random value from the domain of each robot with neighbours."""
+    def choose_first_values(self) -> None:
+        """Choose the start value, or a random value, for each robot with neighbours."""
+        starts = self.layout.description.starts
         for group in self.layout.groups:
             rows = np.arange(group.first, group.first + group.active)
-            chosen = self.draws.choose(rows, np.full(group.active, group.size))
+            if starts is not None:
+                known = starts[self.layout.robots[rows]]
+                self.values[rows] = known.astype(self.layout.kind)
+                rows = rows[known < 0]
+            chosen = self.draws.choose(rows, np.full(len(rows), group.size))
             self.values[rows] = chosen.astype(self.layout.kind)
 
     def value_costs(self) -> list[Integers]:

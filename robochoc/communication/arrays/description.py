@@ -51,6 +51,7 @@ class Description:
             equal.
         domain_bytes: The size of the message with all values, by robot. A single number if all are equal.
         table_checks: The constraint checks for building each robot's tables. None: one check per entry.
+        starts: The index of each robot's start value; -1: unknown. None: no start values are known.
     """
 
     names: Sequence[str]
@@ -62,6 +63,7 @@ class Description:
     value_bytes: Integers | int
     domain_bytes: Integers | int
     table_checks: Integers | None = None
+    starts: Integers | None = None
 
 
 def describe_team(parts: Mapping[str, AgentProblem]) -> Description:
@@ -76,6 +78,7 @@ def describe_team(parts: Mapping[str, AgentProblem]) -> Description:
     draft = _Draft()
     for place, problem in enumerate(problems):
         draft.add(place, problem, rank, domains)
+    starts = [problem.start for problem in problems]
     return Description(
         names=list(parts),
         sizes=np.array([len(problem.values) for problem in problems], np.int64),
@@ -86,7 +89,12 @@ def describe_team(parts: Mapping[str, AgentProblem]) -> Description:
         value_bytes=np.array([_value_bytes(value) for problem in problems for value in problem.values], np.int64),
         domain_bytes=np.array([len(encode(Domain(list(problem.values)))) for problem in problems], np.int64),
         table_checks=np.array([problem.checks for problem in problems], np.int64),
+        starts=None if not any(part.parameters.start for part in parts.values()) else _indices(starts),
     )
+
+
+def _indices(starts: Sequence[int | None]) -> Integers:
+    return np.array([-1 if start is None else start for start in starts], np.int64)
 
 
 def _value_bytes(value: Value) -> int:

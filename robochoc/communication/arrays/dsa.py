@@ -19,7 +19,7 @@ class ArrayDSA(CycleRun):
     in_blocks = True
 
     def _start_active(self) -> None:
-        self.choose_random_values()
+        self.choose_first_values()
         self.send_values()
 
     def _step(self) -> None:

@@ -62,7 +62,7 @@ class ArrayMGM(ArrayGainers):
     in_blocks = True
 
     def _start_active(self) -> None:
-        self.choose_random_values()
+        self.choose_first_values()
         self.send_values()
 
     def _step(self) -> None:

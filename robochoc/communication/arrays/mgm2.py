@@ -146,7 +146,7 @@ class ArrayMGM2(ArrayGainers):
     """A run of MGM-2."""
 
     def _start_active(self) -> None:
-        self.choose_random_values()
+        self.choose_first_values()
         lengths = self.layout.description.domain_bytes
         if isinstance(lengths, np.ndarray):
             lengths = lengths[self.layout.robots]

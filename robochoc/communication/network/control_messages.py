@@ -190,6 +190,8 @@ class SearchTask(EpochMessage, frozen=True, tag="Task"):
     aside: Cost | None
     cards: tuple[bytes, ...]
     message_loss: float = 0.0
+    start: Mapping[str, int | None] = {}
+    upper_bound: Cost | None = None
 
 
 class StartSearch(EpochMessage, frozen=True):

@@ -23,7 +23,7 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.agent_problem import RunParameters, only_values_of
 from robochoc.system.errors import RobochocError
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -318,6 +318,8 @@ class NetworkMembers:
                 parameters.withdrawal_cost,
                 cards,
                 parameters.message_loss,
+                only_values_of(shown[name], parameters.start),
+                parameters.upper_bound,
             )
             for name in order
         }

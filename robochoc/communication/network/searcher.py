@@ -222,7 +222,9 @@ class Searcher(RobotLoop):
             raise UnsupportedError(f"{self._robot.name} received invalid data: {bad}") from None
         self._learnt = {sender: [one.constraint for one in theirs] for sender, theirs in known.items()}
         copies = _sorted([one for theirs in known.values() for one in theirs], task.order)
-        parameters = RunParameters(task.seed, task.settings, task.aside, task.message_loss)
+        parameters = RunParameters(
+            task.seed, task.settings, task.aside, task.message_loss, task.start, task.upper_bound
+        )
         everyone = TeamKnowledge(tuple(task.order), task.interfaces, domains, task.links)
         return AgentProblem(self._own, everyone, copies, task.secretive, parameters)
 

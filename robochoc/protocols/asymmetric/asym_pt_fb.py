@@ -116,6 +116,7 @@ class AsymPTFB(PTFB):
         concludes=ENDS_WITH_PROOF,
         paper="Litov & Meisels 2017",
         costs=True,
+        upper_bound=True,
         partially_known=True,
         asymmetric=True,
         shared_scopes=True,

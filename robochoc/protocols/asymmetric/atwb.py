@@ -134,6 +134,7 @@ class ATWB(AFB):
         concludes=ENDS_WITH_PROOF,
         paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",
         costs=True,
+        upper_bound=True,
         partially_known=True,
         asymmetric=True,
         shared_scopes=True,

@@ -177,6 +177,7 @@ class SyncABB(SyncBB):
         paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",
         synchronous=True,
         costs=True,
+        upper_bound=True,
         partially_known=True,
         asymmetric=True,
         privacy="parts of PKC but in sums, constraints of lower robots",

@@ -183,14 +183,18 @@ class DGibbs(TreeProtocol):
         """The change in the cost of each child's subtree in this cycle."""
 
     def start_in_tree(self) -> None:
-        """Choose a random value, and send it to the neighbours above; without neighbours, choose the cheapest value."""
+        """Choose the start value or a random value, and send it to the neighbours above.
+
+        A robot without neighbours chooses the cheapest value.
+        """
         size = len(self.problem.values)
         if not self.problem.neighbours:
             costs = self.problem.lexicographic_costs({})
             self.cycle = self.settings.cycles
             self._choose(costs.index(min(costs)))
             return
-        self._choose(int(self.chance() * size))
+        start = self.problem.start
+        self._choose(int(self.chance() * size) if start is None else start)
         self.best = self._present
         self._send_value(self.ancestors)
 

@@ -75,6 +75,7 @@ class ADOPT(BoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Modi, Shen, Tambe, Yokoo 2005",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",

@@ -110,6 +110,7 @@ class ADOPTk(BnBADOPT):
         concludes=ENDS_WITH_PROOF,
         paper="Gutierrez, Meseguer, Yeoh 2011",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",

@@ -231,6 +231,7 @@ class AFB(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Gershman, Meisels & Zivan 2009",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         privacy="constraints that a robot has no part in",
         use_when="costs, dense graph, little memory",
@@ -242,7 +243,7 @@ class AFB(Protocol):
         self.below = order.names[self.rank + 1 :]
         self.assignments: list[Assignment] = []
         self.counter = 0
-        self.bound: Cost = math.inf
+        self.bound: Cost = problem.upper_bound
         self.solution: NewSolution | None = None
         self.over = False
         self.costs = self._cost_lookup()
@@ -420,7 +421,7 @@ class AFB(Protocol):
         self._asked = {robot: asked for robot, asked in self._asked.items() if len(asked) < length}
         if length:
             self.send(self.order.names[length - 1], CPA(self.assignments[:length], self.bound, []))
-        elif self.bound == math.inf:
+        elif self.bound == self.problem.upper_bound:
             self.conclude(Verdict.NO_SOLUTION)
         else:
             self._stop()

@@ -81,6 +81,7 @@ class BnBADOPT(DepthFirstProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",

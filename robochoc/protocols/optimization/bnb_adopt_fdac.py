@@ -263,6 +263,7 @@ class BnBADOPTFDAC(DepthFirstProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Gutierrez & Meseguer 2010, 2012",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",

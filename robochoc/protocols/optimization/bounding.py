@@ -76,11 +76,11 @@ class BoundingProtocol(TreeProtocol):
         """Choose a value and send the changes; the bounds are up to date."""
 
     def decide(self) -> None:
-        """Compute the bounds and act; a root whose lower bound is infinite ends the search of all trees."""
+        """Compute the bounds and act; a root whose lower bound reaches the upper bound ends the search of all trees."""
         if self.terminated:
             return
         self._weigh()
-        if self.parent is None and self.lb == INFINITE:
+        if self.parent is None and self.lb >= self.problem.upper_bound:
             self.conclude(Verdict.NO_SOLUTION)
         else:
             self.act()

@@ -225,7 +225,8 @@ class BranchingProtocol(TreeProtocol):
 
     def search(self, limit: Number, local: Sequence[Number]) -> None:
         """Search the subtree for a cost below `limit`; `local` is the cost of each value with the values above."""
-        self.limit, self.local = limit, local
+        self.limit = limit if self.parent is not None else min(limit, self.problem.upper_bound)
+        self.local = local
         self.best, self.solution = INFINITE, {}
         self.searching = True
         self.branches = {child: Branch(self.floor(child)) for child in self.children}

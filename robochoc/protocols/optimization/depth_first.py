@@ -35,6 +35,12 @@ class DepthFirstProtocol(BoundingProtocol):
         self.sent_cost: Cost | None = None
         self._moved = False
 
+    def start_in_tree(self) -> None:
+        """Initialise the bounds; the threshold of a root is the known upper bound of the cost."""
+        super().start_in_tree()
+        if self.parent is None:
+            self.threshold = self.problem.upper_bound
+
     def handle(self, sender: str, message: Message) -> None:
         """Process a message of the search; the message types are those in the subclass's `messages`."""
         if self.terminated:

@@ -280,6 +280,7 @@ class HSCAI(BranchingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Chen, Zhang, Deng, Chen & Li 2020",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,

@@ -102,6 +102,7 @@ class NCBB(ForwardBoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Chechetka & Sycara 2006",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
@@ -181,7 +182,8 @@ class NCBB(ForwardBoundingProtocol):
         if self.parent is not None:
             self.send(self.parent, Result(cost, values))
             return
-        self.greedy_cost, self.greedy_values = cost, values
+        if cost < self.problem.upper_bound:
+            self.greedy_cost, self.greedy_values = cost, values
         self.search(cost, self.problem.charges)
 
     # The search

@@ -102,6 +102,7 @@ class PTFB(ForwardBoundingProtocol):
         concludes=ENDS_WITH_PROOF,
         paper="Litov & Meisels 2017",
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",

@@ -404,6 +404,7 @@ class SFB(Protocol):
         paper="Hirayama & Yokoo 1997; Gershman, Meisels, Zivan 2009",
         synchronous=True,
         costs=True,
+        upper_bound=True,
         shared_scopes=True,
         tables=True,
         use_when="what auto mostly takes, with or without costs: few messages",
@@ -514,6 +515,7 @@ class SFB(Protocol):
             self.send(self.previous, Below([kind[0] for kind in kinds], [kind[1] for kind in kinds], runs, most))
         else:
             self._count_up_to(most + 1)
+            self.upper_bound = int(min(self.upper_bound, self.problem.upper_bound))
             charges = [own[1], *expanded(below.charges, below.runs)]
             self.batches.append(Batch(self.bounds.nothing(charges), self.bounds))
 

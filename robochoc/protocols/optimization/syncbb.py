@@ -146,6 +146,7 @@ class SyncBB(Protocol):
         paper="Hirayama & Yokoo 1997",
         synchronous=True,
         costs=True,
+        upper_bound=True,
         privacy="constraints of lower robots",
         use_when="a simple baseline with costs",
     )
@@ -155,7 +156,7 @@ class SyncBB(Protocol):
         self.rank = order.rank[problem.agent]
         self.path: list[tuple[Value, Cost]] = []
         self.paid: Cost = 0
-        self.best = BestPath(math.inf)
+        self.best = BestPath(problem.upper_bound)
         self.over = False
         self._view: dict[str, Value] = {}
 
@@ -250,4 +251,4 @@ class SyncBB(Protocol):
     @property
     def _known(self) -> bool:
         """True if a best path is known."""
-        return self.best.bound < math.inf
+        return bool(self.best.values)

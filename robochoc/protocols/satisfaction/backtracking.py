@@ -30,7 +30,13 @@ class Backtracking(Protocol):
         self.higher = set(problem.parents)
 
     def _choose_value(self, view: Mapping[str, Value]) -> int | None:
-        """Return the first value of the domain that no nogood rules out in `view`; None if there is none."""
+        """Return the first value of the domain that no nogood rules out in `view`; None if there is none.
+
+        The start value, if it is known, is tried before all others.
+        """
+        start = self.problem.start
+        if start is not None and self._consistent(start, view):
+            return start
         index = self.store.first_open()
         while index is not None and not self._consistent(index, view):
             index = self.store.first_open(index + 1)

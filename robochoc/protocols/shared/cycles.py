@@ -279,8 +279,9 @@ class CycleProtocol(Protocol):
         self._checked[name].add(value)
 
     def any_value(self) -> int:
-        """Return a random value from the whole domain, as the first value of the search."""
-        return self.any_of(range(len(self.problem.values)))
+        """Return the first value of the search: the start value if it is known, else a random value."""
+        start = self.problem.start
+        return self.any_of(range(len(self.problem.values))) if start is None else start
 
     def any_of(self, choices: Sequence[T]) -> T:
         """Return a random element of `choices`; if there is only one, draw no random number."""

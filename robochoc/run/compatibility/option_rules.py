@@ -95,6 +95,7 @@ OPTION_RULES = (
         "--patience is only for robots that run as processes",
         "remove it",
     ),
+    _for_robots("--start", lambda o: o.start),
     _for_robots("--messages", lambda o: o.messages),
     _for_robots("--ncccs", lambda o: o.ncccs is not None),
     _for_robots("--cycles", lambda o: o.cycles is not None),
