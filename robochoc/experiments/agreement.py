@@ -85,6 +85,7 @@ def repeat_commands(task: Task) -> str:
     words += ["--delay", str(setup.delay)] if setup.delay else []
     words += [f"--withdraw={setup.withdraw}"] if setup.withdraw else []
     words += ["--preprocess", setup.preprocess] if setup.preprocess else []
+    words += ["--answer", setup.answer] if setup.answer != "best" else []
     words += ["--verify"] * setup.verify
     words += ["--owner", str(problem.parameters["owner"])] if problem.path and "owner" in problem.parameters else []
     words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]

@@ -16,24 +16,25 @@ from robochoc.model.orders import Order
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.defaults import AUTO, CENTRAL
-from robochoc.run.options import Preprocess, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import AnswerRule, Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
 from robochoc.solver.errors import UnsupportedError
 
 RUN_KEYS = (
     "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw",
-    "preprocess", "verify", "timeout", "messages", "ncccs", "cycles",
+    "preprocess", "answer", "verify", "timeout", "messages", "ncccs", "cycles",
 )  # fmt: skip
 _CHOICES: Mapping[str, Sequence[str]] = {
     "runtime": tuple(map(str, Runtime)),
     "schedule": tuple(map(str, ScheduleName)),
     "withdraw": tuple(map(str, Withdrawal)),
     "preprocess": tuple(map(str, Preprocess)),
+    "answer": tuple(map(str, AnswerRule)),
     "order": tuple(dict.fromkeys((GIVEN, *map(str, Order)))),
 }
 MOST_SETUPS = 2000
 """The maximum number of ways to run in a table."""
-_LABELLED = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "verify")
+_LABELLED = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "answer", "verify")
 """The options that a label may contain, in addition to the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
 _WITHIN = ("label", "settings", "seed", *_OWN_LIMITS)

@@ -68,6 +68,7 @@ class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
     delay: int = 0
     withdraw: str | None = None
     preprocess: str | None = None
+    answer: str = "best"
     verify: bool = False
 
 

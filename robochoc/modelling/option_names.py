@@ -33,6 +33,7 @@ _WORDS = {
     "withdraw": "minimum|maximal",
     "on-loss": "fail|withdraw",
     "preprocess": "ac",
+    "answer": "best|final",
     "order": "dom-deg|max-degree|dfs|given",
     "with": "ace|ortools",
     "protocol": r"[a-z][a-z0-9-]*",

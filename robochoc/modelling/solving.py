@@ -17,7 +17,7 @@ from robochoc.modelling.option_names import errors_in_python, in_python
 from robochoc.modelling.solution import Solution
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.defaults import AUTO
-from robochoc.run.options import CentralSolverName, Options, Runtime, ScheduleName
+from robochoc.run.options import AnswerRule, CentralSolverName, Options, Runtime, ScheduleName
 from robochoc.run.orchestrator import PreparedRun, prepare
 from robochoc.run.scenario import Environment
 from robochoc.solver.compile import CompileLimits
@@ -86,6 +86,7 @@ class Solvable(ABC):
         filters: Sequence[str] = (),
         bounds: bool = False,
         preprocess: str | None = None,
+        answer: str = AnswerRule.BEST,
         cluster: str | None = None,
         journal: Path | str | None = None,
         html: Path | str | None = None,
@@ -138,6 +139,8 @@ class Solvable(ABC):
             bounds: True if events report the proven lower bound of the cost (with processes and in the simulator).
             preprocess: The preprocessing before the protocol: `ac` makes domains arc consistent. None: no
                 preprocessing.
+            answer: The answer of a search that proves nothing: `best`, the cheapest assignment found, or `final`, the
+                robots' last values.
             cluster: With arrays: the address of a Dask scheduler, or the path of its file. Its workers compute the run.
                 None: this process does.
             journal: The file to which the journal of the run is written: all messages and decisions.

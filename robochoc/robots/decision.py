@@ -85,6 +85,7 @@ class _Feedback:
         self._events: list[AnyEvent] = []
         self._messages = 0
         self._own: dict[str, Mapping[str, int]] = {}
+        self._last_t: float | None = None
         self._best: float = INFINITE
         self._assignment: dict[str, int] = {}
         self._objective: Objective | None = None
@@ -136,16 +137,25 @@ class _Feedback:
                 case Given() if self._objective is not None:
                     self._objective.interfaces = interfaces_given(self._reader, event)
                 case Decided():
-                    self._own[event.robot] = event.assignment
-                    if self._objective is not None:
-                        self._objective.change({event.robot: event.assignment})
-                        self._update_best(self._objective.cost, self._own)
+                    self._decided(event)
                 case Heard() if self._objective is not None:
                     shown = self._objective.shown(event.values)
                     if shown is not None:
                         self._update_best(float(event.cost), shown)
                 case _:
                     pass
+
+    def _decided(self, event: Decided) -> None:
+        """Apply a robot's decision. If decisions with equal times are simultaneous, states between them do not count."""
+        objective = self._objective
+        if objective is not None and objective.in_step and self._last_t not in {None, event.t}:
+            self._update_best(objective.cost, self._own)
+        self._last_t = event.t
+        self._own[event.robot] = event.assignment
+        if objective is not None:
+            objective.change({event.robot: event.assignment})
+            if not objective.in_step:
+                self._update_best(objective.cost, self._own)
 
     def _update_best(self, cost: float, own: Mapping[str, Mapping[str, int]]) -> None:
         """Store `own` if it is cheaper than the best assignment so far."""

@@ -17,6 +17,7 @@ from robochoc.model.outcome import Answer, EpochOutcome, Metrics, Optima, Outcom
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.incumbent import best_known, least_violating, lower_bound, merged_values, optima, pseudo_tree
+from robochoc.run.known_costs import DecidedValues
 from robochoc.run.listed_optima import combined_optima
 from robochoc.run.phases import RunPhase
 from robochoc.run.starts import robots_values
@@ -185,7 +186,15 @@ def is_proven(phase: RunPhase, result: SearchResult) -> bool:
 
 
 @collection_paused()
-def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Answer | None:
+def check_with_files(
+    phase: RunPhase,
+    result: SearchResult,
+    team: Team,
+    compiled: CompiledTeam,
+    decided: DecidedValues | None = None,
+    *,
+    final: bool = False,
+) -> Answer | None:
     """Return the assignment found by a search, checked against every constraint in every file.
 
     Args:
@@ -193,6 +202,8 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
         result: the result of the search.
         team: the team in the form of its files.
         compiled: the same team in the form used by the robots: in the order of the run, with compiled domains.
+        decided: the robots' decisions that observers have seen. None: there are no observers.
+        final: true if, without a proof, the robots' last values are the answer.
 
     Returns:
         The assignment claimed by the protocol, or the best known one; None if all known assignments violate hard
@@ -208,7 +219,8 @@ def check_with_files(phase: RunPhase, result: SearchResult, team: Team, compiled
     if proven:
         assignment = merged_values(result.assignments)
     else:
-        best = best_known(compiled, result, phase.parameters.withdrawal_cost, start)
+        seen = decided.cheapest() if decided is not None and not final else None
+        best = best_known(compiled, result, phase.parameters.withdrawal_cost, start, seen, final=final)
         if best is None:
             return None
         assignment = best.assignment

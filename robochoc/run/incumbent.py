@@ -1,8 +1,9 @@
 """The best known assignment after a minimising search that has terminated or was stopped by a limit.
 
 Robots report findings (`protocols/findings.py`): the best assignment of the whole team that any robot has received,
-the values of each robot in every cycle, or only the current values. The cost of each of these assignments is computed
-from the files, and the cheapest assignment is the answer.
+the values of each robot in every cycle, or only the current values. If the run was observed, all assignments that the
+observers have seen count too (`known_costs.py`). The cost of each of these assignments is computed from the files, and
+the cheapest assignment is the answer.
 """
 
 from __future__ import annotations
@@ -32,6 +33,9 @@ def best_known(
     result: SearchResult,
     withdrawal_cost: float | None = None,
     start: Mapping[str, Mapping[str, int]] | None = None,
+    seen: Mapping[str, Mapping[str, int]] | None = None,
+    *,
+    final: bool = False,
 ) -> BestKnown | None:
     """Return the cheapest assignment in a result, or the start assignment if no other is cheaper.
 
@@ -40,18 +44,16 @@ def best_known(
         result: The result of the search.
         withdrawal_cost: The withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
         start: The start assignment, by robot (None: there is none).
+        seen: The cheapest assignment that observers have seen, by robot (None: there is none).
+        final: True if only the robots' last values count.
 
     Returns:
         The assignment, or None if all violate hard constraints.
     """
     best: BestKnown | None = None
     objective = Objective(compiled.team, withdrawal_cost)
-    for own in (
-        *([] if start is None else [start]),
-        result.assignments,
-        *_received_assignments(compiled, result.findings),
-        *_best_cycle(compiled, result, objective),
-    ):
+    known = (start, result.assignments, *_earlier_assignments(compiled, result, objective), seen)
+    for own in [result.assignments] if final else [one for one in known if one is not None]:
         objective.reset()
         objective.change(own)
         if objective.cost < (best.cost if best else INFINITE):
@@ -116,6 +118,12 @@ def merged_values(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
 
 
 _Own = dict[str, dict[str, int]]
+
+
+def _earlier_assignments(compiled: CompiledTeam, result: SearchResult, objective: Objective) -> Iterator[_Own]:
+    """Yield the cheapest assignments in the robots' findings."""
+    yield from _received_assignments(compiled, result.findings)
+    yield from _best_cycle(compiled, result, objective)
 
 
 def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Iterator[_Own]:

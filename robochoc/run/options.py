@@ -82,6 +82,16 @@ class OnLoss(StrEnum):
     WITHDRAW = "withdraw"
 
 
+class AnswerRule(StrEnum):
+    """The answer of a search without a proof.
+
+    `BEST`: the cheapest assignment that is known. `FINAL`: the robots' last values, as in the papers.
+    """
+
+    BEST = "best"
+    FINAL = "final"
+
+
 class CentralSolverName(StrEnum):
     """The solver of the merged problem: ACE, or CP-SAT of OR-Tools."""
 
@@ -108,6 +118,7 @@ class Options:
         deadline: A limit like `timeout`, but the best assignment known at the deadline is the answer (None: no
             deadline).
         improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
+        answer: The answer of a search that proves nothing: the best known assignment, or the last one.
         withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
         schedule: The order of events in the simulator.
         delay: The longest delay of a message in the simulator, in constraint checks.
@@ -147,6 +158,7 @@ class Options:
     timeout: float | None = None
     deadline: float | None = None
     improve: float | None = None
+    answer: AnswerRule = AnswerRule.BEST
     withdraw: Withdrawal | None = None
     schedule: ScheduleName = ScheduleName.CONCURRENT
     delay: int = 0
@@ -224,6 +236,7 @@ _CONVERTERS = MappingProxyType(
         "timeout": optional(seconds),
         "deadline": optional(seconds),
         "improve": optional(seconds),
+        "answer": one_of(AnswerRule),
         "withdraw": _withdrawal,
         "schedule": one_of(ScheduleName),
         "delay": count,

@@ -9,7 +9,7 @@ from typing import Any
 
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.journal.events import Began, Observer
+from robochoc.journal.events import Began, Observer, combined
 from robochoc.journal.team_events import TeamWriter
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, user_cost
@@ -21,9 +21,11 @@ from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, violations_in_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
-from robochoc.run.options import Runtime
+from robochoc.run.known_costs import DecidedValues
+from robochoc.run.options import AnswerRule, Runtime
 from robochoc.run.phases import RunPhase
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
+from robochoc.run.recording import objective_to_record
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.starts import Start, start_in
@@ -84,7 +86,10 @@ class ThisMachine(Deployment):
         self._improvements: Improvements | None = None
         self._dynamic = team.dynamic or environment is not None
         self._compiler = context.team_compiler()
-        self._start_events = StartEvents(context.observer)
+        self._decided = None if environment is not None else _decided_values(team, context)
+        """The robots' decisions that observers have seen."""
+        self._observer = combined(context.observer, self._decided)
+        self._start_events = StartEvents(self._observer)
         order = compute_order(team, options.order, options.seed) if isinstance(options.order, Order) else options.order
         self._scenario = ScenarioRun(
             team,
@@ -167,7 +172,7 @@ class ThisMachine(Deployment):
         with self._session(phase, epoch.compiled) as session:
             self._watch(phase, EpochStart(epoch), session)
             result = session.search(self.left_s(), self.options.messages)
-        return _checkable(phase, result, self._scenario.team, epoch.compiled)
+        return self._checkable(phase, result, self._scenario.team, epoch.compiled)
 
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:
         """See `Deployment.confirm`."""
@@ -326,10 +331,16 @@ class ThisMachine(Deployment):
             phase = current
         else:  # the team could not be compiled in time
             phase = phase.beginning_with(Start({}))
-        search = _checkable(phase, epoch.result, epoch.team, epoch.epoch.compiled)
+        search = self._checkable(phase, epoch.result, epoch.team, epoch.epoch.compiled)
         answer = self.evaluated(phase, search)
         self._improvements = None
         return answer
+
+    def _checkable(self, phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Search:
+        """Return a finished search whose assignment is checked against the files of `team`."""
+        final = self.options.answer == AnswerRule.FINAL
+        check = partial(check_with_files, phase, result, team, compiled, self._decided, final=final)
+        return Search(result, check, partial(violations_in_files, result, team, compiled))
 
     def _ask_environment(self) -> None:
         """Pass the last epoch's answer to the environment, if there is one. The environment may add an event."""
@@ -364,7 +375,7 @@ class ThisMachine(Deployment):
             compiled,
             phase.parameters,
             self.options,
-            context.observer,
+            self._observer,
             context.progress,
             context.kills,
             changes=self._dynamic,
@@ -385,7 +396,9 @@ class ThisMachine(Deployment):
         return confirmed(solvers, team, self.options.protocol, alone, total=total, withdrawal_cost=cost)
 
 
-def _checkable(phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Search:
-    """Return a finished search whose assignment is checked against the files of `team`."""
-    check = partial(check_with_files, phase, result, team, compiled)
-    return Search(result, check, partial(violations_in_files, result, team, compiled))
+def _decided_values(team: Team, context: RunContext) -> DecidedValues | None:
+    """Return an observer of the decisions of `team`, or None if nobody observes the run or nothing is minimised."""
+    if context.observer is None or context.options.answer == AnswerRule.FINAL:
+        return None
+    objective = objective_to_record(team, context.options)
+    return None if objective is None else DecidedValues(objective())

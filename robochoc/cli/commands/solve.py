@@ -30,6 +30,7 @@ from robochoc.cli.options.solve import (
     Outputs,
     SolveCommand,
     TeamRequest,
+    answer_option,
     check_outputs,
     cluster_option,
     deadline_option,
@@ -53,7 +54,8 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": (
-        "--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with", "--cluster",
+        "--order", "--set", "--preprocess", "--answer", "--messages", "--ncccs", "--cycles", "--count", "--with",
+        "--cluster",
     ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
@@ -136,6 +138,7 @@ _SECTIONS: Sections = {
 @deadline_option
 @withdraw_option
 @preprocess_option
+@answer_option
 @messages_option
 @click.option(
     "--ncccs",

@@ -74,6 +74,13 @@ deadline_option = click.option(
     metavar="SECONDS",
     help="Stop after this time with the best solution found.",
 )
+answer_option = click.option(
+    "--answer",
+    type=click.Choice(["best", "final"]),
+    default="best",
+    metavar="best|final",
+    help="Without a proof, answer with the best assignment found (default), or with the robots' final one.",
+)
 preprocess_option = click.option(
     "--preprocess",
     type=click.Choice(["ac"]),
@@ -127,7 +134,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
-    "central_with", "cluster",
+    "central_with", "cluster", "answer",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

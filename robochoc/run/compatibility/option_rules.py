@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from robochoc.run.defaults import CENTRAL, MOST_LOSS
-from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import AnswerRule, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 
 LEAST_SEED, LARGEST_SEED = -(2**63), 2**64 - 1
@@ -110,6 +110,12 @@ OPTION_RULES = (
     _for_robots("--order", lambda o: o.order is not None),
     _for_robots("--set", lambda o: o.settings),
     _for_robots("--preprocess", lambda o: o.preprocess),
+    _for_robots("--answer", lambda o: o.answer != AnswerRule.BEST),
+    OptionRule(
+        lambda o: o.answer == AnswerRule.FINAL and o.improve is not None,
+        "--improve publishes better and better answers, and cannot be used with --answer final",
+        "remove one of them",
+    ),
     OptionRule(
         lambda o: o.preprocess and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
         "--preprocess is only for robots that run as processes or in the simulator",
