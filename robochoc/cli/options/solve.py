@@ -78,8 +78,8 @@ answer_option = click.option(
     "--answer",
     type=click.Choice(["best", "final"]),
     default="best",
-    metavar="best|final",
-    help="Without a proof, answer with the best assignment found (default), or with the robots' final one.",
+    metavar="KIND",
+    help="Answer without a proof: best (default) or final values.",
 )
 preprocess_option = click.option(
     "--preprocess",
