@@ -146,7 +146,7 @@ class _Feedback:
                     pass
 
     def _decided(self, event: Decided) -> None:
-        """Apply a robot's decision. If decisions with equal times are simultaneous, states between them do not count."""
+        """Apply a robot's decision. States between simultaneous decisions do not count."""
         objective = self._objective
         if objective is not None and objective.in_step and self._last_t not in {None, event.t}:
             self._update_best(objective.cost, self._own)
