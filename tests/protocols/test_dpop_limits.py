@@ -19,7 +19,7 @@ from robochoc.journal.events import AnyEvent, Given, Sent
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics
 from robochoc.protocols.inference import dpop_tables
 from robochoc.protocols.inference.dpop import DPOP, UTIL, VALUE, Dimensions, Need, Proceed
-from robochoc.protocols.inference.dpop_tables import Extent, bytes_of
+from robochoc.protocols.inference.dpop_tables import Extent, Result, bytes_of
 from robochoc.protocols.message import Message, encode
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
@@ -143,7 +143,7 @@ def test_a_robot_needs_room_for_the_tables_of_its_constraints_and_of_its_childre
     ((_, said),) = replies(robot, *heard)
     assert isinstance(said, Dimensions)
     floats, child = Extent(3 * 3, 8), Extent(3 * 3, 2)
-    assert said.most == Need(bytes_of([3, 3], 3, 2, [floats, floats, child]), "RC")
+    assert said.most == Need(bytes_of([Result([3, 3], 3, 2)], [floats, floats, child]), "RC")
 
 
 def test_sizes_do_not_overflow() -> None:

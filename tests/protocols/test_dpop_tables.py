@@ -21,6 +21,7 @@ from robochoc.protocols.inference.dpop_tables import (
     CoarseTable,
     Extent,
     IncomingTable,
+    Result,
     Table,
     aligned,
     are_all_infinite,
@@ -150,7 +151,7 @@ def test_arrays_never_hold_more_than_was_told_before(seed: int) -> None:
     most = chance.choice((50, 10_000))
     width = width_for(3 * most)
     inputs = [Extent(math.prod(length), 8 if number == 0 else width_for(most)) for number, length in enumerate(lengths)]
-    told = bytes_of(shape, own, width, inputs)
+    told = bytes_of([Result(shape, own, width)], inputs)
     tracemalloc.start()
     try:
         kinds = (np.dtype(np.float64), *[np.dtype(f"<u{width_for(most)}")] * 2)

@@ -224,6 +224,7 @@ class CountDPOP(DPOP):
         use_when="counting solutions or optima (--count), small induced width",
     )
     settings: ClassVar[TableSettings] = TableSettings()
+    divides = False
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

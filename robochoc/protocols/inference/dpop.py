@@ -6,7 +6,8 @@ subtree. It adds up its constraints and its children's tables, and minimises ove
 each robot chooses the cheapest value (VALUE).
 
 - **When to use**: costs, and a pseudo-tree with a small induced width. The number of messages is linear, but a table
-  has one dimension for each robot in the separator.
+  has one dimension for each robot in the separator. Robots may have several variables, such as a slot and a task: their
+  tables contain only the variables that matter, and independent variables have separate tables.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. A run that needs
   more memory than allowed ends before any table is made.
 - **Parameters (`--set`)**: `memory`, the maximum number of bytes in a robot's tables in memory (default 1 GiB);
@@ -32,6 +33,12 @@ Choices that the paper leaves open, and differences:
 - A separator contains only robots that share a constraint with a robot in the subtree.
 - The join is made block by block and is never in memory as a whole. Besides the table, this robot's cheapest value for
   each cell is stored (one or two bytes), so the children's tables, larger by an axis, can be freed.
+- A constraint may name only some variables of a robot. Then its table, and a table that results from it, distinguish
+  only these variables' values (`dpop_groups.Partition`). The paper has one variable for each robot.
+- A robot with several variables divides its tables into groups that its values do not connect, and minimises each group
+  separately (`dpop_groups.divided`). It sends the resulting tables one after the other; their sum is the paper's table.
+  The table sizes are then in `SplitDimensions`. So six robots with a slot (of 3) and a task (of 6) send tables of 3^5
+  and 6^5 cells, not of 18^5.
 - VALUE contains the indices of the values in the child's separator, in the order of the separator.
 - A table has as few bytes per cost as it needs, and is sent in pieces of up to 4 MiB. Ties go to the first value.
 - A constraint is checked by the lowest robot in its scope, once for each distinguishable combination, when its table is
@@ -65,12 +72,32 @@ from robochoc.protocols import acts
 from robochoc.protocols.acts import Act, Performative
 from robochoc.protocols.disclosure import NOTHING, HasOnly, HasValue, Proof, Reception, table_proves
 from robochoc.protocols.findings import Findings
-from robochoc.protocols.inference.dpop_groups import Partition, length_of, partition_of
+from robochoc.protocols.inference.dpop_groups import (
+    NO_AXIS,
+    Group,
+    Input,
+    Outline,
+    Partition,
+    Parts,
+    code_of,
+    decoded,
+    distinguishes,
+    divided,
+    encoded,
+    length_of,
+    mapped,
+    partition_of,
+    places_of,
+    undivided,
+)
 from robochoc.protocols.inference.dpop_tables import (
     CoarseTable,
     Codes,
     Extent,
     IncomingTable,
+    IncomingTables,
+    Places,
+    Result,
     Table,
     Width,
     aligned,
@@ -205,6 +232,41 @@ class Dimensions(Message, frozen=True):
         )
 
 
+class TableSizes(msgspec.Struct, frozen=True, array_like=True):
+    """One of several tables: an upper bound on its costs, and its axes, each with the codes of the robot's values.
+
+    Values with the same code are not distinguished: the code is the index on the axis. Codes are little-endian integers
+    as narrow as the domain size allows. Without codes, all values are distinguished.
+    """
+
+    dearest: Cost
+    axes: dict[str, bytes]
+
+
+class SplitDimensions(Dimensions, frozen=True):
+    """The `Dimensions` of a sender with several tables, or with one that does not distinguish all values of a robot.
+
+    The sum of the `tables` is the table of DPOP. They are sent one after the other, in this order.
+    """
+
+    tables: list[TableSizes]
+
+    def in_words(self, _: Wording) -> str:
+        tables = "; ".join(map(self._table_in_words, self.tables))
+        return (
+            f"the costs of my subtree are the sum of {counted(len(self.tables), 'table')}: {tables}; no cost is above"
+            f" {cost_text(self.dearest)}; from me down the induced width is {self.induced_width},"
+            f" and {self.most.robot} needs the most memory, {cost_text(self.most.bytes)} bytes"
+        )
+
+    def _table_in_words(self, table: TableSizes) -> str:
+        axes = listed([self._axis_in_words(*axis) for axis in table.axes.items()])
+        return f"one over {axes}" if axes else "a single cost"
+
+    def _axis_in_words(self, robot: str, codes: bytes) -> str:
+        return f"{robot} ({counted(length_of(decoded(codes, self.separator[robot]), self.separator[robot]), 'value')})"
+
+
 class Proceed(Message, frozen=True):
     """Permission to make tables, because the tables of the tree fit in memory; with the axes of the receiver's table.
 
@@ -243,6 +305,8 @@ class UTIL(Message, frozen=True):
         """
         axes = axes_of(reception, reception.receiver, reception.sender)
         dimensions = reception.last(Dimensions, reception.sender, reception.receiver)
+        if isinstance(dimensions, SplitDimensions):
+            return None
         if axes is None or dimensions is None:
             return NOTHING  # received in another epoch, or as labels (MB-DPOP)
         shape = [dimensions.separator[robot] for robot in axes]
@@ -293,11 +357,12 @@ class DPOP(TreeProtocol):
 
     - `domains` of the neighbours above, and `dimensions` of the children;
     - `separator`, and `utils`, the children's tables;
-    - `choices`: for each combination of values in the separator, this robot's cheapest value;
+    - `groups` of tables that this robot's values do not connect;
+    - `choices`: for each group and combination of values in its separator, this robot's cheapest value;
     - `optimum`: the cost of the whole tree (at its root).
     """
 
-    messages: ClassVar[Any] = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
+    messages: ClassVar[Any] = TreeMessage | Domain | Dimensions | SplitDimensions | Proceed | UTIL | VALUE
     traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
@@ -310,15 +375,23 @@ class DPOP(TreeProtocol):
         use_when="costs, small induced width: number of messages is linear",
     )
     settings: ClassVar[TableSettings] = DPOPSettings()
+    divides: ClassVar[bool] = True
+    """True if the protocol divides tables into independent groups."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.domains: dict[str, list[Value]] = {}
         self.dimensions: dict[str, Dimensions] = {}
         self.separator: tuple[str, ...] | None = None
-        self.utils: dict[str, IncomingTable] = {}
-        self.choices: Codes | None = None
+        self.utils: dict[str, IncomingTables] = {}
+        self.choices: list[Codes] | None = None
         self.optimum: int | None = None
+        self.groups: list[Group] = []
+        self._parts: Parts | None = None
+        self._to_join: list[Input] = []
+        self._outlines: dict[str, list[Outline]] = {}
+        """The outlines of the tables of children that have sent `SplitDimensions`."""
+        self._made: list[tuple[Table, Sequence[str]]] = []
         self._checked: list[TableScope] = []
         self._partitions: dict[tuple[str, tuple[int, ...]], Partition] = {}
         self._sizes: dict[str, int] = {}
@@ -334,11 +407,11 @@ class DPOP(TreeProtocol):
         self._measure()
 
     def handle(self, sender: str, message: Message) -> None:
-        match cast("Domain | Dimensions | Proceed | UTIL | VALUE", message):
+        match cast("Domain | Dimensions | SplitDimensions | Proceed | UTIL | VALUE", message):
             case Domain(values):
                 store_once(sender, values, self.domains, self.ancestors)
                 self._measure()
-            case Dimensions() as dimensions:
+            case Dimensions() | SplitDimensions() as dimensions:
                 self._store_dimensions(sender, dimensions)
                 self._measure()
             case Proceed(separator):
@@ -369,6 +442,7 @@ class DPOP(TreeProtocol):
         self._checked = self.problem.scopes_in_tables(self.ancestors)
         self._sizes = self._separator_sizes([one.agents for one in self._checked])
         self._dearest = self._upper_bound([one.max_cost for one in self._checked])
+        self._divide()
         self._plan()
         self._announce_dimensions()
 
@@ -379,7 +453,7 @@ class DPOP(TreeProtocol):
             self._check_limits(most, width)
             self._proceed([])
         else:
-            self._send_dimensions(Dimensions(self._sizes, self._dearest, width, most))
+            self._send_dimensions(self._dimensions(width, most))
 
     def _width_and_need(self) -> tuple[int, Need]:
         """Return the induced width and the largest memory need of this robot's subtree."""
@@ -387,6 +461,55 @@ class DPOP(TreeProtocol):
         below = [self.dimensions[child] for child in self.children]
         width = max([len(self._sizes), *(one.induced_width for one in below)])
         return width, max([self._need, *(one.most for one in below)])
+
+    def _divide(self) -> None:
+        """Divide the tables into groups that this robot's values do not connect."""
+        own = self.problem.agent
+        self._to_join = []
+        for scope in self._checked:
+            robots = (*scope.agents, own)
+            partitions = map(self._partition, robots, scope.places)
+            self._to_join.append(self._input(scope.max_cost, dict(zip(robots, partitions, strict=True))))
+        for child in self.children:
+            self._to_join += [self._input(*outline) for outline in self._outlines_of(child)]
+        self._parts = None
+        if not self.divides or all(one.is_whole for one in self._to_join):
+            result = Outline(self._dearest, dict.fromkeys(self._sizes))
+            self.groups = [undivided(self._to_join, self.problem.charges, result)]
+            return
+        self._parts = Parts(self.problem.values, self.problem.charges)
+        self.groups = divided(self._parts, self._to_join, self._sizes)
+        named = {name for group in self.groups for name in group.result.axes}
+        self._sizes = {name: size for name, size in self._sizes.items() if name in named}
+
+    def _input(self, dearest: float, axes: Mapping[str, Partition]) -> Input:
+        """Return a table to be joined, given all its axes. An axis with a single index is left out."""
+        own = axes.get(self.problem.agent, NO_AXIS)
+        above = {
+            name: axis
+            for name, axis in axes.items()
+            if name in self._sizes and name != self.problem.agent and distinguishes(axis)
+        }
+        single = len(self.problem.values) == 1 or not distinguishes(own)
+        return Input(Outline(int(dearest), above), NO_AXIS if single else own)
+
+    def _outlines_of(self, child: str) -> list[Outline]:
+        """Return the outlines of a child's tables."""
+        dimensions = self.dimensions[child]
+        return self._outlines.get(child) or [Outline(dimensions.dearest, dict.fromkeys(dimensions.separator))]
+
+    def _dimensions(self, width: int, most: Need) -> Dimensions:
+        """Return the dimensions of this robot's tables."""
+        results = [group.result for group in self.groups]
+        if len(results) == 1 and all(axis is None for axis in results[0].axes.values()):
+            return Dimensions(self._sizes, self._dearest, width, most)
+        tables = [
+            TableSizes(
+                min(one.dearest, EXACT), {name: encoded(axis, self._sizes[name]) for name, axis in one.axes.items()}
+            )
+            for one in results
+        ]
+        return SplitDimensions(self._sizes, self._dearest, width, most, tables)
 
     def _plan(self) -> None:
         """Prepare the memory needs, after the sizes of the separator are known. DPOP itself has nothing to prepare."""
@@ -396,9 +519,11 @@ class DPOP(TreeProtocol):
         self.send(self.parent or "", dimensions)
 
     def _store_dimensions(self, child: str, dimensions: Dimensions) -> None:
-        """Store the dimensions of a child's table."""
+        """Store the dimensions of a child's tables."""
         self._check_dimensions(child, dimensions)
+        outlines = outlines_of(child, dimensions) if isinstance(dimensions, SplitDimensions) else []
         store_once(child, dimensions, self.dimensions, self.children)
+        self._outlines[child] = outlines
 
     def _check_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Raise `ValueError` unless `dimensions` are possible."""
@@ -456,14 +581,26 @@ class DPOP(TreeProtocol):
 
     def _memory_need(self) -> Need:
         """Return the memory that this robot's tables need: an integer, if it is small enough for a message."""
-        own = len(self.problem.values)
         inputs = [Extent(math.prod(self._lengths(scope)), 8) for scope in self._checked]
-        inputs += [
-            Extent(math.prod(self._child_sizes(child)), width_of(self.dimensions[child].dearest))
-            for child in self.children
-        ]
-        need = bytes_of(self._own_sizes(), own, width_of(self._dearest), inputs) + self._additional_bytes(inputs)
+        inputs += itertools.chain.from_iterable(map(self._child_extents, self.children))
+        need = bytes_of(self._results(), inputs) + self._additional_bytes(inputs)
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
+
+    def _results(self) -> list[Result]:
+        """Return the sizes of this robot's tables, with their axes in any order."""
+        if self._parts is None:
+            return [Result(self._own_sizes(), len(self.problem.values), width_of(self._dearest))]
+        return [
+            Result(group.result.shape(self._sizes), len(group.values), width_of(min(group.result.dearest, EXACT)))
+            for group in self.groups
+        ]
+
+    def _child_extents(self, child: str) -> list[Extent]:
+        """Return the sizes of a child's tables."""
+        dimensions, outlines = self.dimensions[child], self._outlines.get(child)
+        if not outlines:
+            return [Extent(math.prod(self._child_sizes(child)), width_of(dimensions.dearest))]
+        return [Extent(math.prod(one.shape(dimensions.separator)), width_of(one.dearest)) for one in outlines]
 
     def _lengths(self, scope: TableScope) -> list[int]:
         """Return the shape of the table of a constraint that this robot checks."""
@@ -521,7 +658,7 @@ class DPOP(TreeProtocol):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._joined = [self._aligned(costs_of(table), (*table.agents, self.problem.agent)) for table in tables]
+        self._made = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
         del tables
         if not self.children:
             self._compute_utils()
@@ -533,9 +670,15 @@ class DPOP(TreeProtocol):
         if child not in self._axes:
             raise ValueError(f"{child} sent a table without a request")
         if child not in self.utils:
-            dimensions = self.dimensions[child]
-            shape = [dimensions.separator[name] for name in self._table_axes(child)]
-            self.utils[child] = IncomingTable(shape, dimensions.dearest, on_disk=self._on_disk)
+            sizes = self.dimensions[child].separator
+            self.utils[child] = IncomingTables(
+                [
+                    IncomingTable(
+                        [length_of(one.axes[name], sizes[name]) for name in axes], one.dearest, on_disk=self._on_disk
+                    )
+                    for one, axes in zip(self._outlines_of(child), self._axes_below(child), strict=True)
+                ]
+            )
         self.utils[child].add(width, costs)
         if self._all_arrived:
             self._compute_utils_of_all()
@@ -549,9 +692,15 @@ class DPOP(TreeProtocol):
         """Return the robots that the axes of a child's table belong to."""
         return self._axes[child]
 
+    def _axes_below(self, child: str) -> list[Sequence[str]]:
+        """Return, for each of a child's tables, the robots that its axes belong to."""
+        return [[name for name in self._table_axes(child) if name in one.axes] for one in self._outlines_of(child)]
+
     def _compute_utils_of_all(self) -> None:
         """Join the children's tables, all of which have arrived, and free them."""
-        self._joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
+        for child in self.children:
+            arrived = zip(self.utils[child].tables, self._axes_below(child), strict=True)
+            self._made += [(table.costs, axes) for table, axes in arrived]
         self.utils.clear()
         self._compute_utils()
 
@@ -567,24 +716,43 @@ class DPOP(TreeProtocol):
 
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree for each combination of values in the separator."""
-        shape = [self._sizes[name] for name in self.separator or ()]
-        costs, self.choices = project(shape, self.problem.charges, self._joined, self._dearest, on_disk=self._on_disk)
-        self._process_joined(costs)
+        found = []
+        for group in self.groups:
+            result = group.result
+            onto = [name for name in self.separator or () if name in result.axes]
+            shape = [length_of(result.axes[name], self._sizes[name]) for name in onto]
+            self._joined = [self._in_join(group, number, onto) for number in group.inputs]
+            found.append(project(shape, group.charges, self._joined, result.dearest, on_disk=self._on_disk))
+        self._made.clear()
+        self.choices = [one.choices for one in found]
+        self._process_joined(found[0].costs)
         self._joined.clear()
-        self._send_or_choose(costs)
+        self._send_or_choose(*[one.costs for one in found])
+
+    def _in_join(self, group: Group, number: int, onto: Sequence[str]) -> Table | CoarseTable:
+        """Return the table with this `number` as a part of the join of `group`, with the axes `onto`."""
+        (table, axes), (outline, own) = self._made[number], self._to_join[number]
+        places: dict[str, Places | None] = {
+            name: mapped(axis, places_of(group.result.axes[name], self._sizes[name]))
+            for name, axis in outline.axes.items()
+        }
+        if own is not NO_AXIS:
+            places[self.problem.agent] = mapped(own, group.values)
+        return aligned(coarse(table, [places.get(name) for name in axes]), axes, (self.problem.agent, *onto))
 
     def _process_joined(self, costs: Codes) -> None:
         """Compute further results from the joined tables, besides the least `costs`. DPOP itself has none."""
 
-    def _send_or_choose(self, costs: Codes) -> None:
-        """Send the table to the parent; a root chooses its value, and a table without a finite cost ends the search."""
-        if are_all_infinite(costs):
+    def _send_or_choose(self, *tables: Codes) -> None:
+        """Send tables to the parent; a root chooses its value, and a table without a finite cost ends the search."""
+        if any(map(are_all_infinite, tables)):
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is None:
-            self.optimum = int(costs.item())
+            self.optimum = sum([int(costs.item()) for costs in tables])
             self._choose_optimal([])
         else:
-            self._send_table(costs)
+            for costs in tables:
+                self._send_table(costs)
 
     def _send_table(self, costs: Codes) -> None:
         for width, piece in packed_costs(costs):
@@ -613,9 +781,17 @@ class DPOP(TreeProtocol):
         for child in self.children:
             self.send(child, VALUE([agent_view[name] for name in self._axes[child]]))
 
-    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+    def _best_value(self, choices: Sequence[Codes], assignment: Sequence[int]) -> int:
         """Return the index of this robot's cheapest value for these values in the separator."""
-        return int(choices[tuple(assignment)])
+        if self._parts is None:
+            return int(choices[0][tuple(assignment)])
+        chosen = []
+        for group, table in zip(self.groups, choices, strict=True):
+            axes = group.result.axes
+            known = zip(self.separator or (), assignment, strict=True)
+            at = [code_of(axes[name], place) for name, place in known if name in axes]
+            chosen.append((group, int(group.values[table[tuple(at)]])))
+        return self._parts.value(chosen)
 
 
 def costs_of(table: CostTable) -> Table | CoarseTable:
@@ -626,6 +802,17 @@ def costs_of(table: CostTable) -> Table | CoarseTable:
         for codes, length in zip(table.codes, lengths, strict=True)
     ]
     return coarse(table.charges, places)
+
+
+def outlines_of(child: str, dimensions: SplitDimensions) -> list[Outline]:
+    """Return the outlines of a child's tables. Raises `ValueError` if they are invalid."""
+    sizes = dimensions.separator
+    if not dimensions.tables or not all(one.axes.keys() <= sizes.keys() for one in dimensions.tables):
+        raise ValueError(f"{child} sent invalid dimensions: no tables, or axes of robots outside its separator")
+    return [
+        Outline(one.dearest, {name: decoded(codes, sizes[name]) for name, codes in one.axes.items()})
+        for one in dimensions.tables
+    ]
 
 
 def store_once(sender: str, item: T, received: dict[str, T], senders: Sequence[str]) -> None:

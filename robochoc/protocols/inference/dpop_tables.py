@@ -120,20 +120,27 @@ def width_of(dearest: int) -> Width:
     return next(width for width in _WIDTHS if dearest < _top(width))
 
 
-def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent]) -> int:
-    """Return the peak size of all arrays while a table is made and sent, without allocating anything.
+class Result(NamedTuple):
+    """The size of a table that results from a join: its `shape`, and the number of bytes of each cost (`width`).
 
-    Args:
-        shape: The table's shape.
-        own: The number of this robot's values.
-        width: The number of bytes of each cost in the table.
-        inputs: The tables that are joined.
+    `own` is the number of this robot's values in the join.
     """
-    cells = math.prod(shape)
-    block = own * math.prod(shape[_stepped(shape, own) :])
+
+    shape: Sequence[int]
+    own: int
+    width: int
+
+
+def bytes_of(results: Sequence[Result], inputs: Sequence[Extent]) -> int:
+    """Return the peak size of all arrays while tables are made from `inputs` and sent, without allocating anything."""
+    stored, block, sending = 0, 0, 0
+    for shape, own, width in results:
+        cells = math.prod(shape)
+        stored += cells * (width + _choice(own).itemsize)
+        block = max(block, own * math.prod(shape[_stepped(shape, own) :]))
+        sending = max(sending, cells * width + min(cells * width, PIECE))
     joining = sum(one.cells * one.width for one in inputs) + block * TEMPORARY
-    sending = cells * width + min(cells * width, PIECE)
-    return cells * (width + _choice(own).itemsize) + max(joining, sending)
+    return stored + max(joining, sending)
 
 
 @overload
@@ -387,6 +394,27 @@ def _stored(table: Table | CoarseTable) -> Table:
 def expanded(table: Table | CoarseTable) -> Table:
     """Return `table` with all indices of the join."""
     return table.expanded() if isinstance(table, CoarseTable) else table
+
+
+class IncomingTables:
+    """Tables that arrive in pieces, one table after the other."""
+
+    def __init__(self, tables: Sequence[IncomingTable]) -> None:
+        self.tables = tables
+
+    @property
+    def complete(self) -> bool:
+        """True if all tables have arrived."""
+        return self.tables[-1].complete
+
+    @property
+    def costs(self) -> Codes:
+        """The costs of the first table."""
+        return self.tables[0].costs
+
+    def add(self, width: Width, piece: bytes) -> None:
+        """Append the next piece to the first incomplete table. Raises errors as `IncomingTable.add`."""
+        next((table for table in self.tables if not table.complete), self.tables[-1]).add(width, piece)
 
 
 def _part(table: Table | CoarseTable, place: Sequence[int]) -> Table | CoarseTable:

@@ -199,6 +199,7 @@ class MBDPOP(DPOP):
         use_when="costs, where tables of dpop are too large: bounds them",
     )
     settings: ClassVar[MBDPOPSettings] = MBDPOPSettings()
+    divides = False
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -358,7 +359,8 @@ class MBDPOP(DPOP):
 
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree in the context, for each combination of the robots not fixed."""
-        costs, self.choices = self._projected(self._free, self.context or {})
+        costs, choices = self._projected(self._free, self.context or {})
+        self.choices = [choices]
         if self.cut:
             self._send_table(costs)
         elif not self.enumerated:
@@ -439,10 +441,10 @@ class MBDPOP(DPOP):
             raise ValueError(f"{self.problem.agent} has other fixed values than the values received: {assignment}")
         super()._choose_optimal(assignment)
 
-    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+    def _best_value(self, choices: Sequence[Codes], assignment: Sequence[int]) -> int:
         """Return the index of this robot's cheapest value, or of its fixed value."""
         free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
-        return int(choices[tuple(free)]) + (self.context or {}).get(self.problem.agent, 0)
+        return int(choices[0][tuple(free)]) + (self.context or {}).get(self.problem.agent, 0)
 
 
 def is_place(place: int, size: int) -> bool:

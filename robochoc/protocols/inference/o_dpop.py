@@ -131,6 +131,7 @@ class ODPOP(DPOP):
         use_when="costs, few good combinations: short messages",
     )
     settings: ClassVar[TableSettings] = TableSettings()
+    divides = False
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -173,7 +174,7 @@ class ODPOP(DPOP):
             self.goods[child] = np.full([sizes[name] for name in self._axes[child]], np.nan)
             self.last[child] = 0
         self._unsent = np.ones(shape, bool)
-        self.choices = cast("Codes", np.zeros(shape, np.min_scalar_type(len(self.problem.values))))
+        self.choices = [cast("Codes", np.zeros(shape, np.min_scalar_type(len(self.problem.values))))]
         if self.parent is None:
             self._asked = True
             self._ask_or_answer()
@@ -228,7 +229,7 @@ class ODPOP(DPOP):
             return
         self._asked = False
         self._unsent[cell] = False
-        cast("Codes", self.choices)[cell] = own
+        cast("list[Codes]", self.choices)[0][cell] = own
         if self.parent is None:
             self._choose_optimal([])
         else:
@@ -257,7 +258,7 @@ class ODPOP(DPOP):
 
     # VALUE, from the root down
 
-    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+    def _best_value(self, choices: Sequence[Codes], assignment: Sequence[int]) -> int:
         """Return the index of this robot's value in the good that it sent for `assignment`."""
         if self._unsent[tuple(assignment)]:
             raise ValueError(f"{self.problem.agent} has sent no good for {list(assignment)}")

@@ -548,7 +548,7 @@ class RMBDPOP(MBDPOP):
 
     def _end_contexts(self, found: BestTables) -> None:
         """Send the best of all contexts: robots in a cluster to their parent, others as in DPOP."""
-        self.choices = found.choices
+        self.choices = [found.choices]
         if self._final is not None:
             self._choose_in_context(self._final)
         elif not self._is_in_cluster:
@@ -595,7 +595,7 @@ class RMBDPOP(MBDPOP):
                 self.send(child, CutValue(needed))
         self._compute_if_complete()
 
-    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+    def _best_value(self, choices: Sequence[Codes], assignment: Sequence[int]) -> int:
         """Return the index of this robot's cheapest value; if it is fixed, the tables contain only its fixed value."""
         free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
-        return int(choices[tuple(free)])
+        return int(choices[0][tuple(free)])

@@ -57,6 +57,7 @@ from robochoc.protocols.inference.dpop_tables import (
     Codes,
     Extent,
     IncomingTable,
+    IncomingTables,
     Table,
     Width,
     project,
@@ -122,6 +123,8 @@ class SDPOP(DPOP, DynamicProtocol):
         use_when="costs that change, small induced width: keeps tables",
     )
 
+    divides = False
+
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.basis: tuple[object, ...] | None = None
@@ -151,7 +154,7 @@ class SDPOP(DPOP, DynamicProtocol):
         self._renewed: set[str] = set()
         """Children whose tables may have changed."""
         self._waiting: set[str] = set()
-        self._incoming: dict[str, IncomingTable] = {}
+        self._incoming: dict[str, IncomingTables] = {}
         self._inputs: tuple[object, ...] = ()
         self._computes = self._proceeding = self._tables_changed = self._axes_changed = False
 
@@ -359,10 +362,11 @@ class SDPOP(DPOP, DynamicProtocol):
         if child not in self._incoming:
             dimensions = self.dimensions[child]
             shape = [dimensions.separator[name] for name in self._axes[child]]
-            self._incoming[child] = IncomingTable(shape, dimensions.dearest, on_disk=self._on_disk)
-        table = self._incoming[child]
-        table.add(width, costs)
-        if table.complete:
+            table = IncomingTable(shape, dimensions.dearest, on_disk=self._on_disk)
+            self._incoming[child] = IncomingTables([table])
+        incoming = self._incoming[child]
+        incoming.add(width, costs)
+        if incoming.complete:
             self.utils[child] = self._incoming.pop(child)
             self._tables_changed = True
             self._waiting.discard(child)
@@ -382,7 +386,8 @@ class SDPOP(DPOP, DynamicProtocol):
         joined = [self._aligned(table, axes) for table, axes in self._own_tables]
         joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
         shape = [self._sizes[name] for name in self.separator or ()]
-        costs, self.choices = project(shape, self.problem.charges, joined, self._dearest, on_disk=self._on_disk)
+        costs, choices = project(shape, self.problem.charges, joined, self._dearest, on_disk=self._on_disk)
+        self.choices = [choices]
         self.basis = self._inputs
         self._send_or_choose(costs)
         self._last_optimum = self.optimum
