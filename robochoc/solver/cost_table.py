@@ -17,9 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.problem import Value
-from robochoc.solver.shared_constraint import SharedConstraint, refuse_large
+from robochoc.solver.shared_constraint import Axis, SharedConstraint, refuse_large
 
 Array = NDArray[np.float64]
+
+
+MIN_ENTRIES = 256
+"""The number of entries from which a constraint is evaluated for all combinations at once."""
 
 
 class CostTable(NamedTuple):
@@ -69,14 +73,26 @@ def cost_table(constraint: SharedConstraint, domains: Mapping[str, Sequence[Valu
     found = constraint.evaluations.tables.get(equal)
     if found is None:
         axes = constraint.axes(domains)
-        charges = np.zeros([len(one.parts) for one in axes], np.float64)
-        evaluated = 0
-        for place, others in constraint.combinations(axes[:-1]):
-            evaluated += 1
-            charges[place] = constraint.distinct_costs(others)
+        evaluated, charges = _charges(constraint, axes)
         charges.flags.writeable = False
         places, codes, _ = zip(*axes, strict=True)
         table = CostTable(constraint.key, constraint.agents, places, charges, codes)
         found = constraint.evaluations.tables[equal] = evaluated * len(constraint.codes), table
     checks, table = found
     return checks, table._replace(key=constraint.key, agents=constraint.agents)
+
+
+def _charges(constraint: SharedConstraint, axes: Sequence[Axis]) -> tuple[int, Array]:
+    """Return the number of combinations of the others' values, and the costs on `axes`."""
+    charges: Array = np.zeros([len(one.parts) for one in axes], np.float64)
+    if charges.size >= MIN_ENTRIES:
+        present = [[index for index, part in enumerate(one.parts) if None not in part] for one in axes]
+        found = constraint.cost_array([[one.parts[at] for at in kept] for one, kept in zip(axes, present, strict=True)])
+        if found is not None:
+            charges[np.ix_(*present)] = found
+            return math.prod(map(len, present[:-1])), charges
+    evaluated = 0
+    for place, others in constraint.combinations(axes[:-1]):
+        evaluated += 1
+        charges[place] = constraint.distinct_costs(others)
+    return evaluated, charges

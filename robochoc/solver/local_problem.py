@@ -489,7 +489,8 @@ class LocalProblem:
                 continue
             axes = constraint.axes(domains)
             combinations = [*constraint.combinations(axes[:-1])]
-            self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
+            evaluated = constraint.evaluate_all(axes, [others for _, others in combinations])
+            self.checks += evaluated * len(self.values)
             masks = {place: constraint.mask(others) for place, others in combinations}
             codes = tuple([axis.codes for axis in axes])
             found.append(AllowedValues(constraint.key, constraint.agents, codes, masks))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.absence import may_count_when_absent, restated
 from robochoc.model.problem import INFINITE, Constraint, Domain, Value
@@ -13,6 +13,10 @@ from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import MAX_TUPLES, Cost, allows_function, cost_function, is_soft, max_cost
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.evaluations import Evaluations, SharedEvaluations
+
+if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.typing import NDArray
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that exclude a value of this robot: the left side of a nogood."""
@@ -22,6 +26,10 @@ UNKNOWN = -1
 
 OtherValues = tuple[int | None, ...]
 """The values of other robots' variables in a constraint, in the constraint's order. None: withdrawn."""
+
+
+MIN_AT_ONCE = 4096
+"""The number of combinations from which numpy, which has to be imported, evaluates all of them at once."""
 
 
 class Gap(NamedTuple):
@@ -306,6 +314,24 @@ class SharedConstraint:
             prices = self._costs_by[part] = self.costs((part,))
         return prices
 
+    def cost_array(self, columns: Sequence[Sequence[Value]]) -> NDArray[float64] | None:
+        """Return the costs for all combinations of `columns`, the parts of the others' and then of this robot's values.
+
+        None: the combinations must be evaluated one by one. No part may be None.
+
+        Raises:
+            ValueError: if a value is undeclared.
+        """
+        from robochoc.solver.constraint_arrays import cost_array  # noqa: PLC0415 - numpy, for large tables only
+
+        if not all(columns) or self._counts_when_absent:
+            return None
+        least = [column[0] for column in columns[:-1]]
+        for place, column in enumerate(columns[:-1]):
+            for part in column:
+                self._refuse_undeclared(tuple(itertools.chain(*least[:place], part, *least[place + 1 :])))
+        return cost_array(self._constraint, self._all_names, columns)
+
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[Cost]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
@@ -396,6 +422,25 @@ class SharedConstraint:
         for others in combinations:
             self.mask(others)
         return len(self._masks) - before
+
+    def evaluate_all(self, axes: Sequence[Axis], combinations: Sequence[OtherValues]) -> int:
+        """Evaluate all `combinations` of the others' `axes`, and return the number as `evaluate` does.
+
+        Large numbers are evaluated at once.
+        """
+        masks = self.evaluations.masks
+        if len(combinations) * len(self._distinct) >= MIN_AT_ONCE and not all(one in masks for one in combinations):
+            found = self.cost_array([one.parts for one in axes])
+            if found is not None:
+                from robochoc.solver.constraint_arrays import rows_of_bits  # noqa: PLC0415 - as above
+
+                known: dict[bytes, int] = {}
+                for others, row in zip(combinations, rows_of_bits(found), strict=True):
+                    if row not in known:
+                        codes = int.from_bytes(row, "little")
+                        known[row] = sum([mask for at, mask in enumerate(self._code_values) if codes >> at & 1])
+                    masks[others] = known[row]
+        return self.evaluate(combinations)
 
     def mask_in(self, view: Mapping[str, Value]) -> int:
         """Return `mask` for the values in `view`. `UNKNOWN` if `other_values` is None."""
