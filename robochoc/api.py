@@ -24,7 +24,9 @@ from robochoc.model.problem import Team
 from robochoc.modelling.option_names import errors_in_python, in_python
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
+from robochoc.modelling.start_values import start_values
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
+from robochoc.solver.agent_problem import StartValues
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
@@ -63,6 +65,10 @@ class Problem(Solvable):
 
     def _team_to_solve(self) -> Team:
         return self.team
+
+    def _start_values(self, start: object, team: Team) -> StartValues:
+        called = {original: name for name, original in self.names.items()}
+        return start_values(start, team, self.names, {}, lambda name: called.get(name, name))
 
     @property
     def _is_ordered(self) -> bool:

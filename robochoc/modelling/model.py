@@ -38,10 +38,12 @@ from robochoc.modelling.option_names import errors_in_python
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.solution import NamedValues, Solution, UserValues, team_name
 from robochoc.modelling.solving import Solvable
+from robochoc.modelling.start_values import start_values
 from robochoc.modelling.team_builder import build_team, saved_order
 from robochoc.modelling.team_contents import TeamContents, contents_of, model_variable
 from robochoc.modelling.terms import ModelVariable, all_of, number
 from robochoc.run.defaults import CENTRAL
+from robochoc.solver.agent_problem import StartValues
 from robochoc.system.plain_text import counted
 from robochoc.system.suggestions import did_you_mean
 
@@ -404,6 +406,9 @@ class Model(Solvable):
 
     def _team_to_solve(self) -> Team:
         return self.team
+
+    def _start_values(self, start: object, team: Team) -> StartValues:
+        return start_values(start, team, {}, self.variables, lambda key: team_name(key, self.imported))
 
     @property
     def _is_ordered(self) -> bool:

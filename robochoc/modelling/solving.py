@@ -15,11 +15,13 @@ from robochoc.model.outcome import Answer, Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.option_names import errors_in_python, in_python
 from robochoc.modelling.solution import Solution
+from robochoc.modelling.start_values import start_values
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import AnswerRule, CentralSolverName, Options, Runtime, ScheduleName
 from robochoc.run.orchestrator import PreparedRun, prepare
 from robochoc.run.scenario import Environment
+from robochoc.solver.agent_problem import StartValues
 from robochoc.solver.compile import CompileLimits
 from robochoc.system.errors import OptionError, OptionTypeError
 from robochoc.system.stopping import stopped_by
@@ -61,6 +63,8 @@ class Solvable(ABC):
         order: str | Sequence[str] | None = None,
         withdraw: str | bool | None = None,
         settings: Mapping[str, object] = {},
+        start: Mapping[Any, object] | Outcome | None = None,
+        warm: bool = True,
         observer: Observer | None = None,
         environment: Environment | None = None,
         seed: int = 0,
@@ -110,6 +114,9 @@ class Solvable(ABC):
             withdraw: The rule by which robots withdraw if the whole team has no solution: `minimum` (or True) or
                 `maximal`. None, or False: no robot withdraws.
             settings: Settings of the protocol, by name.
+            start: The assignment from which the robots begin: the values of some or all variables, or an earlier
+                solution. If it is a solution, complete protocols search only for lower costs. None: no assignment.
+            warm: True if the robots begin each later epoch of a changing problem from the previous assignment.
             observer: Called with every event of the run.
             environment: A function that is called with each answer, and returns the next changes of the problem.
             seed: The seed of the simulator, of the order `random`, and of randomised protocols.
@@ -170,6 +177,7 @@ class Solvable(ABC):
         _refuse(unknown)
         _refuse_types(stop, progress, observer)
         team = self._team_to_solve()
+        given["start"] = self._start_values(start, team)
         with errors_in_python(ARGUMENTS), stopped_by(stop):
             options = _with_team_names(Options(**given | {"protocol": protocol or AUTO}), self._robots_called(team))
             refuse_options(options, environment=environment is not None)
@@ -213,6 +221,10 @@ class Solvable(ABC):
     def _robots_called(self, team: Team) -> Mapping[str, str]:
         """Return the names of the robots in `team`, by the names that the user gave them."""
         return {name: name for name in team.order}
+
+    def _start_values(self, start: object, team: Team) -> StartValues:
+        """Return the argument `start` as start values of `team`. Raises `OptionError`."""
+        return start_values(start, team, {}, {}, lambda name: name)
 
     @property
     def _is_ordered(self) -> bool:

@@ -8,10 +8,13 @@ none, the start assignment is optimal (`run/evaluation.py`).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.model.problem import INFINITE, Team
+from robochoc.model.outcome import Outcome
+from robochoc.model.problem import INFINITE, Domain, Team
 from robochoc.solver.agent_problem import StartValues
+from robochoc.system.errors import OptionError
 from robochoc.verification.objective import Objective
 
 
@@ -43,6 +46,41 @@ def start_in(team: Team, values: StartValues, withdrawal_cost: float | None = No
     objective = Objective(team, withdrawal_cost)
     objective.change(own)
     return Start(possible, None if objective.cost == INFINITE else objective.cost)
+
+
+def start_of_outcome(outcome: Outcome, team: Team, names: Mapping[str, str] = MappingProxyType({})) -> StartValues:
+    """Return the assignment in an earlier outcome as start values for `team`.
+
+    Variables that are not in the team any more, and values that are not possible any more, are omitted.
+
+    Args:
+        outcome: The earlier outcome.
+        team: The team.
+        names: The original names of robots and variables, by their names in the team.
+
+    Raises:
+        OptionError: if the team has none of the variables.
+    """
+    called = {names.get(name, name): name for name in team.variables}
+    withdrawn = {*outcome.withdrawn}
+    found: dict[str, int | None] = {
+        name: None for name, robot in team.owner.items() if withdrawn & {robot, names.get(robot, robot)}
+    }
+    known = {called.get(name, name): value for name, value in outcome.labelled(outcome.assignment).items()}
+    if known and not any(name in team.variables for name in known):
+        raise OptionError(f"start: {outcome.team} has none of the variables of {team.name}, such as {min(known)}")
+    for name, value in known.items():
+        code = code_of(value, team.variables[name].domain) if name in team.variables else None
+        if code is not None:
+            found[name] = code
+    return found
+
+
+def code_of(value: object, domain: Domain) -> int | None:
+    """Return the integer for a number, or the name of a symbol, in `domain`; None if `domain` does not contain it."""
+    if domain.symbols:
+        value = domain.symbols.index(value) if value in domain.symbols else None
+    return value if isinstance(value, int) and value in domain else None
 
 
 def robots_values(team: Team, values: StartValues) -> dict[str, dict[str, int]] | None:

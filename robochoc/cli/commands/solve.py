@@ -33,6 +33,7 @@ from robochoc.cli.options.solve import (
     answer_option,
     check_outputs,
     cluster_option,
+    cold_option,
     deadline_option,
     filter_option,
     kill_option,
@@ -41,6 +42,7 @@ from robochoc.cli.options.solve import (
     preprocess_option,
     protocol_option,
     settings_option,
+    start_option,
     withdraw_option,
 )
 from robochoc.cli.options.value_types import Number, WholeNumber
@@ -54,8 +56,8 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": (
-        "--order", "--set", "--preprocess", "--answer", "--messages", "--ncccs", "--cycles", "--count", "--with",
-        "--cluster",
+        "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--messages", "--ncccs", "--cycles",
+        "--count", "--with", "--cluster",
     ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
@@ -137,6 +139,8 @@ _SECTIONS: Sections = {
 )
 @deadline_option
 @withdraw_option
+@start_option
+@cold_option
 @preprocess_option
 @answer_option
 @messages_option
@@ -220,10 +224,12 @@ def solve(
     ros = pop_ros_options(settings)
     named = {"--order": settings["order"], "--channel": settings["channel"]}
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
+    if settings["start"]:
+        given["--start"] = settings["start"]
     options = options_of(settings, environment=bool(ros.situation))
     request = TeamRequest(
         settings["order"], settings.pop("dialect"), settings.pop("infinity"), settings.pop("owner"),
-        as_json=as_json, explain=explain, ros=ros,
+        as_json=as_json, explain=explain, ros=ros, start=settings.pop("start"),
     )  # fmt: skip
     sniffer = sniffer_request(settings["sniff"], open_browser=settings["open_browser"])
     outputs = Outputs(html, journal, serve, sniffer)

@@ -16,7 +16,7 @@ from robochoc.cli.options.ros_setup import closed_loop
 from robochoc.cli.options.scene import ground_map, readable_map
 from robochoc.cli.options.solve import Outputs, TeamRequest
 from robochoc.cli.reports.closed_loop import FlownMission, publication_lines, report_flight
-from robochoc.cli.reports.failures import LIMIT, Failure, errors_as_failures
+from robochoc.cli.reports.failures import INVALID, LIMIT, Failure, errors_as_failures
 from robochoc.cli.reports.live_sniffer import LiveSniffer, check_patterns
 from robochoc.cli.reports.notes import bound_warning, difference_lines
 
@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from robochoc.run.improvement import Audience
     from robochoc.run.options import Options
     from robochoc.run.orchestrator import PreparedRun
+    from robochoc.solver.agent_problem import StartValues
 
 
 def solve_team(folder: Path, options: Options, outputs: Outputs, request: TeamRequest) -> int:
@@ -77,6 +78,22 @@ def _with_team_names(kills: Sequence[Kill], problem: ReadProblem) -> tuple[Kill,
     return tuple(kill._replace(robot=known.get(kill.robot, kill.robot)) for kill in kills)
 
 
+def _start_in(file: Path, problem: ReadProblem) -> StartValues:
+    """Return the start values in a JSON result or a journal. Raises `Failure`."""
+    from robochoc.cli.options.saved import saved_outcome
+    from robochoc.model.change import team_after_events
+    from robochoc.run.starts import start_of_outcome
+    from robochoc.system.errors import OptionError
+
+    outcome, _ = saved_outcome(file)
+    if not outcome.assignment:
+        click.echo(f"{file}: the verdict is {outcome.verdict}, so there is no assignment to begin from", err=True)
+    try:
+        return start_of_outcome(outcome, team_after_events(problem.team, events=0), problem.names)
+    except OptionError as unfit:
+        raise Failure(INVALID, f"{file}: {unfit}") from None
+
+
 class _FinishedRun(NamedTuple):
     """A finished run whose journal has been written."""
 
@@ -100,6 +117,8 @@ def _solve(
     check_patterns(outputs.sniffer, team)
     order = order_for(team, request.order, problem.names)
     options = replace(options, order=order, kill=_with_team_names(options.kill, problem))
+    if request.start is not None:
+        options = replace(options, start=_start_in(request.start, problem))
     from robochoc.cli.reports.improvements import ImprovementReporter
     from robochoc.run.orchestrator import prepare
     from robochoc.run.recording import journal_header, objective_to_record

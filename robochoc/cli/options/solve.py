@@ -13,6 +13,7 @@ import click
 
 from robochoc.cli.options.local_problems import limits
 from robochoc.cli.options.order import GIVEN
+from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.options.value_types import NameOrFile, Number, ProtocolName, WholeNumber
@@ -86,6 +87,15 @@ preprocess_option = click.option(
     type=click.Choice(["ac"]),
     metavar="ac",
     help="Before the search, make domains arc consistent: ac.",
+)
+start_option = click.option(
+    "--start",
+    type=InputPath(),
+    metavar="FILE",
+    help="Begin from the assignment in a JSON result or a journal.",
+)
+cold_option = click.option(
+    "--cold", is_flag=True, help="If the problem changes, do not begin from the previous assignment."
 )
 cluster_option = click.option(
     "--cluster",
@@ -204,7 +214,10 @@ class Outputs:
 
 @dataclass(frozen=True)
 class TeamRequest:
-    """The options that apply to each team: its order (None: not given), how its files are read, and what is printed."""
+    """The options that apply to each team: its order (None: not given), how its files are read, and what is printed.
+
+    `start` is the file with the assignment from which the search begins.
+    """
 
     order: str | Path | None
     dialect: str | None
@@ -213,6 +226,7 @@ class TeamRequest:
     as_json: bool
     explain: bool
     ros: RosOptions
+    start: Path | None = None
 
 
 def channel_for(channel: str | Path | None) -> ChannelModel | None:
@@ -279,6 +293,7 @@ def _pop_options(arguments: dict[str, Any]) -> Options:
         ),
         cache=not arguments.pop("no_cache"),
         settings=protocol_settings(arguments.pop("settings_given")),
+        warm=not arguments.pop("cold"),
         channel=channel,
         **{name: arguments.pop(name) for name in _SAME_NAMES},
     )
@@ -293,6 +308,10 @@ def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, t
     if options.count and options.protocol == "central" and (outputs or request.ros):
         nothing = "--ros" if request.ros else "--html, --journal, --serve or --sniff"
         raise click.UsageError(f"--count reports only a number: remove {nothing}")
+    if request.start and options.protocol == "central":
+        raise click.UsageError("--start is for robots, not for --protocol central: remove --start")
+    if request.start and teams > 1:
+        raise click.UsageError(f"--start accepts one team; {teams} were found")
     if options.bounds and not outputs.journal:
         raise click.UsageError("--bounds writes to the journal: add --journal FILE")
     if options.runtime == "arrays" and (outputs.journal or outputs.sniffer):
