@@ -86,6 +86,7 @@ def repeat_commands(task: Task) -> str:
     words += [f"--withdraw={setup.withdraw}"] if setup.withdraw else []
     words += ["--preprocess", setup.preprocess] if setup.preprocess else []
     words += ["--answer", setup.answer] if setup.answer != "best" else []
+    words += ["--cold"] * setup.cold
     words += ["--verify"] * setup.verify
     words += ["--owner", str(problem.parameters["owner"])] if problem.path and "owner" in problem.parameters else []
     words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]

@@ -69,6 +69,7 @@ class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
     withdraw: str | None = None
     preprocess: str | None = None
     answer: str = "best"
+    cold: bool = False
     verify: bool = False
 
 

@@ -25,7 +25,7 @@ _ARGUMENTS = {
     "host": "hosts",
 }
 """Options whose Python argument has another name. All other arguments have the option's name, with underscores."""
-_FLAGS = {"allow-code": "allow_code=True"}
+_FLAGS = {"allow-code": "allow_code=True", "cold": "cold=True"}
 """Options without a value that a message tells the user to add."""
 _WORDS = {
     "runtime": "processes|simulator|network|arrays",

@@ -64,7 +64,7 @@ class Solvable(ABC):
         withdraw: str | bool | None = None,
         settings: Mapping[str, object] = {},
         start: Mapping[Any, object] | Outcome | None = None,
-        warm: bool = True,
+        cold: bool = False,
         observer: Observer | None = None,
         environment: Environment | None = None,
         seed: int = 0,
@@ -116,7 +116,7 @@ class Solvable(ABC):
             settings: Settings of the protocol, by name.
             start: The assignment from which the robots begin: the values of some or all variables, or an earlier
                 solution. If it is a solution, complete protocols search only for lower costs. None: no assignment.
-            warm: True if the robots begin each later epoch of a changing problem from the previous assignment.
+            cold: True if, after a change of the problem, the robots do not begin from the last assignment.
             observer: Called with every event of the run.
             environment: A function that is called with each answer, and returns the next changes of the problem.
             seed: The seed of the simulator, of the order `random`, and of randomised protocols.

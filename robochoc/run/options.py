@@ -147,8 +147,8 @@ class Options:
             scheduler's file (None: this process).
         start: The values from which the search begins, by variable (None: the variable's robot withdraws). Variables
             without a start value begin as in any run.
-        warm: True if each later epoch begins from the previous epoch's assignment. Dynamic protocols begin with their
-            own knowledge in any case.
+        cold: True if later epochs do not begin from the last assignment. Dynamic protocols begin with their own
+            knowledge in any case.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
@@ -184,7 +184,7 @@ class Options:
     preprocess: Preprocess | None = None
     cluster: str | None = None
     start: Mapping[str, int | None] = field(default_factory=dict)
-    warm: bool = True
+    cold: bool = False
 
     def __post_init__(self) -> None:
         for name, given in vars(self).copy().items():
@@ -262,7 +262,7 @@ _CONVERTERS = MappingProxyType(
         "preprocess": optional(one_of(Preprocess)),
         "cluster": optional(text),
         "start": start_values,
-        "warm": flag,
+        "cold": flag,
     }
 )
 """The converter for each field of `Options`. A field without a converter cannot be set."""

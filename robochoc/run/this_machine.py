@@ -252,13 +252,15 @@ class ThisMachine(Deployment):
         self._watch(self._phase or phase, start, session)
 
     def _next_parameters(self, team: Team) -> RunParameters:
-        """Return the parameters of the next epoch, whose team is `team`. It begins from the previous assignment.
+        """Return the parameters of the next epoch, whose team is `team`. It begins from the last assignment.
 
         Dynamic protocols begin with their own knowledge instead.
         """
         assert self._phase is not None  # noqa: S101 - for mypy: set before the first epoch
-        warm = self.options.warm and not self._phase.traits.dynamic
-        self._phase = self._phase.beginning_with(start_in(team, self.epochs[-1].assignment if warm else {}))
+        last: Mapping[str, int] = {}
+        if not (self.options.cold or self._phase.traits.dynamic):
+            last = next((epoch.assignment for epoch in reversed(self.epochs) if epoch.assignment), {})
+        self._phase = self._phase.beginning_with(start_in(team, last))
         return self._phase.parameters
 
     def _restart(self) -> None:

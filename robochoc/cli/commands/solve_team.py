@@ -91,7 +91,7 @@ def _start_in(file: Path, problem: ReadProblem) -> StartValues:
     try:
         return start_of_outcome(outcome, team_after_events(problem.team, events=0), problem.names)
     except OptionError as unfit:
-        raise Failure(INVALID, f"{file}: {unfit}") from None
+        raise Failure(INVALID, f"{file}: {str(unfit).removeprefix('start: ')}") from None
 
 
 class _FinishedRun(NamedTuple):

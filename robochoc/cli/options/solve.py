@@ -95,7 +95,7 @@ start_option = click.option(
     help="Begin from the assignment in a JSON result or a journal.",
 )
 cold_option = click.option(
-    "--cold", is_flag=True, help="If the problem changes, do not begin from the previous assignment."
+    "--cold", is_flag=True, help="After a change of the problem, do not begin from the last assignment."
 )
 cluster_option = click.option(
     "--cluster",
@@ -144,7 +144,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
-    "central_with", "cluster", "answer",
+    "central_with", "cluster", "answer", "cold",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 
@@ -293,7 +293,6 @@ def _pop_options(arguments: dict[str, Any]) -> Options:
         ),
         cache=not arguments.pop("no_cache"),
         settings=protocol_settings(arguments.pop("settings_given")),
-        warm=not arguments.pop("cold"),
         channel=channel,
         **{name: arguments.pop(name) for name in _SAME_NAMES},
     )
