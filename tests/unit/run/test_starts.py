@@ -16,7 +16,7 @@ from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, RemoveValue, ScenarioEvent, Team
 from robochoc.modelling.terms import ModelVariable
-from robochoc.run import Options, Runtime, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.evaluation import Search, evaluate_search
 from robochoc.run.known_costs import KnownCosts
 from robochoc.run.phases import RunPhase
@@ -101,11 +101,11 @@ def test_only_possible_values_begin_a_search() -> None:
 
 def test_robots_that_had_withdrawn_begin_withdrawn() -> None:
     team = pair(values=1)
-    outcome = solve(team, replace(SIMULATED, withdraw="minimum"))
+    outcome = solve(team, replace(SIMULATED, withdraw=Withdrawal.MINIMUM))
     (out,) = outcome.withdrawn
     start = start_of_outcome(outcome, team)
     assert start[out.removeprefix("R")] is None
-    again = solve(team, replace(SIMULATED, withdraw="minimum", start=start))
+    again = solve(team, replace(SIMULATED, withdraw=Withdrawal.MINIMUM, start=start))
     assert (again.verdict, again.withdrawn, dict(again.assignment)) == (
         Verdict.OPTIMAL,
         outcome.withdrawn,
