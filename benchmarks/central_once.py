@@ -44,7 +44,7 @@ def _by_ortools(told: dict[str, Any]) -> float | None:
 
 
 def _by_toulbar2(told: dict[str, Any]) -> float | None:
-    import pytoulbar2  # type: ignore[import-not-found]  # noqa: PLC0415 - only where it is asked
+    import pytoulbar2  # noqa: PLC0415 - only where it is asked
 
     rows_of = [rows for _, rows in told["constraints"]]
     forbidden = 1 + sum(max((cost for cost in rows if cost is not None), default=0) for rows in rows_of)

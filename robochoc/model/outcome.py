@@ -222,6 +222,8 @@ class Answer:
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
         confirmed: True if the central solver was called, and has found the same `no-solution` or the same minimum cost.
         confirmed_by: The names of the solvers that have found the same result, on the machine of the run.
+        solved_by: The names of the solvers that found the answer, with the protocol `central`; several, if independent
+            parts of the problem had different solvers.
         checked: The number of checked constraints in a run across machines, by the robots that checked them.
         preprocessing: The result of preprocessing, if it was requested.
         optima: The optima, or the solutions, if the protocol lists them.
@@ -249,6 +251,7 @@ class Answer:
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
     confirmed_by: tuple[str, ...] = ()
+    solved_by: tuple[str, ...] = ()
     checked: CheckCounts | None = None
     preprocessing: Preprocessing | None = None
     optima: Optima | None = None
@@ -323,7 +326,7 @@ class Outcome(Answer):
         return hash((self.team, self.protocol, self.seed, self.verdict, frozenset(self.assignment.items())))
 
     def same_answer(self, other: Outcome) -> bool:
-        """Return whether `other` is equal except for measurements: times, and memory of processes.
+        """Return whether `other` is equal except for measurements (times, memory) and `solved_by`, which may vary.
 
         Runs of the same problem with the same options and seed have the same answer in the simulator.
         """
@@ -369,6 +372,7 @@ def _without_measurements(answer: Answer, kind: type[Answer]) -> dict[str, objec
     """Return the fields of `kind` by name, with 0 for measured times and memory."""
     parts = answer.parts(kind)
     parts["metrics"] = _counts(answer.metrics)
+    parts["solved_by"] = ()  # solvers that run in parallel
     parts["improvements"] = [one._replace(at_s=0.0) for one in answer.improvements]
     if answer.preprocessing is not None:
         parts["preprocessing"] = replace(answer.preprocessing, metrics=_counts(answer.preprocessing.metrics))

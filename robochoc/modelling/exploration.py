@@ -103,7 +103,8 @@ class _Searches:
     @property
     def can_list(self) -> bool:
         """True if the central solver can list the other solutions instead of searching for each."""
-        ace = self._options.get("central_with", CentralSolverName.ACE) == CentralSolverName.ACE
+        solver = self._options.get("central_with", CentralSolverName.AUTO)
+        ace = solver in {CentralSolverName.AUTO, CentralSolverName.ACE}
         return self.found[0].protocol == CENTRAL and ace and self._options.keys() <= LISTING_OPTIONS
 
     @property

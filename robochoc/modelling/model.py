@@ -322,7 +322,7 @@ class Model(Solvable):
 
         Searches start when their solutions are requested. Solutions differ in at least one value. `central` lists many
         solutions in one search, and sorts up to 100,000 solutions with costs; for more, and for other protocols,
-        `central_with="ortools"` or a `journal`, each solution is a search. `timeout` limits each search.
+        a `central_with` other than ACE, or a `journal`, each solution is a search. `timeout` limits each search.
 
         Args:
             protocol: The protocol, or `central`: a single solver that knows the constraints of all robots.

@@ -76,7 +76,7 @@ class Solvable(ABC):
         cycles: int | None = None,
         verify: bool = False,
         count: bool = False,
-        central_with: str = CentralSolverName.ACE,
+        central_with: str = CentralSolverName.AUTO,
         cache: bool = True,
         local: CompileLimits = NO_LIMITS,
         schedule: str = ScheduleName.CONCURRENT,
@@ -127,9 +127,10 @@ class Solvable(ABC):
             messages: A limit on the number of messages. None: no limit.
             ncccs: A limit on non-concurrent constraint checks, for the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
-            verify: True if the central solver checks a `no-solution` or a minimum cost found by the robots.
+            verify: True if central solvers check a `no-solution` or a minimum cost found by others.
             count: True to count: the protocol `central` counts all solutions, and `count-dpop` counts all optima.
-            central_with: The solver of the protocol `central`: `ace` or `ortools`.
+            central_with: The solver of the protocol `central`: `auto`, `ace`, `ortools`, `toulbar2` or
+                `cosoco`.
             cache: True if solutions of local problems are stored in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.

@@ -10,7 +10,7 @@ from robochoc.model.change import describe_change, team_after_events
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
-from robochoc.model.problem import ProblemKind, Team
+from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.model.team_edits import dropped_constraints
 from robochoc.run.context import RunContext
 from robochoc.run.defaults import CENTRAL
@@ -21,7 +21,7 @@ from robochoc.solver.errors import SolverLostError
 from robochoc.verification.absence_reason import absence_reason
 from robochoc.verification.checker import assignment_cost, robots_without_values
 from robochoc.verification.objective import withdrawal_cost
-from robochoc.verification.second_opinion import total_cost
+from robochoc.verification.second_opinion import confirmed, total_cost
 
 
 class _Decision(NamedTuple):
@@ -49,7 +49,7 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
     last = len(team.scenario)
     with AceProcess(always=options.local.always_ace) as warm:
         solver = context.deciding_solver(warm)
-        decisions = [_decide(solver, team_after_events(team, number), options) for number in range(last + 1)]
+        decisions = [_decide(solver, team_after_events(team, number), context) for number in range(last + 1)]
     answer, solutions = decisions[-1]
     epochs = tuple(
         decision.answer.as_epoch(team_after_events(team, number).order, _opened_by(team, number))
@@ -67,18 +67,35 @@ def _opened_by(team: Team, number: int) -> str:
     return ", ".join(describe_change(change, team) for change in team.scenario[number - 1].changes) or "nothing"
 
 
-def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
+def _decide(solver: TeamSolver, team: Team, context: RunContext) -> _Decision:
     """Decide one epoch, and check the answer."""
     began = time.monotonic()
+    options = context.options
     solutions = None
     if options.count:
         found = solver.solve(team, count=True)
-        answer, solutions = PhaseAnswer(found.verdict), found.count
+        answer, solutions = PhaseAnswer(found.verdict, solved_by=found.solvers), found.count
     else:
         answer = _answer(solver, team, options)
     if answer.verified:
         check_assignment(team, answer.assignment, answer.withdrawn, maximal=answer.verdict != Verdict.UNKNOWN)
+    if options.verify:
+        answer = _confirmed(context, team, answer)
     return _Decision(replace(answer, metrics=Metrics(wall_s=time.monotonic() - began)), solutions)
+
+
+def _confirmed(context: RunContext, team: Team, answer: PhaseAnswer) -> PhaseAnswer:
+    """Return the answer, confirmed by a solver that has not found it, if it is a proof."""
+    if answer.verdict not in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
+        return answer
+    options = context.options
+    price = int(withdrawal_cost(team)) if options.withdraw is not None and answer.withdrawn else None
+    if options.withdraw is not None and answer.verdict == Verdict.NO_SOLUTION:
+        price = int(withdrawal_cost(team))
+    total = INFINITE if answer.verdict == Verdict.NO_SOLUTION else total_cost(team, answer.assignment, price)
+    solver = context.solver_without(answer.solved_by)
+    names = confirmed([solver], team, CENTRAL, total=total, withdrawal_cost=price)
+    return answer.confirmed_as(names) if names else answer
 
 
 def _answer(solver: TeamSolver, team: Team, options: Options) -> PhaseAnswer:
@@ -122,5 +139,6 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
         withdrawn=withdrawn,
         bound=bound,
         verified=has_answer,
+        solved_by=found.solvers,
         dropped_constraints=dropped_constraints(team, withdrawn) if has_answer else (),
     )

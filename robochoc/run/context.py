@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,7 @@ from robochoc.solver.compile import TeamCompiler
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
     from robochoc.solver.central import CentralSolver, TeamSolver
-    from robochoc.solver.cp_sat import CpSatSolver
+    from robochoc.solver.solver_choice import AutoSolver
 
 
 class RunContext:
@@ -69,21 +69,39 @@ class RunContext:
 
     def deciding_solver(self, warm: AceProcess) -> TeamSolver:
         """Return the solver of the merged problem. ACE runs in `warm`, unless the run already has a process."""
-        if self.options.central_with == CentralSolverName.ORTOOLS:
-            return self.cp_sat_solver()
-        return self.central_solver(warm)
+        match self.options.central_with:
+            case CentralSolverName.AUTO if not self.options.local.always_ace:
+                return self._auto_solver(warm)
+            case CentralSolverName.AUTO | CentralSolverName.ACE:
+                return self.central_solver(warm)
+            case name:
+                return self._external_solver(name)
 
-    def cp_sat_solver(self) -> CpSatSolver:
-        """Return a central solver for this run that uses OR-Tools."""
-        from robochoc.solver.cp_sat import CpSatSolver  # noqa: PLC0415 - start-up: rarely needed
+    def _auto_solver(self, warm: AceProcess | None, without: Sequence[str] = ()) -> AutoSolver:
+        """Return a central solver that chooses the solvers, except those named in `without`."""
+        from robochoc.solver.solver_choice import AutoSolver  # noqa: PLC0415 - start-up: rarely needed
 
-        return CpSatSolver(self.deadline, partial(self.show_stage, "OR-Tools decides the whole team"))
+        show = partial(self.show_stage, "the central solver decides the whole team")
+        return AutoSolver(self.cache, self.deadline, show, self.solver or warm, without)
+
+    def _external_solver(self, name: str) -> TeamSolver:
+        """Return a central solver that uses one external program."""
+        from robochoc.solver.external_programs import PROGRAMS  # noqa: PLC0415 - start-up: rarely needed
+        from robochoc.solver.solver_choice import only  # noqa: PLC0415 - the same
+
+        program = PROGRAMS[name]
+        return only(program, self.deadline, partial(self.show_stage, f"{program.name} decides the whole team"))
 
     def second_opinions(self) -> list[TeamSolver]:
-        """Return the solvers that check proofs by robots: the central solver, and OR-Tools if it is installed."""
-        from robochoc.solver.cp_sat import is_installed  # noqa: PLC0415 - start-up: rarely needed
+        """Return the solvers that check proofs by robots: the best one, and OR-Tools if it is installed."""
+        from robochoc.solver.external_programs import CP_SAT  # noqa: PLC0415 - start-up: rarely needed
 
-        return [self.central_solver(), *([self.cp_sat_solver()] if is_installed() else [])]
+        opinions: list[TeamSolver] = [self.solver_without(())]
+        return [*opinions, self._external_solver(CP_SAT.extra)] if CP_SAT.is_installed() else opinions
+
+    def solver_without(self, names: Sequence[str]) -> TeamSolver:
+        """Return a central solver that uses none of the solvers `names`."""
+        return self._auto_solver(None, names)
 
     def central_solver(self, warm: AceProcess | None = None) -> CentralSolver:
         """Return a central solver. It uses the process `warm`, unless the run already has a process."""

@@ -93,10 +93,13 @@ class AnswerRule(StrEnum):
 
 
 class CentralSolverName(StrEnum):
-    """The solver of the merged problem: ACE, or CP-SAT of OR-Tools."""
+    """The solver of the merged problem: the best installed one, ACE, CP-SAT of OR-Tools, toulbar2 or cosoco."""
 
+    AUTO = "auto"
     ACE = "ace"
     ORTOOLS = "ortools"
+    TOULBAR2 = "toulbar2"
+    COSOCO = "cosoco"
 
 
 @dataclass(frozen=True)
@@ -126,8 +129,7 @@ class Options:
         cache: True if solutions of local problems are stored in the user's cache folder.
         count: True if solutions, or optima, are counted.
         central_with: The central solver of `CENTRAL`.
-        verify: True if the central solver, and OR-Tools if it is installed, check a `no-solution` or a minimum cost
-            that robots have found.
+        verify: True if central solvers that have not found it themselves check a `no-solution` or a minimum cost.
         order: The total priority order of the robots: its name, or the robots' names (None: the order of the files).
         messages: A limit on the number of messages (None: no limit).
         ncccs: A limit on non-concurrent constraint checks, in the simulator (None: no limit).
@@ -165,7 +167,7 @@ class Options:
     local: CompileLimits = field(default_factory=CompileLimits)
     cache: bool = True
     count: bool = False
-    central_with: CentralSolverName = CentralSolverName.ACE
+    central_with: CentralSolverName = CentralSolverName.AUTO
     verify: bool = False
     order: Order | tuple[str, ...] | None = None
     messages: int | None = None

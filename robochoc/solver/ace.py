@@ -51,9 +51,10 @@ from robochoc.solver.enumeration import (
     minimum_solution,
 )
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
-from robochoc.solver.linear import Formula, Junction, Operand, conjuncts, renamed
+from robochoc.solver.linear import Operand, conjuncts, renamed
 from robochoc.solver.process_socket import start_by_port
 from robochoc.solver.propagation import propagate
+from robochoc.solver.xcsp3_formula import in_xcsp3
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import signals_delayed
@@ -258,6 +259,17 @@ class AceProcess:
         self._send_task(task, deadline)
         return True
 
+    def without_search(self, network: Network, costs: Costs = (), deadline: float | None = None) -> SolverAnswer | None:
+        """Return one solution, the cheapest with `costs`, by propagation or enumeration. None: the task is not small.
+
+        Raises:
+            TimeLimitError: if the deadline passes.
+        """
+        question = Query.of(computed_by(deadline, propagate, network), 1, count_only=False, costs=costs)
+        if question.trivial:
+            return question.answered(1, complete=True, solutions=[()], means=SolvedBy.PROPAGATION)
+        return computed_by(deadline, self._small, question, STEPS_EACH)
+
     def answer(self, deadline: float | None = None) -> SolverAnswer:
         """Return the answer to the current task. Raises the errors of `solve`.
 
@@ -328,12 +340,12 @@ class AceProcess:
         self._tasks = 0
         self._searching = False
 
-    def _small(self, question: Query) -> SolverAnswer | None:
-        """Return the answer by enumeration. None: enumeration takes too many steps.
+    def _small(self, question: Query, steps: int | None = None) -> SolverAnswer | None:
+        """Return the answer by enumeration. None: enumeration takes more than `steps`.
 
-        The step limit is about the time of a query to ACE, including the start of ACE if it is not running.
+        The default is about the time of a query to ACE, including the start of ACE if it is not running.
         """
-        budget = Budget(STEPS_EACH + (self._steps_left if self._socket is None else 0))
+        budget = Budget(STEPS_EACH + (self._steps_left if self._socket is None else 0) if steps is None else steps)
         try:
             if question.costs:
                 best = minimum_solution(question.asked, budget, question.costs)
@@ -471,21 +483,6 @@ def _left_s(deadline: float | None) -> float | None:
     return None if deadline is None else min(max(1e-3, deadline - time.monotonic()), LONGEST_WAIT_S)
 
 
-def _in_xcsp3(formula: Formula) -> str:
-    """Return `formula` as an XCSP3 predicate without negative numbers."""
-    if isinstance(formula, Junction):
-        return f"{'and' if formula.every else 'or'}({','.join(map(_in_xcsp3, formula.parts))})"
-    left: list[str] = []
-    right: list[str] = []
-    for place, factor in formula.terms:
-        term = f"x{place}" if abs(factor) == 1 else f"mul(x{place},{abs(factor)})"
-        (left if factor > 0 else right).append(term)
-    if formula.bound:
-        (right if formula.bound > 0 else left).append(str(abs(formula.bound)))
-    sides = (side[0] if len(side) == 1 else f"add({','.join(side)})" if side else "0" for side in (left, right))
-    return f"{formula.sign}({','.join(sides)})"
-
-
 def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Costs = ()) -> AceTask:
     rows: dict[tuple[Codes, ...], int] = {}
     forms = [
@@ -500,5 +497,5 @@ def _task(network: Network, limit: int | None, *, count_only: bool, strategy: St
         count_only=count_only,
         strategy=strategy,
         costs=list(costs),
-        formulas=[_in_xcsp3(formula) for whole in network.formulas for formula in conjuncts(whole)],
+        formulas=[in_xcsp3(formula) for whole in network.formulas for formula in conjuncts(whole)],
     )

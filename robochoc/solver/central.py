@@ -12,7 +12,7 @@ import select
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Protocol
 
 from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
@@ -41,6 +41,9 @@ HEDGE_S = 5.0
 """The time without an answer, in seconds, after which the second strategy starts in parallel."""
 _TICK_S = 0.2
 NO_SOLUTIONS = SolverAnswer(0, complete=True, solutions=())
+ENUMERATION = "enumeration"
+"""The name of the solver of small components, in `CentralAnswer.solvers`."""
+ACE = "ACE"
 
 
 @dataclass(frozen=True)
@@ -53,6 +56,7 @@ class CentralAnswer:
         count: The number of solutions, if requested.
         cost: The cost of the assignment, if costs are minimised.
         bound: A lower bound on the cost of all assignments, if costs are minimised.
+        solvers: The names of the solvers that found the answer. Several, if they solved different components.
     """
 
     verdict: Verdict
@@ -60,6 +64,7 @@ class CentralAnswer:
     count: int | None = None
     cost: int | None = None
     bound: int | None = None
+    solvers: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -76,7 +81,7 @@ class _SearchRequest:
 
 
 class TeamSolver(Protocol):
-    """A solver of whole teams: `CentralSolver` or `CpSatSolver` (`solver/cp_sat.py`)."""
+    """A solver of whole teams: `CentralSolver` or `RacingSolver` (`solver/racing.py`)."""
 
     @property
     def name(self) -> str:
@@ -110,6 +115,7 @@ class CentralSolver:
         self._deadline = deadline
         self._progress = progress
         self._tables: dict[Network, tuple[Codes, ...] | None] = {}
+        self._used: set[str] = set()
 
     def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
         """Solve `team`, or count its solutions.
@@ -128,12 +134,18 @@ class CentralSolver:
             SolverLostError: if the solver's process died.
             UnsupportedError: if a constraint or its costs are too large.
         """
+        self._used.clear()
         try:
             if withdrawal_cost is not None or (team.kind == ProblemKind.DISWCSP and not count):
-                return self._minimum(team, computed_by(self._deadline, priced_components, team, withdrawal_cost))
-            return self._all_components(team, count=count)
+                parts = computed_by(self._deadline, priced_components, team, withdrawal_cost)
+                answer = self._minimum(team, parts)
+            else:
+                answer = self._all_components(team, count=count)
         except (SolverTimeoutError, TimeLimitError):
             return CentralAnswer(Verdict.UNKNOWN)
+        if answer.verdict != Verdict.UNKNOWN and not self._used:
+            self._used.add(ENUMERATION)
+        return replace(answer, solvers=tuple(sorted(self._used)))
 
     def solutions(self, team: Team, limit: int | None = None, timeout_s: float | None = None) -> Iterator[Assignment]:
         """Yield each assignment without violated hard constraints once. Costs are ignored.
@@ -232,7 +244,9 @@ class CentralSolver:
                 self._watch(ace)
             answer = ace.answer(self._deadline)
         except SolverTimeoutError as over:
+            self._used.add(ACE)
             return over.best, False
+        self._used.add(_solver_name(answer))
         return (answer.solutions[0] if answer.found else None), True
 
     def _watch(self, ace: AceProcess) -> None:
@@ -269,7 +283,11 @@ class CentralSolver:
 
     def _search(self, network: Network, ace: AceProcess, spare: AceProcess, request: _SearchRequest) -> SolverAnswer:
         strong = computed_by(self._deadline, with_cliques, network, lambda clique: self._table(ace, clique))
-        return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, request)
+        if strong.impossible:
+            return NO_SOLUTIONS
+        answer = self._race(strong, ace, spare, request)
+        self._used.add(_solver_name(answer))
+        return answer
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
         """Return all solutions of a clique. None: there are too many, or the search takes too long."""
@@ -280,6 +298,7 @@ class CentralSolver:
     def _known_or_solved(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
         known = self._cache.get(clique) if self._cache else None
         if known is not None:
+            self._used.add(ACE)  # the cache contains only answers of ACE
             return known if len(known) <= MAX_CLIQUE_ROWS else None
         patience = time.monotonic() + TABLE_PATIENCE_S
         deadline = patience if self._deadline is None else min(patience, self._deadline)
@@ -289,6 +308,7 @@ class CentralSolver:
             if self._deadline is not None and deadline == self._deadline:
                 raise
             return None
+        self._used.add(_solver_name(answer))
         if not answer.complete or answer.found > MAX_CLIQUE_ROWS:
             return None
         if self._cache and answer.means == SolvedBy.ACE:
@@ -321,3 +341,7 @@ class CentralSolver:
 
     def _patience(self) -> float:
         return _TICK_S if self._deadline is None else max(0.0, min(_TICK_S, self._deadline - time.monotonic()))
+
+
+def _solver_name(answer: SolverAnswer) -> str:
+    return ACE if answer.means == SolvedBy.ACE else ENUMERATION

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.solver.central import CentralAnswer, TeamSolver
+from robochoc.solver.central import ACE, ENUMERATION, CentralAnswer, TeamSolver
 from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
 
 
@@ -36,17 +36,26 @@ def confirmed(
     Raises:
         RefutedError: if a solver has found a different result.
     """
-    agreeing = []
+    agreeing: dict[str, None] = {}
     for solver in solvers:
+        if solver.name in agreeing:
+            continue
         opinion = solver.solve(team, withdrawal_cost=withdrawal_cost)
         against = contradiction(opinion, total)
         if against or (alone is not None and has_local_solution(team[alone])):
             claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
-            found = f"{team.name} has {claim}, but {solver.name} has found {against or 'one'}"
+            name = " and ".join(_names(solver, opinion))
+            found = f"{team.name} has {claim}, but {name} has found {against or 'one'}"
             raise RefutedError(f"{protocol} claims that {found}")
         if opinion.verdict != Verdict.UNKNOWN:
-            agreeing.append(solver.name)
+            agreeing |= dict.fromkeys(_names(solver, opinion))
     return tuple(agreeing)
+
+
+def _names(solver: TeamSolver, opinion: CentralAnswer) -> tuple[str, ...]:
+    """Return the solvers that found `opinion`: the central solver, instead of ACE and enumeration, and the others."""
+    names = [name for name in opinion.solvers if name not in {ACE, ENUMERATION}]
+    return (*([CENTRAL_SOLVER] if len(names) < len(opinion.solvers) else []), *names) or (solver.name,)
 
 
 def contradiction(opinion: CentralAnswer, total: float) -> str | None:

@@ -14,27 +14,27 @@ from unittest.mock import patch
 
 from robochoc.solver import ace
 from robochoc.solver.ace import AceProcess
-from robochoc.solver.cp_sat import CpSatSolver
-from robochoc.solver.cp_sat_messages import CpSatAnswer, CpSatTask
+from robochoc.solver.external_process import ExternalProcess
+from robochoc.solver.external_programs import PROGRAMS
 from tests.support.leftovers import shared_by_tests
 
 _PROCESS = ("_process", "_folder", "_socket", "_lifeline", "_tasks")
 """The attributes of an `AceProcess` that are its process."""
-_CP_SAT = ("_process", "_socket")
-"""The same of a `CpSatSolver`."""
+_EXTERNAL = ("_process", "_socket")
+"""The same of an `ExternalProcess`."""
 
 
 class AceStable:
-    """Keeps the processes of ACE and of OR-Tools that no test uses at the moment; usually one of each."""
+    """Keeps the processes of ACE and of external solvers that no test uses at the moment; usually one of each."""
 
     def __init__(self) -> None:
         self._idle: list[dict[str, Any]] = []
-        self._idle_cp_sat: list[dict[str, Any]] = []
+        self._idle_external: dict[str, list[dict[str, Any]]] = {extra: [] for extra in PROGRAMS}
 
     @contextmanager
     def lent(self) -> Iterator[None]:
         """While this lasts, a solver that starts takes over an idle process, and one that is closed leaves it."""
-        with self._ace_lent(), self._cp_sat_lent():
+        with self._ace_lent(), self._external_lent():
             yield
 
     @contextmanager
@@ -59,30 +59,25 @@ class AceStable:
             yield
 
     @contextmanager
-    def _cp_sat_lent(self) -> Iterator[None]:
-        start, asked, close = vars(CpSatSolver)["_start"], vars(CpSatSolver)["_solve_task"], CpSatSolver.close
+    def _external_lent(self) -> Iterator[None]:
+        start, close = vars(ExternalProcess)["_start"], ExternalProcess.close
 
-        def take_over(solver: CpSatSolver) -> object:
-            if not self._idle_cp_sat:
+        def take_over(solver: ExternalProcess) -> object:
+            idle = self._idle_external[solver.program.extra]
+            if not idle:
                 with shared_by_tests():
                     return start(solver)
-            vars(solver).update(self._idle_cp_sat.pop())
+            vars(solver).update(idle.pop())
             return vars(solver)["_socket"]
 
-        def ask(solver: CpSatSolver, task: CpSatTask) -> CpSatAnswer:
-            vars(solver)["asked"] = True  # a solver that is closed meanwhile is not fit for others
-            answer: CpSatAnswer = asked(solver, task)
-            vars(solver)["asked"] = False
-            return answer
-
-        def leave(solver: CpSatSolver) -> None:
+        def leave(solver: ExternalProcess) -> None:
             parts = vars(solver)
-            if _runs(parts) and not parts.get("asked"):
-                self._idle_cp_sat.append({name: parts[name] for name in _CP_SAT})
-                parts.update(dict.fromkeys(_CP_SAT))
+            if _runs(parts) and parts["_task"] is None:
+                self._idle_external[solver.program.extra].append({name: parts[name] for name in _EXTERNAL})
+                parts.update(dict.fromkeys(_EXTERNAL))
             close(solver)
 
-        with patch.multiple(CpSatSolver, _start=take_over, _solve_task=ask, close=leave):
+        with patch.multiple(ExternalProcess, _start=take_over, close=leave):
             yield
 
     def warm(self) -> None:
@@ -93,11 +88,15 @@ class AceStable:
 
     def close(self) -> None:
         """End all processes."""
-        for kind, idle in ((AceProcess, self._idle), (CpSatSolver, self._idle_cp_sat)):
+        while self._idle:
+            solver = AceProcess()
+            vars(solver).update(self._idle.pop())
+            solver.close()
+        for extra, idle in self._idle_external.items():
             while idle:
-                solver = kind()
-                vars(solver).update(idle.pop())
-                solver.close()
+                process = ExternalProcess(PROGRAMS[extra])
+                vars(process).update(idle.pop())
+                process.close()
 
 
 def _runs(parts: dict[str, Any]) -> bool:

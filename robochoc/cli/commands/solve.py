@@ -178,10 +178,10 @@ _SECTIONS: Sections = {
 @click.option(
     "--with",
     "central_with",
-    type=click.Choice(["ace", "ortools"], case_sensitive=False),
-    default="ace",
+    type=click.Choice(["auto", "ace", "ortools", "toulbar2", "cosoco"], case_sensitive=False),
+    default="auto",
     metavar="NAME",
-    help="--protocol central: ace (default) or ortools.",
+    help="--protocol central: auto (default), ace, ortools, toulbar2, cosoco.",
 )
 @click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum by a central solver.")
 @local_options

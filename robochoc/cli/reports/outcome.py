@@ -114,7 +114,8 @@ def _place(team: Team, outcome: Outcome) -> str:
             joined = " on a network" * (outcome.runtime == "network")
             return f"{len(team.robots)} process{'es' * (len(team.robots) != 1)}{joined}{seed}"
         case "central":
-            return "one model of all files merged"
+            solvers = f", solved by {' and '.join(outcome.solved_by)}" if outcome.solved_by else ""
+            return f"one model of all files merged{solvers}"
         case _:
             return f"{outcome.runtime}, seed {outcome.seed}"
 

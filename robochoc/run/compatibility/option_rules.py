@@ -87,8 +87,9 @@ OPTION_RULES = (
         "add --runtime simulator --schedule cycles (a local search has its own number of cycles: --set cycles=N)",
     ),
     OptionRule(
-        lambda o: o.protocol == CENTRAL and o.verify,
-        "--verify calls the central solver: remove it, since --protocol central uses that solver already",
+        lambda o: o.protocol == CENTRAL and o.verify and o.count,
+        "--verify confirms a no-solution or an optimum, and not the number of solutions",
+        "remove --verify or --count",
     ),
     OptionRule(
         lambda o: o.patience is not None and (o.protocol == CENTRAL or o.runtime in _WITHOUT_PROCESSES),
@@ -127,13 +128,13 @@ OPTION_RULES = (
         "use --withdraw minimum",
     ),
     OptionRule(
-        lambda o: o.central_with != CentralSolverName.ACE and o.protocol != CENTRAL,
+        lambda o: o.central_with != CentralSolverName.AUTO and o.protocol != CENTRAL,
         "--with chooses the central solver",
         "add --protocol central",
     ),
     OptionRule(
-        lambda o: o.central_with == CentralSolverName.ORTOOLS and o.count,
-        "--count is only for ACE: OR-Tools does not count solutions",
+        lambda o: o.central_with not in {CentralSolverName.AUTO, CentralSolverName.ACE} and o.count,
+        "--count is only for ACE: the other central solvers find one solution",
         "remove --with",
     ),
     OptionRule(

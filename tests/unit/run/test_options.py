@@ -164,7 +164,7 @@ REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"channel": WLAN, "delay": 3}, "remove --delay and --schedule"),
     ({"delay": 3, "runtime": Runtime.PROCESSES}, "--delay and --schedule are only for the simulator"),
     ({"delay": 3, "schedule": ScheduleName.RANDOM}, "--delay is only for --schedule concurrent"),
-    ({"protocol": "central", "verify": True}, "--verify calls the central solver"),
+    ({"protocol": "central", "verify": True, "count": True}, "--verify confirms a no-solution or an optimum"),
     ({"patience": 1.0}, "--patience is only for robots that run as processes"),
     ({"protocol": "central", "messages": 5}, "--messages is for robots"),
     ({"protocol": "central", "order": ("RA", "RB")}, "--order is for robots"),

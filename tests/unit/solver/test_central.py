@@ -23,6 +23,7 @@ from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.cliques import cliques, with_cliques
 from robochoc.solver.encoding import Codes, CodeTable, Component, Network
 from robochoc.solver.errors import SolverLostError
+from robochoc.solver.solver_choice import AutoSolver
 from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetries
 from robochoc.solver.team_network import identifiers
 from robochoc.verification.checker import RefutedError
@@ -185,7 +186,7 @@ def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
 
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
+    monkeypatch.setattr(AutoSolver, "solve", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
     with pytest.raises(RefutedError, match="no solution, but the central solver has found one"):
         solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
 

@@ -21,6 +21,7 @@ from robochoc.protocols.message import Message
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run.options import CentralSolverName
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import AceSolutions
 from robochoc.solver.central import CentralAnswer, CentralSolver
@@ -46,7 +47,7 @@ from tests.support.solver_networks import misheard
 
 pytestmark = pytest.mark.usefixtures("shared_solvers")
 
-CENTRAL = Options(protocol="central")
+CENTRAL = Options(protocol="central", central_with=CentralSolverName.ACE)
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.MINIMUM)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]
 

@@ -19,6 +19,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Runtime, solve
+from robochoc.run.options import CentralSolverName
 from robochoc.solver import central
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import BEST
@@ -34,7 +35,7 @@ from tests.support.moved_clock import MovedClock
 from tests.support.problems import team_of
 from tests.support.solver_networks import queens_network
 
-CENTRAL = Options(protocol="central")
+CENTRAL = Options(protocol="central", central_with=CentralSolverName.ACE)
 SOON_S = 0.05
 
 

@@ -19,8 +19,9 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.solver import splitting
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralSolver
-from robochoc.solver.cp_sat import CpSatSolver
 from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.external_programs import CP_SAT
+from robochoc.solver.solver_choice import only
 from robochoc.solver.splitting import Split, split
 from tests.support.xcsp3_solvers import read_document
 
@@ -187,7 +188,7 @@ def test_both_central_solvers_find_the_least_cost_under_a_wide_sum(bound: int) -
             longer[after] = min(longer.get(after, cost + value * value), cost + value * value)
         least = longer
     expected = min((cost for total, cost in least.items() if total >= bound), default=None)
-    with CpSatSolver() as cp:
+    with only(CP_SAT) as cp:
         answers = [CentralSolver().solve(team), cp.solve(team)]
     assert [answer.cost for answer in answers] == [expected, expected]
     assert {answer.verdict for answer in answers} == {Verdict.NO_SOLUTION if expected is None else Verdict.OPTIMAL}

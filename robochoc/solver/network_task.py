@@ -1,4 +1,4 @@
-"""The messages between the OR-Tools process and its parent: msgpack, each after its length. Imports neither."""
+"""The messages between the process of an external solver and its parent: msgpack, each after its length."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ import struct
 import msgspec
 
 LENGTH = struct.Struct("!Q")
+MAX_LENGTH = 1 << 28
+"""The maximum size of an answer, in bytes."""
 
 
-class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
+class TaskTable(msgspec.Struct, frozen=True, array_like=True):
     """A table: `rows` are the allowed, or the forbidden, code tuples of the variables at positions `scope`."""
 
     scope: tuple[int, ...]
@@ -17,7 +19,7 @@ class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
     rows: tuple[tuple[int, ...], ...]
 
 
-class CpSatComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class TaskComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """The sum of `terms` (positions of variables with factors) compared by `sign` ("le", "eq", "ne") with `bound`."""
 
     terms: tuple[tuple[int, int], ...]
@@ -25,14 +27,14 @@ class CpSatComparison(msgspec.Struct, frozen=True, array_like=True, tag=True):
     bound: int
 
 
-class CpSatJunction(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class TaskJunction(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """A conjunction (`every`) or disjunction of `parts`."""
 
     every: bool
-    parts: tuple[CpSatComparison | CpSatJunction, ...]
+    parts: tuple[TaskComparison | TaskJunction, ...]
 
 
-class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class NetworkTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Find one solution; with `costs`, a solution with the least sum of the codes at these positions.
 
     A cost is the position of a variable and the unit of its codes. `domains` has the codes of each variable. `deadline`
@@ -40,13 +42,13 @@ class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """
 
     domains: tuple[tuple[int, ...], ...]
-    tables: tuple[CpSatTable, ...]
+    tables: tuple[TaskTable, ...]
     costs: tuple[tuple[int, int], ...] = ()
     deadline: float | None = None
-    formulas: tuple[CpSatComparison | CpSatJunction, ...] = ()
+    formulas: tuple[TaskComparison | TaskJunction, ...] = ()
 
 
-class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
+class TaskAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """The codes of a solution, if found; whether it is proven (or that there is none); a lower bound on the cost."""
 
     codes: tuple[int, ...] | None
@@ -54,11 +56,11 @@ class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
     bound: int = 0
 
 
-class CpSatFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
-    """An error; `missing` if OR-Tools is not installed."""
+class TaskFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """An error; `missing` if the solver's package cannot be imported."""
 
     why: str
     missing: bool = False
 
 
-FromCpSat = CpSatAnswer | CpSatFailed
+FromSolver = TaskAnswer | TaskFailed

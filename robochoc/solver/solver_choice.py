@@ -1,0 +1,73 @@
+"""The rules by which `--with auto` chooses a central solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from robochoc.model.outcome import CENTRAL_SOLVER
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.cache import SolutionCache
+from robochoc.solver.central import ACE, ENUMERATION, CentralAnswer, CentralSolver
+from robochoc.solver.errors import SolverMissingError
+from robochoc.solver.external_process import ExternalProcess
+from robochoc.solver.external_programs import COSOCO, CP_SAT, TOULBAR2, ExternalProgram
+from robochoc.solver.racing import AceRunner, RacingSolver, Runner
+
+FOR_COSTS = (TOULBAR2, CP_SAT)
+FOR_SATISFACTION = (CP_SAT, COSOCO)
+
+
+def programs(*, has_costs: bool) -> list[ExternalProgram]:
+    """Return the installed external solvers for problems with or without costs, the best first."""
+    return [one for one in (FOR_COSTS if has_costs else FOR_SATISFACTION) if one.is_installed()]
+
+
+class AutoSolver:
+    """Solves teams with the best installed solver (`programs`), and ACE in parallel if it takes long.
+
+    ACE alone counts solutions, and solves all problems if no external solver is installed. For the arguments see
+    `CentralSolver`; `without` are the names of solvers that must not be used.
+    """
+
+    name = CENTRAL_SOLVER
+
+    def __init__(
+        self,
+        cache: SolutionCache | None = None,
+        deadline: float | None = None,
+        progress: Callable[[], None] | None = None,
+        solver: AceProcess | None = None,
+        without: Sequence[str] = (),
+    ) -> None:
+        self._enumerates = ENUMERATION not in without
+        self._central = CentralSolver(
+            cache, deadline, progress, solver if self._enumerates else None, always_ace=not self._enumerates
+        )
+        self._deadline = deadline
+        self._progress = progress
+        self._without = frozenset(without)
+
+    def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
+        """Solve `team`. For the arguments, the answer and the errors see `CentralSolver.solve`."""
+        has_costs = withdrawal_cost is not None or team.kind == ProblemKind.DISWCSP
+        chosen = [one for one in programs(has_costs=has_costs) if one.name not in self._without]
+        may_use_ace = ACE not in self._without
+        if not chosen and not may_use_ace:
+            raise SolverMissingError(
+                f"--verify requires a solver other than ACE, which found the answer; run: {CP_SAT.install}"
+            )
+        if count or not chosen:
+            return self._central.solve(team, count=count, withdrawal_cost=withdrawal_cost)
+
+        runners: list[Runner] = [ExternalProcess(one) for one in chosen]
+        runners += [AceRunner()] if may_use_ace else []
+        racing = RacingSolver(self.name, runners, self._deadline, self._progress, enumerates=self._enumerates)
+        return racing.solve(team, withdrawal_cost=withdrawal_cost)
+
+
+def only(
+    program: ExternalProgram, deadline: float | None = None, progress: Callable[[], None] | None = None
+) -> RacingSolver:
+    """Return a central solver that uses `program` for all components."""
+    return RacingSolver(program.name, [ExternalProcess(program)], deadline, progress)
