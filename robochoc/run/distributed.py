@@ -18,6 +18,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
 from robochoc.run.options import Options
 from robochoc.run.phases import RunPhase, first_phase, second_phase
+from robochoc.run.starts import Start
 from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"
@@ -77,6 +78,10 @@ class Deployment(ABC):
         """Return `phase`, which begins with the start assignment in the options, if there is one."""
         return phase
 
+    def without_lost(self, phase: RunPhase) -> RunPhase:
+        """Return `phase` after robots were lost: the cost of its start assignment does not hold for the others."""
+        return phase.beginning_with(Start(phase.parameters.start))
+
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
         """Return the central solvers that confirm `answer`. Raises `RefutedError` if a solver refutes it."""
         return ()
@@ -93,7 +98,7 @@ class Deployment(ABC):
             RobotsLostError: if all robots were lost.
             RefutedError: if the check refutes the answer.
         """
-        search = self._search_without_losses(phase)
+        phase, search = self._search_without_losses(phase)
         answer = self.evaluated(phase, search)
         return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
 
@@ -160,18 +165,22 @@ class Deployment(ABC):
             return None
         return 0 if answer.verdict == Verdict.NO_SOLUTION else answer.count
 
-    def _search_without_losses(self, phase: RunPhase) -> Search:
-        """Search until no robot is lost during a search. The metrics include all these searches."""
+    def _search_without_losses(self, phase: RunPhase) -> tuple[RunPhase, Search]:
+        """Search until no robot is lost during a search. The metrics include all these searches.
+
+        Returns the last search, and `phase` as it was in this search.
+        """
         spent = Metrics()
         while True:
             search = self.search(phase)
             result: SearchResult = search.result
             spent += result.metrics
             if not result.lost:
-                return search._replace(result=replace(result, metrics=spent))
+                return phase, search._replace(result=replace(result, metrics=spent))
             self.remove(result.lost)
             if self.is_empty:
                 raise RobotsLostError(result.lost)
+            phase = self.without_lost(phase)
 
 
 def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: Outcome) -> Outcome:

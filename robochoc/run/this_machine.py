@@ -29,7 +29,7 @@ from robochoc.run.recording import objective_to_record
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.starts import Start, start_in
-from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.agent_problem import RunParameters, StartValues
 from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import withdrawal_cost
@@ -141,10 +141,17 @@ class ThisMachine(Deployment):
 
     def started(self, phase: RunPhase) -> RunPhase:
         """See `Deployment.started`."""
-        if not self.options.start:
+        return self._beginning_with(phase, self.options.start)
+
+    def without_lost(self, phase: RunPhase) -> RunPhase:
+        """See `Deployment.without_lost`."""
+        return self._beginning_with(phase, phase.parameters.start)
+
+    def _beginning_with(self, phase: RunPhase, values: StartValues) -> RunPhase:
+        """Return `phase`, which begins with `values` in the current team."""
+        if not values:
             return phase
-        cost = phase.parameters.withdrawal_cost
-        return phase.beginning_with(start_in(self._scenario.team, self.options.start, cost))
+        return phase.beginning_with(start_in(self._scenario.team, values, phase.parameters.withdrawal_cost))
 
     def left_s(self) -> float | None:
         """See `Deployment.left_s`."""
@@ -308,7 +315,7 @@ class ThisMachine(Deployment):
         if self.is_empty:
             return self._scenario.compiled(), None
         phase = preprocessing_phase(self.options)
-        result = self._search_without_losses(phase).result
+        result = self._search_without_losses(phase)[1].result
         whole = self._searched
         values = sum(len(robot.domain.values) for robot in whole.robots.values())
         self._preprocessings.append(

@@ -188,8 +188,9 @@ class AFCng(Protocol):
             self._assign()
 
     def _assign(self) -> None:
-        """Choose the first remaining value and send the CPA on."""
-        index = self.store.first_open()
+        """Choose the start value, or the first remaining value if there is none, and send the CPA on."""
+        start = self.problem.start
+        index = start if start is not None and self.store[start] is None else self.store.first_open()
         assert index is not None  # noqa: S101 - for mypy: a value is left
         self.value = index
         self.counter += 1

@@ -158,7 +158,10 @@ class DisFC(Protocol):
         self.send(receiver, Ok(self.counter, self.problem.filter(index, receiver)))
 
     def _choose_value(self) -> int | None:
-        """Return the first value that no nogood and no filter rules out; None if there is none."""
+        """Return the first value that no nogood and no filter rules out, or the start value; None if there is none."""
+        start = self.problem.start
+        if start is not None and self._consistent(start):
+            return start
         index = self.store.first_open()
         while index is not None and not self._consistent(index):
             index = self.store.first_open(index + 1)

@@ -15,18 +15,23 @@ from robochoc.formats import write_team
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, RemoveValue, ScenarioEvent, Team
+from robochoc.model.team_edits import without_robots
 from robochoc.modelling.terms import ModelVariable
 from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Search, evaluate_search
 from robochoc.run.known_costs import KnownCosts
 from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_named
 from robochoc.run.starts import Start, start_in, start_of_outcome
+from robochoc.run.this_machine import ThisMachine
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.system.errors import OptionError, OptionTypeError
 from robochoc.verification.checker import RefutedError
 from robochoc.verification.objective import Objective
+from tests.support.brute_force import solutions
 from tests.support.cost_problems import random_cost_team, with_costs
+from tests.support.problems import random_team
 from tests.support.program import robochoc_within
 from tests.support.small_teams import pair
 
@@ -231,3 +236,35 @@ def test_an_imported_problem_begins_from_its_original_names(tmp_path: Path) -> N
     assert {"v 1", "v 2"} == {*again}
     with pytest.raises(OptionError, match="there is no variable 'v 3'"):
         problem.solve("syncbb", start={"v 3": "R"})
+
+
+def test_after_a_loss_the_cost_of_the_start_does_not_count() -> None:
+    """It was the cost of the whole team. The values still do."""
+    team = random_cost_team(Random(5))
+    first = solve(team, SIMULATED)
+    cost = first.cost
+    assert cost is not None
+    phase = RunPhase("syncbb", protocol_named("syncbb"), RunParameters()).beginning_with(
+        start_in(team, dict(first.assignment))
+    )
+    assert phase.parameters.upper_bound == cost
+    machine = ThisMachine(team, RunContext(SIMULATED), None, None)
+    machine.remove({team.order[0]: "lost"})
+    left = machine.without_lost(phase)
+    names = {variable.name for robot in team.robots[1:] for variable in robot.variables}
+    assert {*left.parameters.start} == names
+    remaining = without_robots(team, [team.order[0]])
+    assert left.parameters.upper_bound == start_in(remaining, dict(first.assignment)).cost
+
+
+@pytest.mark.parametrize("protocol", ["abt", "afc-ng", "disfc", "agile-abt", "abt-hyb"])
+def test_robots_without_costs_keep_a_solution(protocol: str) -> None:
+    for number in range(10):
+        team = random_team(Random(number))
+        found = list(solutions(team))
+        if not found:
+            continue
+        start = found[-1]
+        outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, start=start))
+        for name in (name for robot in team.robots for name in robot.interface):
+            assert outcome.assignment[name] == start[name]
