@@ -260,7 +260,7 @@ def test_after_a_loss_the_cost_of_the_start_does_not_count() -> None:
 @pytest.mark.parametrize("protocol", ["abt", "afc-ng", "disfc", "agile-abt", "abt-hyb"])
 def test_robots_without_costs_keep_a_solution(protocol: str) -> None:
     for number in range(10):
-        team = random_team(Random(number))
+        team = random_team(Random(number), n_ary=False)
         found = list(solutions(team))
         if not found:
             continue
