@@ -17,6 +17,7 @@ import app_pages
 import array_cluster
 import arrays
 import auctions
+import central_solvers
 import choice
 import command_time
 import crowd
@@ -60,6 +61,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "app": app_pages.measured,
     "arrays": arrays.measured,
     "auctions": auctions.measured,
+    "central": central_solvers.measured,
     "choice": choice.measured,
     "wide": wide_tables.measured,
     "growth": scale.measured,

