@@ -103,8 +103,8 @@ def _section(rows: Sequence[Measured]) -> Section:
         f"{len(by_instance)} instances; the solvers agree on all answers. `auto` enumerates"
         f" {len(by_instance) - len(searched)} of them in this process, without a solver; the first table has the other"
         f" {len(searched)}. Each cell: instances decided within {LIMIT_S} s of CPU of the solver's process, the median"
-        f" CPU seconds of a run ({LIMIT_S} if not decided), and the memory of the largest process. `ace` enumerates small"
-        " problems, too, and adds cliques and symmetries. All figures are in `results/central.csv`."
+        f" CPU seconds of a run ({LIMIT_S} if not decided), and the memory of the largest process. `ace` enumerates"
+        " small problems, too, and adds cliques and symmetries. All figures are in `results/central.csv`."
     )
     first: list[Row] = [("family", "instances", *SOLVERS)]
     for family in FAMILIES:
