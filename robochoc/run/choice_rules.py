@@ -106,7 +106,9 @@ LARGE_TABLE = Condition(
 MORE_THAN_FEW = _more_than(FEW_ROBOTS)
 NO_WITHDRAWAL = Condition(lambda f: not f.withdrawal, "no --withdraw", "robots may withdraw")
 NOT_COMPLETE = Condition(
-    lambda f: f.robots <= SMALL_TEAM or f.share_linked < NEARLY_ALL or f.declared_table > LARGE_PAIR,
+    lambda f: (
+        f.robots <= SMALL_TEAM or f.share_linked < NEARLY_ALL or max(f.largest_pair, f.declared_table) > LARGE_PAIR
+    ),
     f"at most {SMALL_TEAM} robots, or less than {NEARLY_ALL:.0%} of all pairs linked, or more than 100 values",
     f"{NEARLY_ALL:.0%} or more of all pairs of robots are linked",
 )

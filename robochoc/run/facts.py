@@ -102,9 +102,9 @@ class Facts:
     @cached_property
     def sizes(self) -> Sizes:
         """The number of values of each robot: the declared number or, if it is large, the number after compilation."""
-        if self.declared_table <= MAX_TUPLES:
-            return self.declared_sizes
-        return self.compiled_sizes() or self.declared_sizes
+        sizes = self.declared_sizes
+        combinations = (math.prod([sizes[name] + 1 for name in scope]) for scope in self._scopes)
+        return sizes if max(combinations, default=1) <= MAX_TUPLES else self.compiled_sizes() or sizes
 
     @property
     def values(self) -> int:
@@ -123,8 +123,11 @@ class Facts:
 
     @cached_property
     def largest_table(self) -> int:
-        """The number of entries in the largest table of a single constraint, assuming that robots may withdraw."""
-        return self.declared_table if self.sizes is self.declared_sizes else self._largest_table(self.sizes)
+        """The number of entries in the largest table of a single constraint.
+
+        A table is over the variables that the constraint names (`CostTable`), whatever other variables the robots have.
+        """
+        return self._largest_table(self.sizes)
 
     @property
     def is_binary(self) -> bool:
@@ -210,15 +213,35 @@ class Facts:
         """The same as `largest_table`, with the declared sizes."""
         return self._largest_table(self.declared_sizes)
 
+    @property
+    def largest_pair(self) -> int:
+        """The largest number of combinations of the declared values of two robots in a constraint."""
+        sizes = self.declared_sizes
+        pairs = (sorted([sizes[name] + 1 for name in scope])[-_TWO:] for scope in self._scopes)
+        return max(map(math.prod, pairs), default=1)
+
     @cached_property
     def _scopes(self) -> set[frozenset[str]]:
         """The robots of each shared constraint."""
         owner = self.first.owner
-        shared = (one for robot in self.first.robots for one in robot.shared)
-        return {frozenset([owner[name] for name in one.variables]) for one in shared}
+        return {frozenset([owner[name] for name in scope]) for scope in self._named}
+
+    @cached_property
+    def _named(self) -> set[frozenset[str]]:
+        """The variables of each shared constraint."""
+        return {frozenset(one.variables) for robot in self.first.robots for one in robot.shared}
 
     def _largest_table(self, sizes: Sizes) -> int:
-        return max((math.prod([sizes[name] + 1 for name in scope]) for scope in self._scopes), default=1)
+        owner, domains = self.first.owner, self._domains
+        largest = 1
+        for scope in self._named:
+            named: dict[str, int] = {}
+            for name in scope:
+                named[owner[name]] = named.get(owner[name], 1) * len(domains[name])
+            largest = max(
+                largest, math.prod([min(size, sizes[robot]) + self.withdrawal for robot, size in named.items()])
+            )
+        return largest
 
 
 def _share_allowed(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import combinations
 from math import log2, prod
 from random import Random
 from typing import Any
@@ -169,9 +170,22 @@ def test_each_epoch_of_a_problem_that_changes_is_that_of_brute_force(many: int) 
             assert epoch.verdict is truth or (epoch.verdict is Verdict.UNKNOWN and event and event.after is not None)
 
 
+NAMES = "ABCDEFGHIJ"
 PART = pkc_part("AB", (0, 0))
 CROWDED = meetings(23, 32, 3, 7, 395737, max_value=None, model="eav")
 """32 meetings. Eight of them have common participants, and there are seven slots."""
+
+
+def slots_and_tasks(robots: int) -> Team:
+    """Robots that each choose one of 6 slots and one of 6 tasks; at most two robots may have the same slot."""
+    model = Model("slots")
+    chosen = [
+        [robot.variable(name, range(6)) for name in ("slot", "task")] for robot in map(model.robot, NAMES[:robots])
+    ]
+    model.add([sum(slot == number for slot, _ in chosen) <= 2 for number in range(6)])
+    model.add([(one != other) | (one == 0) for (_, one), (_, other) in combinations(chosen, 2)])
+    model.minimize(sum(slot + 2 * task for slot, task in chosen))
+    return model.team
 
 
 def test_what_is_chosen() -> None:
@@ -210,7 +224,10 @@ def test_what_is_chosen() -> None:
         (random_scenario(random_csp(30, 5, 0.2, 0.5), 2, 0.1), {}, "dynabt", None),
         (team_of({"A": range(3000), "B": range(3000)}, []), {}, "sfb", Order.MIN_WIDTH),
         (coloring(300, 300, 3, conflicts="hard"), {}, "abt", None),
-        (queens3d(5, "full", "rows"), {}, "afc-ng", Order.MAX_DEGREE),
+        (queens3d(5, "full", "rows"), {}, "sfb", Order.MIN_WIDTH),
+        (queens3d(6, "full", "rows"), {}, "afc-ng", Order.MAX_DEGREE),
+        (slots_and_tasks(8), {}, "sfb", Order.MAX_DEGREE),
+        (slots_and_tasks(10), {}, "afb", Order.MAX_DEGREE),
         (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.1}, "gdba", None),
         (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.2}, "dsa", None),
         (random_csp(10, 4, 0.5, 0, max_cost=9), {"message_loss": 0.1}, "maxsum", None),
