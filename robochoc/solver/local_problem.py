@@ -84,24 +84,40 @@ class AllowedValues(NamedTuple):
         agents: The other robots, in priority order.
         codes: For each of `agents`, and last for this robot, the code of each value: as in a `CostTable`.
         masks: The values of this robot (bit i for the i-th) that are consistent with each combination of the others'
-            codes.
+            codes, in the order of `itertools.product`.
     """
 
     key: str
     agents: tuple[str, ...]
     codes: tuple[Sequence[int], ...]
-    masks: dict[tuple[int, ...], int]
+    masks: Sequence[int]
 
-    def joined(self) -> dict[tuple[int, ...], int]:
-        """Return the `masks` by the indices of the others' values.
+    @property
+    def sizes(self) -> list[int]:
+        """The number of codes of each of `agents`."""
+        return [max(codes, default=-1) + 1 for codes in self.codes[:-1]]
+
+    def joined(self) -> Sequence[int]:
+        """Return a mask for each combination of the others' values instead of codes.
 
         Raises:
             TooLargeError: if there are too many combinations.
         """
-        refuse_large(self.key, math.prod(map(len, self.codes)))
         others = self.codes[:-1]
-        places = itertools.product(*(range(len(codes)) for codes in others))
-        return {place: self.masks[chosen] for place, chosen in zip(places, itertools.product(*others), strict=True)}
+        if self.sizes == [*map(len, others)]:  # codes are numbered from 0, so they are the indices of the values
+            return self.masks
+        refuse_large(self.key, math.prod(map(len, self.codes)))
+        chosen = itertools.product(*steps_of(others, self.sizes))
+        return [self.masks[sum(steps)] for steps in chosen]
+
+
+def steps_of(codes: Sequence[Sequence[int]], sizes: Sequence[int]) -> list[list[int]]:
+    """Return, for each robot's `codes`, their parts of an index in `itertools.product`, which is the sum of all parts.
+
+    `sizes` are the numbers of codes.
+    """
+    lower = [math.prod(sizes[place + 1 :]) for place in range(len(sizes))]
+    return [[code * step for code in coded] for coded, step in zip(codes, lower, strict=True)]
 
 
 MIN_TABLE_VALUES = 64
@@ -488,10 +504,8 @@ class LocalProblem:
             if not domains.keys() >= set(constraint.agents):
                 continue
             axes = constraint.axes(domains)
-            combinations = [*constraint.combinations(axes[:-1])]
-            evaluated = constraint.evaluate_all(axes, [others for _, others in combinations])
+            evaluated, masks = constraint.masks_on(axes, MAX_BOUNDED_ROWS)
             self.checks += evaluated * len(self.values)
-            masks = {place: constraint.mask(others) for place, others in combinations}
             codes = tuple([axis.codes for axis in axes])
             found.append(AllowedValues(constraint.key, constraint.agents, codes, masks))
         return found

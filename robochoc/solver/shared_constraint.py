@@ -28,10 +28,6 @@ OtherValues = tuple[int | None, ...]
 """The values of other robots' variables in a constraint, in the constraint's order. None: withdrawn."""
 
 
-MIN_AT_ONCE = 4096
-"""The number of combinations from which numpy, which has to be imported, evaluates all of them at once."""
-
-
 class Gap(NamedTuple):
     """The others' values that violate a constraint with a value of this robot, and those that satisfy it."""
 
@@ -155,6 +151,7 @@ class SharedConstraint:
         self._masks_by: dict[int, int] = {}
         """If the others have one variable: the cache of `mask`, by the variable's value."""
         self._masks: dict[OtherValues, int] = {}
+        self._masks_on: dict[tuple[tuple[Value, ...], ...], list[int]] = {}
         self._costs_by: dict[int, list[Cost]] = {}
         """If the others have one variable: the cache of `costs`, by the variable's value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
@@ -423,24 +420,37 @@ class SharedConstraint:
             self.mask(others)
         return len(self._masks) - before
 
-    def evaluate_all(self, axes: Sequence[Axis], combinations: Sequence[OtherValues]) -> int:
-        """Evaluate all `combinations` of the others' `axes`, and return the number as `evaluate` does.
+    def masks_on(self, axes: Sequence[Axis], at_once: int) -> tuple[int, Sequence[int]]:
+        """Return the number of combinations that had not been evaluated before, and the mask of each combination.
 
-        Large numbers are evaluated at once.
+        The combinations, those of the others' `axes`, are in the order of `itertools.product`. More than `at_once` rows
+        of a table over the robots' values are evaluated and stored together.
         """
-        masks = self.evaluations.masks
-        if len(combinations) * len(self._distinct) >= MIN_AT_ONCE and not all(one in masks for one in combinations):
-            found = self.cost_array([one.parts for one in axes])
-            if found is not None:
-                from robochoc.solver.constraint_arrays import rows_of_bits  # noqa: PLC0415 - as above
+        *others, own = axes
+        if math.prod([len(one.parts) for one in others]) * len(own.codes) > at_once:
+            key = tuple([tuple(one.parts) for one in others])
+            known = self._masks_on.get(key)
+            if known is not None:
+                return 0, known
+            costs = self.cost_array([one.parts for one in axes])
+            if costs is not None:
+                masks = self._masks_on[key] = self._masks_in(costs)
+                return len(masks), masks
+        combinations = [combination for _, combination in self.combinations(others)]
+        return self.evaluate(combinations), [self.mask(combination) for combination in combinations]
 
-                known: dict[bytes, int] = {}
-                for others, row in zip(combinations, rows_of_bits(found), strict=True):
-                    if row not in known:
-                        codes = int.from_bytes(row, "little")
-                        known[row] = sum([mask for at, mask in enumerate(self._code_values) if codes >> at & 1])
-                    masks[others] = known[row]
-        return self.evaluate(combinations)
+    def _masks_in(self, costs: NDArray[float64]) -> list[int]:
+        """Return the mask of each row of `costs`. Equal masks are one object."""
+        from robochoc.solver.constraint_arrays import rows_of_bits  # noqa: PLC0415 - as above
+
+        known: dict[bytes, int] = {}
+        masks = []
+        for row in rows_of_bits(costs):
+            if row not in known:
+                codes = int.from_bytes(row, "little")
+                known[row] = sum([mask for at, mask in enumerate(self._code_values) if codes >> at & 1])
+            masks.append(known[row])
+        return masks
 
     def mask_in(self, view: Mapping[str, Value]) -> int:
         """Return `mask` for the values in `view`. `UNKNOWN` if `other_values` is None."""

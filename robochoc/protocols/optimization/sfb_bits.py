@@ -14,16 +14,15 @@ that is 0, which stops a borrow (Lamport, "Multiple byte processing with full-wo
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.local_problem import AllowedValues, LocalProblem
+from robochoc.solver.local_problem import AllowedValues, LocalProblem, steps_of
 
 Row = tuple[bytes, int]
-Places = tuple[int, ...]
 Domain = tuple[Value, ...]
 
 CEILING = 1
@@ -34,14 +33,15 @@ class _NAry(NamedTuple):
     """The values that an n-ary constraint rules out for its lowest robot.
 
     Attributes:
-        others: The ranks of the other robots above, each with the code of each of its values.
+        others: The ranks of the other robots above, each with the steps of its values: the sum of one step of each
+            robot is an index in `ruled_out`.
         own: The code of each value of this robot.
-        ruled_out: For the codes of the robots above, the bits that each code of this robot rules out.
+        ruled_out: The bits that each code of this robot rules out.
     """
 
     others: Sequence[tuple[int, Sequence[int]]]
     own: Sequence[int]
-    ruled_out: Mapping[Places, list[int]]
+    ruled_out: Sequence[Sequence[int]]
 
 
 class ForwardBits:
@@ -70,14 +70,14 @@ class ForwardBits:
             if rank <= self.rank:
                 continue
             for table in problem.allowed({**above, name: domains[rank]}, lowest=name):
-                start = columns.start(rank - self.rank - 1)
-                ruled_out = _ruled_out(table, start)
+                ruled_out = _ruled_out(table, columns.start(rank - self.rank - 1))
                 *others, _, own = table.codes
                 if others:
-                    ranked = [(order.rank[one], codes) for one, codes in zip(table.agents, others, strict=False)]
+                    steps = steps_of(others, table.sizes[:-1])
+                    ranked = [(order.rank[one], row) for one, row in zip(table.agents, steps, strict=False)]
                     self._n_ary.append(_NAry(ranked, own, ruled_out))
                 else:
-                    outs = ruled_out[()]
+                    (outs,) = ruled_out
                     self._left = [left & ~outs[code] for left, code in zip(self._left, own, strict=True)]
 
     def count_up_to(self, ceiling: int) -> None:
@@ -157,38 +157,33 @@ class ForwardBits:
                 return 0, [*places, (own & -own).bit_length() - 1]
         return CEILING, []
 
-    def _chosen(self, chosen: bytes, others: Sequence[tuple[int, Sequence[int]]]) -> Places:
+    def _chosen(self, chosen: bytes, others: Sequence[tuple[int, Sequence[int]]]) -> int:
         size = self._place_bytes
-        return tuple(
-            [codes[int.from_bytes(chosen[rank * size : (rank + 1) * size], "little")] for rank, codes in others]
-        )
+        return sum([steps[int.from_bytes(chosen[rank * size : (rank + 1) * size], "little")] for rank, steps in others])
 
 
-def _ruled_out(table: AllowedValues, start: int) -> dict[Places, list[int]]:
-    """Return the values that each value of this robot rules out, for a robot whose field begins at `start`.
+def _ruled_out(table: AllowedValues, start: int) -> list[list[int]]:
+    """Return the values that each code of this robot rules out, for a robot whose field begins at `start`.
 
-    Values are represented by their codes in `table`, except the values that are ruled out: these are bits of the field.
+    The lists are those of the combinations of the other robots' codes, in the order of `itertools.product`. The values
+    that are ruled out are bits of the field. Equal lists are one object: tables may be large.
     """
     *_, lowest, own = table.codes
     firsts = [own.index(code) for code in range(max(own, default=-1) + 1)]
-    fields = [0] * (max(lowest, default=-1) + 1)
+    fields = [0] * table.sizes[-1]
     for place, code in enumerate(lowest):
         fields[code] |= 1 << start + place
-    codes: dict[Places, list[int]] = {}
-    for (*above, code), allowed in table.masks.items():
-        ruled_out = codes.setdefault(tuple(above), [0] * len(firsts))
-        for value, first in enumerate(firsts):
-            if not allowed >> first & 1:
-                ruled_out[value] |= 1 << code
-    bits: dict[int, int] = {}  # equal integers are one object: tables may be large
-    return {above: [_joined(out, fields, bits) for out in ruled_out] for above, ruled_out in codes.items()}
-
-
-def _joined(codes: int, fields: Sequence[int], known: dict[int, int]) -> int:
-    """Return the union of the `fields` of all `codes` (bits); `known` are the results so far."""
-    if codes not in known:
-        known[codes] = sum([field for code, field in enumerate(fields) if codes >> code & 1])
-    return known[codes]
+    known: dict[tuple[int, ...], list[int]] = {}
+    found = []
+    for row in range(0, len(table.masks), len(fields)):
+        masks = tuple(table.masks[row : row + len(fields)])
+        if masks not in known:
+            known[masks] = [
+                sum([field for field, mask in zip(fields, masks, strict=True) if not mask >> first & 1])
+                for first in firsts
+            ]
+        found.append(known[masks])
+    return found
 
 
 def _lowest_and_guards(sizes: Sequence[tuple[int, int]]) -> tuple[int, int]:

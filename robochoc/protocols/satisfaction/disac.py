@@ -31,8 +31,10 @@ Choices and differences:
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
-from typing import assert_never, cast
+from operator import and_
+from typing import NamedTuple, assert_never, cast
 
 from robochoc.model.outcome import Verdict
 from robochoc.protocols import acts
@@ -44,7 +46,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.protocols.wording import Wording
-from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.system.plain_text import counted
 
@@ -76,7 +78,20 @@ class Del(Message, frozen=True):
         return f"{counted(len(self.places), 'value')} of {words.variables(words.sender)} can be in no solution"
 
 
-_Table = tuple[tuple[str, ...], dict[tuple[int, ...], int]]
+class _Table(NamedTuple):
+    """The values of this robot that are consistent with each combination of the codes of `agents`' values."""
+
+    agents: tuple[str, ...]
+    codes: tuple[tuple[int, ...], ...]
+    masks: Sequence[int]
+
+    def remaining(self, place: int, values: int) -> list[bool]:
+        """Return, for each code of the robot at `place`, whether one of its `values` is left."""
+        found = [False] * (max(self.codes[place], default=-1) + 1)
+        for value, code in enumerate(self.codes[place]):
+            if values >> value & 1:
+                found[code] = True
+        return found
 
 
 class DisAC(Protocol):
@@ -152,26 +167,32 @@ class DisAC(Protocol):
             self.left[sender] &= ~(1 << place)
 
     def _evaluated(self) -> list[_Table]:
-        """Return the constraints as tables; constraints over the same robots form one table."""
-        found: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
+        """Return the constraints as tables; constraints over the same robots form one table, unless it is too large."""
+        found: dict[tuple[tuple[str, ...], tuple[tuple[int, ...], ...]], Sequence[int]] = {}
         for lowest in self.linked:
             try:
-                tables = [(table.agents, table.joined()) for table in self.problem.allowed(self.domains, lowest)]
+                tables = self.problem.allowed(self.domains, lowest)
             except UnsupportedError:  # too large for a table, so fewer values are removed
                 continue
-            for others, masks in tables:
-                known = found.get(others)
-                found[others] = {place: mask & known[place] for place, mask in masks.items()} if known else masks
-        return list(found.items())
+            for table in tables:
+                codes = tuple([tuple(range(len(self.domains[robot]))) for robot in table.agents])
+                try:
+                    masks = table.joined()
+                except TooLargeError:
+                    codes, masks = tuple(map(tuple, table.codes[:-1])), table.masks
+                known = found.get((table.agents, codes))
+                found[table.agents, codes] = [*map(and_, masks, known)] if known else masks
+        return [_Table(agents, codes, masks) for (agents, codes), masks in found.items()]
 
     def _revise(self) -> bool:
         """Remove this robot's values without support; return whether any value is left."""
         assert self._tables is not None  # noqa: S101 - made before
         before = self.own
-        for others, masks in self._tables:
+        for table in self._tables:
+            left = [table.remaining(place, self.left[robot]) for place, robot in enumerate(table.agents)]
             supported = 0
-            for place, mask in masks.items():
-                if all(self.left[robot] >> value & 1 for robot, value in zip(others, place, strict=True)):
+            for present, mask in zip(itertools.product(*left), table.masks, strict=True):
+                if all(present):
                     supported |= mask
             self.own &= supported
         self.removed += _places(before & ~self.own)
@@ -192,10 +213,10 @@ class DisAC(Protocol):
         """Return, for each neighbour, its values without support by a remaining value of this robot."""
         assert self._tables is not None  # noqa: S101 - made before
         lost = dict.fromkeys(self.linked, 0)
-        for others, masks in self._tables:
-            if len(others) == 1:
-                (robot,) = others
-                gone = sum(1 << value for (value,), mask in masks.items() if not mask & self.own)
+        for table in self._tables:
+            if len(table.agents) == 1:
+                (robot,), (codes,) = table.agents, table.codes
+                gone = sum([1 << value for value, code in enumerate(codes) if not table.masks[code] & self.own])
                 lost[robot] |= gone & self.left[robot]
         return lost
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from operator import and_
 from typing import NamedTuple
 
 import msgspec
@@ -48,12 +49,12 @@ def own_tables(
     problem: LocalProblem, linked: Iterable[str], domains: Mapping[str, Sequence[Value]]
 ) -> tuple[AllowedTable, ...]:
     """Return the constraints of `problem` with robots in `linked`, with one table for each set of robots."""
-    allowed: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
+    allowed: dict[tuple[str, ...], Sequence[int]] = {}
     for lowest in linked:
         for table in problem.allowed(domains, lowest):
             others, masks = table.agents, table.joined()
             known = allowed.get(others)
-            allowed[others] = {p: mask & known[p] for p, mask in masks.items()} if known else masks
+            allowed[others] = [*map(and_, masks, known)] if known else masks
     return tuple([_table(problem, domains, others, masks) for others, masks in allowed.items()])
 
 
@@ -83,13 +84,13 @@ def _table(
     problem: LocalProblem,
     domains: Mapping[str, Sequence[Value]],
     others: tuple[str, ...],
-    masks: Mapping[tuple[int, ...], int],
+    masks: Sequence[int],
 ) -> AllowedTable:
     """Return a table whose last robot is the robot of `problem`."""
     own = len(problem.values)
     bits = 0
-    for row, place in enumerate(sorted(masks)):
-        bits |= masks[place] << row * own
+    for row, mask in enumerate(masks):
+        bits |= mask << row * own
     sizes = (*(len(domains[robot]) for robot in others), own)
     return AllowedTable((*others, problem.agent), sizes, bits.to_bytes(-(-len(masks) * own // 8), "little"))
 

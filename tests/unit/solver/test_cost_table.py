@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,10 +10,11 @@ import numpy as np
 import pytest
 
 from robochoc.model.problem import Value
-from robochoc.solver import shared_constraint
+from robochoc.solver import local_problem, shared_constraint
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.errors import TooLargeError
-from robochoc.solver.local_problem import LocalProblem
+from robochoc.solver.local_problem import LocalProblem, steps_of
+from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team
 from tests.support.examples import count, drawn
 from tests.support.solver_networks import compiled_by_brute_force
@@ -68,3 +70,29 @@ def test_only_the_named_variables_count_for_the_limit(monkeypatch: pytest.Monkey
                 refused += 1
         monkeypatch.undo()
     assert refused
+
+
+@count("teams", 40, 1000)
+def test_rows_that_are_evaluated_together_allow_the_same_values(monkeypatch: pytest.MonkeyPatch, teams: int) -> None:
+    for number in range(teams):
+        parts = agent_problems(compiled_by_brute_force(random_complex_team(drawn(f"together {number}"))))
+        problems = {name: LocalProblem(part) for name, part in parts.items()}
+        others = {name: LocalProblem(part._replace(known=replace(part.known))) for name, part in parts.items()}
+        values: dict[str, Sequence[Value]] = {name: problem.values for name, problem in problems.items()}
+        for name, problem in problems.items():
+            for lowest in values:
+                if lowest == name:
+                    continue
+                monkeypatch.setattr(local_problem, "MAX_BOUNDED_ROWS", 0)
+                together = others[name].allowed(values, lowest)
+                assert others[name].allowed(values, lowest) == together  # without further checks
+                monkeypatch.undo()
+                one_by_one = problem.allowed(values, lowest)
+                assert together == one_by_one
+                for table in together:
+                    rows = itertools.product(*(range(len(values[robot])) for robot in table.agents))
+                    for row, mask in zip(rows, table.joined(), strict=True):
+                        codes = [coded[place] for coded, place in zip(table.codes, row, strict=False)]
+                        place = sum(step for (step,) in steps_of([[code] for code in codes], table.sizes))
+                        assert mask == table.masks[place]
+            assert problem.checks == others[name].checks
