@@ -62,6 +62,30 @@ class CostTable(NamedTuple):
         joined.flags.writeable = False
         return joined
 
+    def distinct_codes(self) -> list[Sequence[int] | None]:
+        """Return the `codes`, and None for each axis on which the indices are those of the values."""
+        return [None if len(one) == size else one for one, size in zip(self.codes, self.charges.shape, strict=True)]
+
+    def after(self, other: CostTable) -> CostTable:
+        """Return the sum of `other` and this table, both over the same robots, over the variables that one names.
+
+        Raises:
+            TooLargeError: if the table is too large.
+        """
+        axes = [_common_axis(first, second) for first, second in zip(other.codes, self.codes, strict=True)]
+        codes, firsts, seconds = zip(*axes, strict=True)
+        refuse_large(self.key, math.prod(map(len, firsts)))
+        charges: Array = other.charges[np.ix_(*firsts)] + self.charges[np.ix_(*seconds)]
+        places = tuple([tuple(sorted({*some, *more})) for some, more in zip(other.places, self.places, strict=True)])
+        return CostTable(self.key, self.agents, places, charges, codes)
+
+
+def _common_axis(first: Sequence[int], second: Sequence[int]) -> tuple[list[int], list[int], list[int]]:
+    """Return codes of all values that `first` or `second` distinguishes, and for each of them the code in both."""
+    found: dict[tuple[int, int], int] = {}
+    codes = [found.setdefault(pair, len(found)) for pair in zip(first, second, strict=True)]
+    return codes, [one for one, _ in found], [other for _, other in found]
+
 
 def cost_table(constraint: SharedConstraint, domains: Mapping[str, Sequence[Value]]) -> tuple[int, CostTable]:
     """Return the number of checks, and the table of `constraint` over `domains` and this robot's values.

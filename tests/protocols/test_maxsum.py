@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 from random import Random
@@ -16,18 +17,22 @@ from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Te
 from robochoc.protocols.inference import maxsum_factor
 from robochoc.protocols.inference.maxsum import MaxSum, MaxSumSettings, Q, R
 from robochoc.protocols.inference.maxsum_factor import MOST, Factor, from_zero
+from robochoc.protocols.message import Value
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver import shared_constraint
+from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.cost_table import Array, CostTable
 from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.local_problem import LocalProblem
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
-from tests.support.cost_problems import random_cost_team, random_tree, with_costs
-from tests.support.examples import count
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team, random_tree, with_costs
+from tests.support.examples import count, drawn
 from tests.support.local_search_runs import any_schedule, assignments_by_cycle, cost_of_assignment, domains_of, played
 from tests.support.problems import team_of
+from tests.support.solver_networks import compiled_by_brute_force
 
 COSTS = Relation("C", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (3, 1, 4, 6))
 HARD = Relation("H", 2, Semantics.CONFLICTS, ((2, 1), (2, 2)))
@@ -302,3 +307,22 @@ def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -
     robot = middle(chain())
     with pytest.raises(UnsupportedError, match="has 4 entries, more than 3"):
         replies(robot, ("RA", TWO))
+
+
+@count("teams", 40, 1000)
+def test_functions_over_the_named_variables_send_what_functions_over_all_values_send(teams: int) -> None:
+    smaller = 0
+    for number in range(teams):
+        chance = drawn(f"named {number}")
+        parts = agent_problems(compiled_by_brute_force(random_complex_cost_team(chance)))
+        problems = {name: LocalProblem(part) for name, part in parts.items()}
+        values: dict[str, Sequence[Value]] = {name: problem.values for name, problem in problems.items()}
+        for name, problem in problems.items():
+            tables = problem.tables({other: values[other] for other in values if other != name})
+            for named, joined in zip(Factor.joined(tables), Factor.joined(tables, of_values=True), strict=True):
+                rows = [[chance.choice((0.0, chance.random(), INFINITE)) for _ in values[one]] for one in named.agents]
+                rows.append([chance.random() for _ in problem.values])
+                if all([*map(len, rows)]):
+                    assert named.r(rows) == joined.r(rows)
+                smaller += named.charges.size < joined.charges.size
+    assert smaller

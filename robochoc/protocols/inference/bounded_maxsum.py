@@ -174,7 +174,7 @@ class BoundedMaxSum(SpanningProtocol):
         for name, values in self._domains.items():
             for value in values:
                 self.problem.refuse_value(name, value)
-        for factor in Factor.joined(self.problem.tables(self._domains)):
+        for factor in Factor.joined(self.problem.tables(self._domains), of_values=True):
             self.functions[factor.agents[0]] = factor.charges
         for name in self.above:
             table = self.functions.get(name)

@@ -212,7 +212,7 @@ class MaxSum(FactorGraphProtocol):
         domains = self._domains
         self._made = True
         self._shape = []
-        self.factors = self._split(Factor.joined(self.problem.tables(domains)))
+        self.factors = self._split(Factor.joined(self.problem.tables(domains), of_values=self.settings.split > 0))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
         self._last_q = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
 

@@ -29,24 +29,33 @@ can have remain finite.
 
 
 class Factor:
-    """A function node: the sum of all constraints over the same robots (`agents` and the robot that holds it)."""
+    """A function node: the sum of all constraints over the same robots (`agents` and the robot that holds it).
 
-    def __init__(self, agents: Sequence[str], charges: Array) -> None:
+    `charges` has an axis for each of these robots. Values that no constraint distinguishes share an index: `codes` has
+    the index of each value, and None for robots whose values are all distinguished.
+    """
+
+    def __init__(self, agents: Sequence[str], charges: Array, codes: Sequence[Sequence[int] | None] = ()) -> None:
         self.agents = agents
         self.charges = charges
+        self._codes = codes if any(one is not None for one in codes) else ()
         small = len(agents) == 1 and charges.size <= SMALL
         self._lines: tuple[list[Row], list[Row]] | None = (charges.tolist(), charges.T.tolist()) if small else None
 
     @classmethod
-    def joined(cls, tables: Iterable[CostTable]) -> list[Self]:
-        """Return one function for each set of robots in `tables`; tables over a single robot are left out."""
-        sums: dict[tuple[str, ...], Array] = {}
+    def joined(cls, tables: Iterable[CostTable], *, of_values: bool = False) -> list[Self]:
+        """Return one function for each set of robots in `tables`; tables over a single robot are left out.
+
+        With `of_values`, each value has an index of its own.
+        """
+        sums: dict[tuple[str, ...], CostTable] = {}
         for table in tables:
             if table.agents:
                 before = sums.get(table.agents)
-                charges = table.joined()
-                sums[table.agents] = charges if before is None else before + charges
-        return [cls(agents, charges) for agents, charges in sums.items()]
+                sums[table.agents] = table if before is None else table.after(before)
+        if of_values:
+            return [cls(agents, table.joined()) for agents, table in sums.items()]
+        return [cls(agents, table.charges, table.distinct_codes()) for agents, table in sums.items()]
 
     def split(self, shares: Array) -> tuple[Factor, Factor]:
         """Return two functions whose sum is this one: one has its share (0 to 1) of each entry, one the rest.
@@ -57,6 +66,14 @@ class Factor:
 
     def r(self, q: Sequence[Row]) -> list[Row]:
         """Return the minimum cost of each robot's values, given the Q of the others, in the order of the axes."""
+        if not self._codes:
+            return self._answers(q)
+        rows = [row if codes is None else _least_of(row, codes) for row, codes in zip(q, self._codes, strict=True)]
+        answers = zip(self._answers(rows), self._codes, strict=True)
+        return [answer if codes is None else [answer[code] for code in codes] for answer, codes in answers]
+
+    def _answers(self, q: Sequence[Row]) -> list[Row]:
+        """Return the minimum cost for each index on each axis, given the Q of the other axes."""
         if self._lines:
             (other, own), (lines, columns) = q, self._lines
             return [_least_sums(lines, own), _least_sums(columns, other)]
@@ -73,6 +90,14 @@ class Factor:
             total = total + np.expand_dims(row, tuple([other for other in range(len(q)) if other != axis]))
         least: Row = total.min(axis=axes).tolist()
         return least
+
+
+def _least_of(row: Row, codes: Sequence[int]) -> Row:
+    """Return the minimum entry for each code."""
+    least = [INFINITE] * (max(codes, default=-1) + 1)
+    for entry, code in zip(row, codes, strict=True):
+        least[code] = min(least[code], entry)
+    return least
 
 
 def _least_sums(lines: Sequence[Row], row: Row) -> Row:
