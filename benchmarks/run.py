@@ -36,6 +36,7 @@ import sniffer
 import solver
 import start_up
 import transport
+import warm_starts
 import wide_tables
 from measure import RUNS
 from report import Section, machine
@@ -64,6 +65,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "central": central_solvers.measured,
     "choice": choice.measured,
     "wide": wide_tables.measured,
+    "starts": warm_starts.measured,
     "growth": scale.measured,
     "cluster": array_cluster.measured,
     "mujoco": other_flight.mujoco,

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from typing import Any
 
 import msgspec
 from msgspec import UNSET, UnsetType
@@ -121,6 +122,12 @@ def _units(units: CostUnits) -> tuple[bool, int, int] | UnsetType:
 def run_parameters_of(given: Given) -> RunParameters:
     """Return the parameters of the run, without its start."""
     return RunParameters(given.seed, given.settings, given.aside)
+
+
+def start_fields(parameters: RunParameters) -> dict[str, Any]:
+    """Return the fields of `Began` with the start of a run, if it has one."""
+    fields: dict[str, Any] = {"start": dict(parameters.start)} if parameters.start else {}
+    return fields if parameters.upper_bound is None else fields | {"upper_bound": parameters.upper_bound}
 
 
 def with_start(parameters: RunParameters, began: Began | None) -> RunParameters:

@@ -10,7 +10,7 @@ from typing import Any
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Began, Observer, combined
-from robochoc.journal.team_events import TeamWriter
+from robochoc.journal.team_events import TeamWriter, start_fields
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, user_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
@@ -56,11 +56,7 @@ class StartEvents:
         detail: dict[str, Any] = {"epoch": number, "opened_by": opened_by} if number else {}
         if protocol.traits.costs:
             detail["minimises"] = True
-        if epoch.parameters.start:
-            detail["start"] = dict(epoch.parameters.start)
-        if epoch.parameters.upper_bound is not None:
-            detail["upper_bound"] = epoch.parameters.upper_bound
-        self._observer(Began(t=0, protocol=protocol.__name__, **detail))
+        self._observer(Began(t=0, protocol=protocol.__name__, **detail, **start_fields(epoch.parameters)))
         fresh = epoch.team.order if session and session.starts_fresh else epoch.restarted
         lossless = session is None or session.lossless
         self._observer(self._writer.given(epoch.team, epoch.parameters, epoch.invalidated, fresh=fresh, quiet=lossless))

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from pathlib import Path
 
 import pytest
 
+from robochoc.formats.result import result_json
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Type, parse
+from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import (
     Constraint,
     CostUnits,
@@ -20,6 +23,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from tests.support.deployments import Deployment, enrolled, finished, one_line, written
+from tests.support.program import robochoc_within
 
 pytestmark = pytest.mark.more
 
@@ -83,3 +87,20 @@ def test_violated_constraints_are_reported_by_their_holders(site: Deployment) ->
         "first": [{"name": "", "robot": "RB", "variables": ["A", "B"]}],
     }
     assert master.object["reason"].endswith("the best assignment violates 1 of 2 hard constraints: one of RB over A B")
+
+
+def test_robots_on_machines_begin_from_a_result(site: Deployment, tmp_path: Path) -> None:
+    """They stay in the local optimum of the start: neither robot alone can improve it. The journal has it too."""
+    utility = Relation("R", 2, Semantics.SOFT, ((0, 0), (1, 1)), (500, 900), 0)
+    files = written(team_with(utility), site)
+    result, journal = tmp_path / "result.json", tmp_path / "mgm.journal"
+    known = Outcome(
+        Verdict.SOLUTION, team="t", protocol="mgm", runtime="simulator", seed=0, assignment={"A": 0, "B": 0}
+    )
+    result.write_bytes(result_json(known))
+    words = ("--team", files, "--protocol", "mgm", "--set", "cycles=4", "--json")
+    master, _ = finished(site, files, *words, "--start", result, "--journal", journal)
+    assert master.object["assignment"] == {"A": 0, "B": 0}
+    replayed = robochoc_within("replay", journal, "--team", files, "--set", "cycles=4")
+    assert replayed.returncode == 0, replayed.stderr
+    assert "identical" in replayed.stdout

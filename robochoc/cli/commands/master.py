@@ -15,6 +15,7 @@ from robochoc.cli.options.network import AddressType, authority_option, network_
 from robochoc.cli.options.paths import TeamFolder
 from robochoc.cli.options.recording import flushing_progress, journal_option, recording
 from robochoc.cli.options.ros import improve_option
+from robochoc.cli.options.saved import saved_outcome
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     SolveCommand,
@@ -24,6 +25,7 @@ from robochoc.cli.options.solve import (
     protocol_option,
     protocol_settings,
     settings_option,
+    start_option,
     withdraw_option,
 )
 from robochoc.cli.options.value_types import Number, WholeNumber
@@ -47,7 +49,7 @@ _SECTIONS: Sections = {
         "--listen", "--robots", "--team", "--protocol", "--withdraw", "--timeout", "--deadline", "--improve",
         "--json", "--journal", "--sniffable", "--help",
     ),
-    "Search": ("--set", "--seed", "--messages", "--message-loss"),
+    "Search": ("--set", "--seed", "--start", "--messages", "--message-loss"),
     "Robots and losses": ("--host", "--authority", "--gather", "--patience", "--on-loss"),
     "Privacy and security": ("--private", "--filter"),
 }  # fmt: skip
@@ -82,6 +84,7 @@ _SECTIONS: Sections = {
 @click.option(
     "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of randomised protocols."
 )
+@start_option
 @withdraw_option
 @click.option("--private", is_flag=True, help="Robots report that they have values, but not the values.")
 @filter_option
@@ -177,12 +180,13 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
         patience_s=given.pop("patience_s"),
         survive=given.pop("on_loss") == "withdraw",
     )
-    withdraw = given.pop("withdraw")
+    withdraw, start = given.pop("withdraw"), given.pop("start")
     return MasterPlan(
         authority=folder or default_authority_folder(),
         conditions=conditions,
         settings=protocol_settings(given.pop("settings_given")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
+        start=saved_outcome(start)[0] if start else None,
         names=tuple(robot_names(team)) if team else None,
         name=team.resolve().name if team else "team",
         **given,

@@ -18,6 +18,7 @@ from robochoc.communication.network.master import Master
 from robochoc.communication.network.plausibility import doubts_about_checks, doubts_about_values, thoroughness
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.journal.events import Began, Observer
+from robochoc.journal.team_events import start_fields
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import ALL_ROBOTS, Answer, Improvement, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
@@ -27,6 +28,7 @@ from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
 from robochoc.run.phases import RunPhase
+from robochoc.run.starts import Start
 from robochoc.verification.checker import RefutedError
 
 
@@ -106,6 +108,10 @@ class Machines(Deployment):
         """See `Deployment.left_s`."""
         return None if self._deadline is None else max(0.0, self._deadline - time.monotonic())
 
+    def started(self, phase: RunPhase) -> RunPhase:
+        """See `Deployment.started`. The cost of the start is unknown, since the master has no constraints."""
+        return phase.beginning_with(Start(self.options.start)) if self.options.start else phase
+
     def remove(self, lost: Mapping[str, str]) -> None:
         """See `Deployment.remove`."""
         self._lost |= lost
@@ -119,7 +125,10 @@ class Machines(Deployment):
     def search(self, phase: RunPhase) -> Search:
         """See `Deployment.search`. Raises `RefutedError` if robots contradict each other."""
         if self._observer:
-            self._observer(Began(t=0, protocol=phase.name, minimises=True if phase.traits.costs else UNSET))
+            minimises = True if phase.traits.costs else UNSET
+            self._observer(
+                Began(t=0, protocol=phase.protocol.__name__, minimises=minimises, **start_fields(phase.parameters))
+            )
         left_s, checked = self.left_s(), self.options.deadline is not None
         self._master.watch = self._improvements = self._watch(phase) if checked else None
         result = self._master.search(

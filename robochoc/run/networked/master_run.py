@@ -36,8 +36,9 @@ from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_or_stage
+from robochoc.run.starts import start_of_outcome
 from robochoc.solver.errors import UnsupportedError
-from robochoc.system.errors import RobochocError
+from robochoc.system.errors import OptionError, RobochocError
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.checker import RefutedError
 
@@ -68,6 +69,7 @@ class MasterPlan:
         improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
         messages: A limit on the number of messages (None: no limit).
         message_loss: The probability with which robots drop received messages.
+        start: The outcome from whose assignment the robots begin (None: they begin without an assignment).
         conditions: The network settings.
     """
 
@@ -87,6 +89,7 @@ class MasterPlan:
     improve: float | None = None
     messages: int | None = None
     message_loss: float = 0.0
+    start: Outcome | None = None
     conditions: NetworkSettings = NetworkSettings()
 
     def options(self, protocol: str) -> Options:
@@ -215,6 +218,11 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; missing: {names}")
     team = registered_team(master, plan.name)
     options = choose_for_private_team(team, plan.options(plan.protocol or AUTO)).options
+    if plan.start is not None:
+        try:
+            options = replace(options, start=start_of_outcome(plan.start, team))
+        except OptionError as unfit:
+            raise UnsupportedError(str(unfit)) from None
     name, protocol = options.protocol, protocol_or_stage(options.protocol)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
