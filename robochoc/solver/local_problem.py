@@ -68,11 +68,12 @@ class TableScope(NamedTuple):
     Attributes:
         agents: The other robots, in priority order.
         places: For each of them, then for this robot: its variables in the constraint, among its interface variables.
+            None: all interface variables.
         max_cost: The constraint's maximum finite cost.
     """
 
     agents: tuple[str, ...]
-    places: tuple[tuple[int, ...], ...]
+    places: tuple[tuple[int, ...], ...] | None
     max_cost: Cost
 
 
@@ -428,7 +429,11 @@ class LocalProblem:
     def scopes_in_tables(self, robots: Iterable[str]) -> list[TableScope]:
         """Return the result of `scopes`, with the variables that each constraint names: nothing is checked."""
         known = {*robots}
-        return [TableScope(c.agents, c.places, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
+        return [
+            TableScope(c.agents, None if c.names_all else c.places, c.max_cost)
+            for c in self._constraints
+            if known.issuperset(c.agents)
+        ]
 
     def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
         """Return the data that determine `tables` for these `robots`, except domains: equal data give equal tables.

@@ -70,6 +70,11 @@ class OwnValues:
             self._code_values[places] = found
         return self._code_values[places]
 
+    @property
+    def width(self) -> int:
+        """The number of interface variables."""
+        return len(self._names)
+
     def number(self, places: tuple[int, ...], shared: SharedEvaluations) -> int:
         """Return a number in `shared` that determines the `axis` for `places`."""
         if places not in self._numbers:
@@ -187,6 +192,11 @@ class SharedConstraint:
     def seen(self) -> tuple[tuple[int, int], ...]:
         """The other robots' variables in the scope: the index of each robot in `agents`, and of its variable."""
         return tuple([(self.agents.index(agent), place) for agent, place in self._seen])
+
+    @property
+    def names_all(self) -> bool:
+        """True if the constraint names all interface variables of its robots."""
+        return len(self._all_names) == sum(self._widths.values()) + self._own.width
 
     @property
     def places(self) -> tuple[tuple[int, ...], ...]:

@@ -88,7 +88,6 @@ from robochoc.protocols.inference.dpop_groups import (
     mapped,
     partition_of,
     places_of,
-    undivided,
 )
 from robochoc.protocols.inference.dpop_tables import (
     CoarseTable,
@@ -97,6 +96,7 @@ from robochoc.protocols.inference.dpop_tables import (
     IncomingTable,
     IncomingTables,
     Places,
+    Projection,
     Result,
     Table,
     Width,
@@ -391,7 +391,7 @@ class DPOP(TreeProtocol):
         self._to_join: list[Input] = []
         self._outlines: dict[str, list[Outline]] = {}
         """The outlines of the tables of children that have sent `SplitDimensions`."""
-        self._made: list[tuple[Table, Sequence[str]]] = []
+        self._made: list[tuple[Table | CoarseTable, Sequence[str]]] = []
         self._checked: list[TableScope] = []
         self._partitions: dict[tuple[str, tuple[int, ...]], Partition] = {}
         self._sizes: dict[str, int] = {}
@@ -438,7 +438,7 @@ class DPOP(TreeProtocol):
 
     def _compute_dimensions(self) -> None:
         """Compute the dimensions of this robot's table, and announce them."""
-        self._partitions.clear()  # in S-DPOP, the domains above may have changed
+        self._partitions = {}  # in S-DPOP, the domains above may have changed
         self._checked = self.problem.scopes_in_tables(self.ancestors)
         self._sizes = self._separator_sizes([one.agents for one in self._checked])
         self._dearest = self._upper_bound([one.max_cost for one in self._checked])
@@ -464,23 +464,27 @@ class DPOP(TreeProtocol):
 
     def _divide(self) -> None:
         """Divide the tables into groups that this robot's values do not connect."""
-        own = self.problem.agent
-        self._to_join = []
-        for scope in self._checked:
-            robots = (*scope.agents, own)
-            partitions = map(self._partition, robots, scope.places)
-            self._to_join.append(self._input(scope.max_cost, dict(zip(robots, partitions, strict=True))))
-        for child in self.children:
-            self._to_join += [self._input(*outline) for outline in self._outlines_of(child)]
-        self._parts = None
-        if not self.divides or all(one.is_whole for one in self._to_join):
-            result = Outline(self._dearest, dict.fromkeys(self._sizes))
-            self.groups = [undivided(self._to_join, self.problem.charges, result)]
+        self._parts, self.groups = None, []
+        if not self.divides or (not self._outlines and all(scope.places is None for scope in self._checked)):
+            return
+        self._to_join = self._inputs_of_join()
+        if all(one.is_whole for one in self._to_join):
             return
         self._parts = Parts(self.problem.values, self.problem.charges)
         self.groups = divided(self._parts, self._to_join, self._sizes)
         named = {name for group in self.groups for name in group.result.axes}
         self._sizes = {name: size for name, size in self._sizes.items() if name in named}
+
+    def _inputs_of_join(self) -> list[Input]:
+        """Return the tables that this robot joins: those of its constraints, and then its children's."""
+        found = []
+        for scope in self._checked:
+            robots = (*scope.agents, self.problem.agent)
+            axes = zip(robots, self._partitions_of(scope), strict=True)
+            found.append(self._input(scope.max_cost, dict(axes)))
+        for child in self.children:
+            found += [self._input(*outline) for outline in self._outlines_of(child)]
+        return found
 
     def _input(self, dearest: float, axes: Mapping[str, Partition]) -> Input:
         """Return a table to be joined, given all its axes. An axis with a single index is left out."""
@@ -501,7 +505,7 @@ class DPOP(TreeProtocol):
     def _dimensions(self, width: int, most: Need) -> Dimensions:
         """Return the dimensions of this robot's tables."""
         results = [group.result for group in self.groups]
-        if len(results) == 1 and all(axis is None for axis in results[0].axes.values()):
+        if not results or (len(results) == 1 and all(axis is None for axis in results[0].axes.values())):
             return Dimensions(self._sizes, self._dearest, width, most)
         tables = [
             TableSizes(
@@ -521,9 +525,10 @@ class DPOP(TreeProtocol):
     def _store_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Store the dimensions of a child's tables."""
         self._check_dimensions(child, dimensions)
-        outlines = outlines_of(child, dimensions) if isinstance(dimensions, SplitDimensions) else []
+        outlines = outlines_of(child, dimensions) if isinstance(dimensions, SplitDimensions) else None
         store_once(child, dimensions, self.dimensions, self.children)
-        self._outlines[child] = outlines
+        if outlines is not None:
+            self._outlines[child] = outlines
 
     def _check_dimensions(self, child: str, dimensions: Dimensions) -> None:
         """Raise `ValueError` unless `dimensions` are possible."""
@@ -582,7 +587,8 @@ class DPOP(TreeProtocol):
     def _memory_need(self) -> Need:
         """Return the memory that this robot's tables need: an integer, if it is small enough for a message."""
         inputs = [Extent(math.prod(self._lengths(scope)), 8) for scope in self._checked]
-        inputs += itertools.chain.from_iterable(map(self._child_extents, self.children))
+        for child in self.children:
+            inputs += self._child_extents(child)
         need = bytes_of(self._results(), inputs) + self._additional_bytes(inputs)
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
 
@@ -604,11 +610,13 @@ class DPOP(TreeProtocol):
 
     def _lengths(self, scope: TableScope) -> list[int]:
         """Return the shape of the table of a constraint that this robot checks."""
+        sizes = [*(len(self.domains[name]) for name in scope.agents), len(self.problem.values)]
+        return sizes if scope.places is None else list(map(length_of, self._partitions_of(scope), sizes))
+
+    def _partitions_of(self, scope: TableScope) -> list[Partition]:
+        """Return the partitions of the other robots' values, then of this robot's, by the variables in a constraint."""
         robots = (*scope.agents, self.problem.agent)
-        return [
-            length_of(self._partition(robot, places), len(self._values_of(robot)))
-            for robot, places in zip(robots, scope.places, strict=True)
-        ]
+        return [None] * len(robots) if scope.places is None else list(map(self._partition, robots, scope.places))
 
     def _values_of(self, robot: str) -> Sequence[Value]:
         """Return the values of this robot, or of a neighbour above."""
@@ -658,7 +666,7 @@ class DPOP(TreeProtocol):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._made = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
+        self._made = [(costs_of(table), (*table.agents, self.problem.agent)) for table in tables]
         del tables
         if not self.children:
             self._compute_utils()
@@ -670,15 +678,9 @@ class DPOP(TreeProtocol):
         if child not in self._axes:
             raise ValueError(f"{child} sent a table without a request")
         if child not in self.utils:
-            sizes = self.dimensions[child].separator
-            self.utils[child] = IncomingTables(
-                [
-                    IncomingTable(
-                        [length_of(one.axes[name], sizes[name]) for name in axes], one.dearest, on_disk=self._on_disk
-                    )
-                    for one, axes in zip(self._outlines_of(child), self._axes_below(child), strict=True)
-                ]
-            )
+            shapes = self._shapes_below(child)
+            tables = [IncomingTable(shape, dearest, on_disk=self._on_disk) for shape, dearest in shapes]
+            self.utils[child] = IncomingTables(tables)
         self.utils[child].add(width, costs)
         if self._all_arrived:
             self._compute_utils_of_all()
@@ -694,13 +696,24 @@ class DPOP(TreeProtocol):
 
     def _axes_below(self, child: str) -> list[Sequence[str]]:
         """Return, for each of a child's tables, the robots that its axes belong to."""
+        if child not in self._outlines:
+            return [self._table_axes(child)]
         return [[name for name in self._table_axes(child) if name in one.axes] for one in self._outlines_of(child)]
+
+    def _shapes_below(self, child: str) -> list[tuple[list[int], int]]:
+        """Return the shapes of a child's tables, and the upper bounds on their costs."""
+        dimensions = self.dimensions[child]
+        sizes = dimensions.separator
+        if child not in self._outlines:
+            return [([sizes[name] for name in self._table_axes(child)], dimensions.dearest)]
+        outlines = zip(self._outlines[child], self._axes_below(child), strict=True)
+        return [([length_of(one.axes[name], sizes[name]) for name in axes], one.dearest) for one, axes in outlines]
 
     def _compute_utils_of_all(self) -> None:
         """Join the children's tables, all of which have arrived, and free them."""
         for child in self.children:
-            arrived = zip(self.utils[child].tables, self._axes_below(child), strict=True)
-            self._made += [(table.costs, axes) for table, axes in arrived]
+            for table, axes in zip(self.utils[child].tables, self._axes_below(child), strict=True):
+                self._made.append((table.costs, axes))
         self.utils.clear()
         self._compute_utils()
 
@@ -716,18 +729,25 @@ class DPOP(TreeProtocol):
 
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree for each combination of values in the separator."""
-        found = []
-        for group in self.groups:
-            result = group.result
-            onto = [name for name in self.separator or () if name in result.axes]
-            shape = [length_of(result.axes[name], self._sizes[name]) for name in onto]
-            self._joined = [self._in_join(group, number, onto) for number in group.inputs]
-            found.append(project(shape, group.charges, self._joined, result.dearest, on_disk=self._on_disk))
+        if self._parts is None:
+            shape = [self._sizes[name] for name in self.separator or ()]
+            self._joined = [self._aligned(table, axes) for table, axes in self._made]
+            found = [project(shape, self.problem.charges, self._joined, self._dearest, on_disk=self._on_disk)]
+        else:
+            found = [self._projected_group(group) for group in self.groups]
         self._made.clear()
         self.choices = [one.choices for one in found]
         self._process_joined(found[0].costs)
         self._joined.clear()
         self._send_or_choose(*[one.costs for one in found])
+
+    def _projected_group(self, group: Group) -> Projection:
+        """Join the tables of a group, and minimise over this robot's values."""
+        result = group.result
+        onto = [name for name in self.separator or () if name in result.axes]
+        shape = [length_of(result.axes[name], self._sizes[name]) for name in onto]
+        tables = [self._in_join(group, number, onto) for number in group.inputs]
+        return project(shape, group.charges, tables, result.dearest, on_disk=self._on_disk)
 
     def _in_join(self, group: Group, number: int, onto: Sequence[str]) -> Table | CoarseTable:
         """Return the table with this `number` as a part of the join of `group`, with the axes `onto`."""
@@ -738,7 +758,8 @@ class DPOP(TreeProtocol):
         }
         if own is not NO_AXIS:
             places[self.problem.agent] = mapped(own, group.values)
-        return aligned(coarse(table, [places.get(name) for name in axes]), axes, (self.problem.agent, *onto))
+        costs = table.costs if isinstance(table, CoarseTable) else table
+        return aligned(coarse(costs, [places.get(name) for name in axes]), axes, (self.problem.agent, *onto))
 
     def _process_joined(self, costs: Codes) -> None:
         """Compute further results from the joined tables, besides the least `costs`. DPOP itself has none."""
@@ -797,6 +818,8 @@ class DPOP(TreeProtocol):
 def costs_of(table: CostTable) -> Table | CoarseTable:
     """Return the costs of a constraint, whose axes belong to the other robots and then to this robot."""
     lengths = table.charges.shape
+    if lengths == tuple(map(len, table.codes)):
+        return table.charges
     places = [
         None if len(codes) == length else np.array(codes, np.intp)
         for codes, length in zip(table.codes, lengths, strict=True)

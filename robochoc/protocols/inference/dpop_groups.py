@@ -230,11 +230,6 @@ class Parts:
         return int(matches.argmax())
 
 
-def undivided(inputs: Sequence[Input], charges: Sequence[float], result: Outline) -> Group:
-    """Return a single group of all tables, in which this robot has all its values."""
-    return Group(tuple(range(len(inputs))), frozenset([0]), np.arange(len(charges)), charges, result)
-
-
 def divided(parts: Parts, inputs: Sequence[Input], sizes: Mapping[str, int]) -> list[Group]:
     """Divide tables into groups that this robot's values do not connect.
 

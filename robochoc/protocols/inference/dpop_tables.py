@@ -89,6 +89,11 @@ class CoarseTable(NamedTuple):
                 kept.append(places if whole else None)
         return CoarseTable(self.costs[tuple(found)], tuple(kept))
 
+    def leading(self, place: Sequence[int]) -> CoarseTable:
+        """Return the part at these indices on the first axes after this robot's."""
+        leading = [index if length > 1 else 0 for index, length in zip(place, self.shape[1:], strict=False)]
+        return self.part([slice(None), *leading, *[slice(None)] * (len(self.places) - 1 - len(leading))])
+
     def aligned(self, axes: Sequence[str], onto: Sequence[str]) -> CoarseTable:
         """Return the result of the function `aligned`."""
         places = dict(zip(axes, self.places, strict=True))
@@ -104,8 +109,11 @@ class CoarseTable(NamedTuple):
 
 
 def coarse(table: Table, places: Sequence[Places | None]) -> Table | CoarseTable:
-    """Return `table`, as a `CoarseTable` if there are any `places`."""
-    return table if all(one is None for one in places) else CoarseTable(table, tuple(places))
+    """Return `table` with other indices; small tables are expanded at once."""
+    if all(one is None for one in places):
+        return table
+    found = CoarseTable(table, tuple(places))
+    return found if math.prod(found.shape) > SMALL else found.expanded()
 
 
 class Extent(NamedTuple):
@@ -188,14 +196,13 @@ def project(
     )
     split = _stepped(shape, len(charges))
     steps: list[list[Table | CoarseTable]] = [[] for _ in shape[:split]]
-    tables = [expanded(table) if math.prod(table.shape) <= SMALL else table for table in tables]
     fixed: Array = np.array(charges, np.float64).reshape(-1, *(1 for _ in shape[split:]))
     for table in sorted(tables, key=lambda table: [length > 1 for length in table.shape[split + 1 :]]):
         varying = [axis for axis, length in enumerate(table.shape[1 : split + 1]) if length > 1]
         if varying:
             steps[varying[-1]].append(table)
         else:
-            fixed = np.add(fixed, _floats(expanded(_part(table, [0] * split))))
+            fixed = np.add(fixed, _floats(_part(table, [0] * split)))
     codes = _Codes.least(len(charges), dearest, sum(map(len, steps)), math.prod(shape) * len(charges))
     numbers = codes.first(fixed)
     del fixed
@@ -253,6 +260,12 @@ class _Codes:
         if broken is not None:
             np.copyto(numbers, self.kind.type(self.infinite), where=broken)
         return numbers
+
+    def part(self, table: Table | CoarseTable, place: Sequence[int]) -> Any:  # noqa: ANN401 - integers or floats
+        """Return numbers for the part of `table` at these indices on the first axes after this robot's."""
+        if isinstance(table, CoarseTable):
+            return CoarseTable.expanded(self.further(table.leading(place)))
+        return self.further(_part(table, place))
 
     def store(self, numbers: Any, costs: Codes, choices: Codes) -> None:  # noqa: ANN401 - integers or floats
         """Store the costs and values of the least of `numbers`, a row for each of this robot's values."""
@@ -313,10 +326,10 @@ class _Join:
             full = (*place, index, *after)
             total = added
             for table in self._small[depth]:
-                block = expanded(_part(table, full))
+                block = _part(table, full)
                 total = block if total is None else total + block
             for large in self._large[depth]:
-                block = expanded(self._codes.further(_part(large, full)))
+                block = self._codes.part(large, full)
                 total = block if total is None else total + block
             self.fill((*place, index), total)
 
@@ -417,11 +430,10 @@ class IncomingTables:
         next((table for table in self.tables if not table.complete), self.tables[-1]).add(width, piece)
 
 
-def _part(table: Table | CoarseTable, place: Sequence[int]) -> Table | CoarseTable:
+def _part(table: Table | CoarseTable, place: Sequence[int]) -> Table:
     """Return the part of `table` at these indices on the first axes after this robot's."""
     if isinstance(table, CoarseTable):
-        leading = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
-        return table.part([slice(None), *leading, *[slice(None)] * (len(table.places) - 1 - len(leading))])
+        return table.leading(place).expanded()
     steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
     index: tuple[slice | int, ...] = (slice(None), *steps)
     return table[index]
