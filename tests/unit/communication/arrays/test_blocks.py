@@ -71,7 +71,8 @@ def test_random_teams_in_blocks_run_as_in_one(protocol: str, many: int) -> None:
         for seed in range(many):
             chance = drawn(f"blocks {protocol} {seed}")
             team = CompiledTeam(chance.choice(MAKERS)(chance), lambda robot: compiler.compile(robot).domain)
-            parts = Epoch(team, parameters=RunParameters(seed)).parts(protocol_named(protocol))
+            start = {n: chance.choice([*v.domain]) for n, v in team.team.variables.items() if chance.random() < 0.3}
+            parts = Epoch(team, parameters=RunParameters(seed, start=start)).parts(protocol_named(protocol))
             limits = Limits(messages=chance.randint(1, 60)) if chance.random() < 0.2 else Limits()
             settings = random_settings(protocol, chance)
             compare(describe_team(parts), protocol, settings, seed, chance.randint(2, 4), limits)
