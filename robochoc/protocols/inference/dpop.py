@@ -391,7 +391,8 @@ class DPOP(TreeProtocol):
         self._to_join: list[Input] = []
         self._outlines: dict[str, list[Outline]] = {}
         """The outlines of the tables of children that have sent `SplitDimensions`."""
-        self._made: list[tuple[Table | CoarseTable, Sequence[str]]] = []
+        self._made: list[tuple[Any, Sequence[str]]] = []
+        """Tables to be joined, and the robots of their axes: as they are if they are divided into groups."""
         self._checked: list[TableScope] = []
         self._partitions: dict[tuple[str, tuple[int, ...]], Partition] = {}
         self._sizes: dict[str, int] = {}
@@ -666,7 +667,10 @@ class DPOP(TreeProtocol):
     def _start_utils(self) -> None:
         """Make the tables of this robot's constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._made = [(costs_of(table), (*table.agents, self.problem.agent)) for table in tables]
+        whole = self._parts is None
+        self._made = [
+            (costs_of(table) if whole else table.charges, (*table.agents, self.problem.agent)) for table in tables
+        ]
         del tables
         if not self.children:
             self._compute_utils()
@@ -758,8 +762,7 @@ class DPOP(TreeProtocol):
         }
         if own is not NO_AXIS:
             places[self.problem.agent] = mapped(own, group.values)
-        costs = table.costs if isinstance(table, CoarseTable) else table
-        return aligned(coarse(costs, [places.get(name) for name in axes]), axes, (self.problem.agent, *onto))
+        return aligned(coarse(table, [places.get(name) for name in axes]), axes, (self.problem.agent, *onto))
 
     def _process_joined(self, costs: Codes) -> None:
         """Compute further results from the joined tables, besides the least `costs`. DPOP itself has none."""
