@@ -49,7 +49,8 @@ class SearchResult:
 
     `witness` is the robot that concluded the verdict alone, or None if the verdict follows from quiescence or a limit.
     `lost` maps the robots whose loss stopped the search to the reasons. `findings` is the robots' knowledge about the
-    team. `cycle_costs` contains the cost of the robots' values in each cycle, if the runtime has computed it.
+    team. `cycle_costs` contains the cost of the robots' values in each cycle, if the runtime has computed it, and
+    `best_cycle` their values in the first of the cheapest cycles.
     """
 
     verdict: Verdict
@@ -59,6 +60,7 @@ class SearchResult:
     lost: dict[str, str] = field(default_factory=dict)
     findings: dict[str, Findings] = field(default_factory=dict)
     cycle_costs: Sequence[float] = ()
+    best_cycle: dict[str, dict[str, int]] = field(default_factory=dict)
 
     @classmethod
     def of(

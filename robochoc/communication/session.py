@@ -49,10 +49,12 @@ class Session(ABC):
 
     `compiled` is the team that the robots use: first the given `team` (compiled without a solver unless it is already
     compiled), and after each `change` the team of that epoch. `starts_fresh`: robots keep no knowledge of the previous
-    epoch, even if their protocol could. `watch` receives snapshots during a search (None: no snapshots).
+    epoch, even if their protocol could. `watch` receives snapshots during a search (None: no snapshots). `brief`: the
+    caller needs only the best cycle of a search, so a runtime that knows this cycle reports no others.
     """
 
     starts_fresh: bool = False
+    brief: bool = False
     watch: SearchWatch | None = None
 
     def __init__(self, team: Team | CompiledTeam) -> None:

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 import msgspec
 
-from robochoc.model.outcome import Answer, CheckCounts, Improvement, Metrics, Optima, Outcome
+from robochoc.model.outcome import Answer, CheckCounts, Improvement, Metrics, Optima, Outcome, SearchStage
 from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.errors import RobochocError
 
@@ -98,7 +98,7 @@ def _in_json(name: str, value: Any, outcome: Outcome) -> Any:  # noqa: ANN401, C
         case Improvement():
             found = {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
             return {"seconds": found.pop("at_s"), **found}
-        case CheckCounts() | Optima():
+        case CheckCounts() | Optima() | SearchStage():
             return {key: _in_json(key, one, outcome) for key, one in value._asdict().items()}
         case Mapping():
             if name == "assignment":
@@ -194,6 +194,10 @@ def _outcome_fields(result: Any) -> Any:  # noqa: ANN401 - JSON
         found["epochs"] = [
             _answer_fields(one, symbols) | {"metrics": _metrics_fields(one)} if isinstance(one, dict) else one
             for one in epochs
+        ]
+    if isinstance(stages := result.get("stages"), list):
+        found["stages"] = [
+            [one.get(name) for name in SearchStage._fields] if isinstance(one, dict) else one for one in stages
         ]
     if "metrics" in result:
         found["metrics"] = _metrics_fields(result["metrics"])

@@ -26,7 +26,8 @@ class Began(Event, frozen=True):
     an epoch. `minimises`: the run minimises costs, so there may be `Improved` events.
 
     `start`: the values from which the search begins, by variable, if they are known (null: the robot withdraws).
-    `upper_bound`: the cost of these values, if the robots know it; they search for lower costs only.
+    `upper_bound`: the cost of these values, if the robots know it; they search for lower costs only. `continues`: the
+    search is for the same problem as the previous one, so the best assignment known so far remains known.
     """
 
     protocol: str
@@ -35,6 +36,7 @@ class Began(Event, frozen=True):
     minimises: bool | UnsetType = UNSET
     start: dict[str, int | None] | UnsetType = UNSET
     upper_bound: float | int | UnsetType = UNSET
+    continues: bool | UnsetType = UNSET
 
 
 class Given(Event, frozen=True):

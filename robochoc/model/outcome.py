@@ -106,6 +106,22 @@ class Improvement(NamedTuple):
     withdrawn: tuple[str, ...] = ()
 
 
+class SearchStage(NamedTuple):
+    """A stage of a run in which several protocols search in turn.
+
+    Attributes:
+        protocol: The name of the protocol.
+        seconds: The duration of the stage.
+        searches: The number of searches: 1, and one for each restart.
+        cost: The cost of the best assignment known at the end of the stage (None: none is known).
+    """
+
+    protocol: str
+    seconds: float
+    searches: int
+    cost: Cost | None
+
+
 CENTRAL_SOLVER = "the central solver"
 """The name in `confirmed_by` for ACE, including the checks made before ACE is called."""
 ALL_ROBOTS = "all robots"
@@ -306,6 +322,7 @@ class Outcome(Answer):
         symbols: The names of the team's symbols, if any: the value 2 means the symbol at index 2.
         symbolic: The variables whose values are symbols.
         chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.
+        stages: The stages of the run, if several protocols have searched in turn.
     """
 
     team: str
@@ -321,6 +338,7 @@ class Outcome(Answer):
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
     chosen: dict[str, str] = field(default_factory=dict)
+    stages: tuple[SearchStage, ...] = ()
 
     def __hash__(self) -> int:
         return hash((self.team, self.protocol, self.seed, self.verdict, frozenset(self.assignment.items())))
@@ -377,6 +395,7 @@ def _without_measurements(answer: Answer, kind: type[Answer]) -> dict[str, objec
     if answer.preprocessing is not None:
         parts["preprocessing"] = replace(answer.preprocessing, metrics=_counts(answer.preprocessing.metrics))
     if isinstance(answer, Outcome):
+        parts["stages"] = [(one.protocol, one.cost) for one in answer.stages]
         parts["epochs"] = [_without_measurements(epoch, EpochOutcome) for epoch in answer.epochs]
     return parts
 

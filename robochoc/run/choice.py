@@ -16,6 +16,7 @@ from robochoc.model.orders import Order
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.alternatives import refuse_team
 from robochoc.run.choice_rules import FEW_LOSSES, LOSSY, RULES
+from robochoc.run.choice_stages import with_stages
 from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.context import RunContext
 from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
@@ -69,6 +70,9 @@ def choose(team: Team, options: Options, *, environment: bool = False, ordered: 
     """
     if options.protocol == AUTO:
         choice = _decided(team, options, environment=environment)
+        if choice.analysis is not None:
+            staged = with_stages(choice.options, choice.analysis, lambda name, others: accepts(name, team, others))
+            choice = replace(choice, options=staged)
     elif (
         ordered
         or options.order is not None

@@ -6,19 +6,23 @@ access to the robots' files; with the one in `run/networked/machines.py`, robots
 
 from __future__ import annotations
 
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
 
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.model.cost_units import Cost
-from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.outcome import Metrics, Outcome, SearchStage, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
 from robochoc.run.options import Options
 from robochoc.run.phases import RunPhase, first_phase, second_phase
+from robochoc.run.registry import protocol_named
 from robochoc.run.starts import Start
+from robochoc.solver.compile import TeamCompileTimeoutError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"
@@ -29,10 +33,11 @@ FOUND_NOTHING = "ended, and found no assignment that satisfies all hard constrai
 class Deployment(ABC):
     """A team of robots that searches on command, on this machine or on several.
 
-    `options` are the options of the run.
+    `options` are the options of the run, `searches` the number of searches in the last stage.
     """
 
     options: Options
+    searches: int = 1
 
     @property
     def compile_s(self) -> float:
@@ -65,6 +70,15 @@ class Deployment(ABC):
     @abstractmethod
     def left_s(self) -> float | None:
         """Return the remaining seconds; None without a limit."""
+
+    def search_s(self, phase: RunPhase) -> float | None:
+        """Return the remaining seconds for the search of `phase`; None without a limit."""
+        left = self.left_s()
+        return None if left is None else max(0.0, left - phase.reserved_s)
+
+    def begun_from(self, phase: RunPhase, answer: PhaseAnswer) -> RunPhase:  # noqa: ARG002 - an implementation needs it
+        """Return `phase`, which begins with the assignment in `answer`."""
+        return phase
 
     @abstractmethod
     def search(self, phase: RunPhase) -> Search:
@@ -104,7 +118,7 @@ class Deployment(ABC):
 
     def evaluated(self, phase: RunPhase, search: Search) -> PhaseAnswer:
         """Return the answer of `search`. If the options require it, the central solver confirms the answer."""
-        deadline = self.options.deadline if self.left_s() == 0 else None
+        deadline = self.options.deadline if self.search_s(phase) == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.in_user_units, deadline))
         if self._found_nothing(phase, search, answer):
             answer = replace(answer, violations=search.violations())
@@ -197,9 +211,65 @@ def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: 
     """
     options = deployment.options
     phase = deployment.started(first_phase(options, protocol, deployment.withdrawal_cost))
-    answer = deployment.solve(phase)
+    if options.stages:
+        answer, stages = _solve_in_stages(deployment, options)
+        header = replace(header, stages=stages)
+    else:
+        answer = deployment.solve(phase)
     if answer.verdict == Verdict.NO_SOLUTION and options.withdraw is not None and not phase.withdrawal:
         phase = deployment.started(second_phase(options, deployment.withdrawal_cost))
         answer = answer.then(deployment.solve(phase))
         header = replace(header, placed_by=phase.name)
     return deployment.outcome(header, answer)
+
+
+def _solve_in_stages(deployment: Deployment, options: Options) -> tuple[PhaseAnswer, tuple[SearchStage, ...]]:
+    """Let several protocols search in turn, each from the best assignment so far. Return the answer and the stages.
+
+    A stage that is too large for its protocol is left out, unless it is the last one and there is no answer.
+    """
+    answer: PhaseAnswer | None = None
+    done: list[SearchStage] = []
+    for number, stage in enumerate(options.stages, start=1):
+        case = replace(options, protocol=stage.protocol, settings=stage.settings)
+        phase = first_phase(case, protocol_named(stage.protocol), deployment.withdrawal_cost)
+        phase = replace(phase, reserved_s=_reserved_s(options, stage.until), kept=stage.kept)
+        phase = deployment.started(phase) if answer is None else deployment.begun_from(phase, answer)
+        if answer is not None and deployment.search_s(phase) == 0:
+            continue
+        began = time.monotonic()
+        try:
+            found = deployment.solve(phase)
+        except (UnsupportedError, TeamCompileTimeoutError):
+            if answer is None and number == len(options.stages):
+                raise
+            continue
+        answer = found if answer is None else _improved(deployment, answer, found)
+        done.append(SearchStage(stage.protocol, time.monotonic() - began, deployment.searches, answer.cost))
+        if answer.verdict in {Verdict.OPTIMAL, Verdict.NO_SOLUTION} or stop_requested():
+            break
+    assert answer is not None  # noqa: S101 - for mypy: the last stage returns an answer or raises an error
+    return answer, tuple(done)
+
+
+def _reserved_s(options: Options, until: float) -> float:
+    """Return the seconds left for later stages after this fraction of the time until the deadline."""
+    return 0.0 if until >= 1 else (1 - until) * (options.deadline or 0.0) + (options.improve or 0.0)
+
+
+def _improved(deployment: Deployment, before: PhaseAnswer, found: PhaseAnswer) -> PhaseAnswer:
+    """Return the answer of all stages so far. `found` is that of the last one, which began from the answer `before`."""
+    answer = before.then(found)
+    if found.verdict == Verdict.NO_SOLUTION:
+        return answer
+    answer = replace(answer, reason=found.reason)
+    if before.assignment and not found.assignment:
+        answer = replace(answer, verdict=before.verdict, violations=None, **before.assignment_parts())
+    if found.verdict == Verdict.OPTIMAL:
+        return answer
+    signed = -1 if deployment.in_user_units(1) < deployment.in_user_units(0) else 1
+    bounds = [one.bound for one in (before, found) if one.bound is not None]
+    bound = max(bounds, key=lambda one: signed * one, default=None)
+    if bound is not None and answer.cost == bound and not answer.withdrawn and answer.verified:
+        return replace(answer, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
+    return replace(answer, bound=bound)

@@ -52,7 +52,7 @@ def best_known(
     """
     best: BestKnown | None = None
     objective = Objective(compiled.team, withdrawal_cost)
-    known = (start, result.assignments, *_earlier_assignments(compiled, result, objective), seen)
+    known = (start, *known_assignments(compiled, result, objective), seen)
     for own in [result.assignments] if final else [one for one in known if one is not None]:
         objective.reset()
         objective.change(own)
@@ -120,8 +120,9 @@ def merged_values(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
 _Own = dict[str, dict[str, int]]
 
 
-def _earlier_assignments(compiled: CompiledTeam, result: SearchResult, objective: Objective) -> Iterator[_Own]:
-    """Yield the cheapest assignments in the robots' findings."""
+def known_assignments(compiled: CompiledTeam, result: SearchResult, objective: Objective) -> Iterator[_Own]:
+    """Yield the robots' last values, and the cheapest assignments in their findings, by robot."""
+    yield result.assignments
     yield from _received_assignments(compiled, result.findings)
     yield from _best_cycle(compiled, result, objective)
 
@@ -136,6 +137,9 @@ def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Finding
 
 def _best_cycle(compiled: CompiledTeam, result: SearchResult, objective: Objective) -> Iterator[_Own]:
     """Yield the robots' values in the first of the cheapest cycles."""
+    if result.best_cycle:
+        yield result.best_cycle
+        return
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return

@@ -34,6 +34,7 @@ class KnownCosts:
         self._objective = objective
         self._least: float = INFINITE
         self._bounds: dict[str, float] = {}
+        self._earlier_bound: float = 0
         self._minimises = False
         self._last_t: float | None = None
         self.best: Cost | None = None
@@ -52,17 +53,19 @@ class KnownCosts:
                 self._improve(event.cost)
             case Bounded() if event.robot in self._objective.interfaces and 0 <= event.bound <= EXACT:
                 self._bounds[event.robot] = max(event.bound, self._bounds.get(event.robot, 0))
-                self.bound = self._objective.in_user_units(sum(self._bounds.values()))
+                self.bound = self._objective.in_user_units(max(self._earlier_bound, sum(self._bounds.values())))
             case _:
                 pass
 
     def _begin(self, began: Began) -> None:
         self._minimises = began.minimises is True
         self._objective.clear()
-        self._least = INFINITE
-        self._bounds.clear()
         self._last_t = None
-        self.best = self.bound = None
+        self._earlier_bound = max(self._earlier_bound, sum(self._bounds.values()))
+        self._bounds.clear()
+        if began.continues is not True:
+            self._least, self._earlier_bound = INFINITE, 0
+            self.best = self.bound = None
         if self._minimises and began.upper_bound is not UNSET:
             self._improve(began.upper_bound)
 
@@ -92,11 +95,13 @@ class DecidedValues:
         self._objective = objective
         self._minimises = False
         self._decisions: list[Decided] = []
+        self._earlier: tuple[float, dict[str, dict[str, int]]] = (INFINITE, {})
 
     def __call__(self, event: AnyEvent) -> None:
         """Process one event. `Began` starts a search."""
         match event:
             case Began():
+                self._earlier = self._cheapest_so_far() if event.continues is True else (INFINITE, {})
                 self._minimises = event.minimises is True
                 self._decisions = []
             case Decided() if self._minimises:
@@ -106,11 +111,15 @@ class DecidedValues:
 
     def cheapest(self) -> dict[str, dict[str, int]] | None:
         """Return the values of each robot in the cheapest assignment, or None if no assignment was feasible."""
+        cost, values = self._cheapest_so_far()
+        return values if cost < INFINITE else None
+
+    def _cheapest_so_far(self) -> tuple[float, dict[str, dict[str, int]]]:
+        """Return the cost and the values of the cheapest assignment in this search and those that it continues."""
         decisions = self._decisions
         by_time = sorted(decisions, key=attrgetter("t"))
         found = [self._cheapest(decisions), *([] if by_time == decisions else [self._cheapest(by_time)])]
-        cost, values = min(found, key=lambda one: one[0])
-        return values if cost < INFINITE else None
+        return min(self._earlier, *found, key=lambda one: one[0])
 
     def _cheapest(self, decisions: Sequence[Decided]) -> tuple[float, dict[str, dict[str, int]]]:
         """Return the cost and the values of the cheapest assignment in a sequence of decisions."""

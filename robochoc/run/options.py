@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import field
 from enum import StrEnum
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
@@ -102,6 +102,23 @@ class CentralSolverName(StrEnum):
     COSOCO = "cosoco"
 
 
+class Stage(NamedTuple):
+    """A stage of a run with a deadline, in which one protocol searches (`run/stages.py`).
+
+    Attributes:
+        protocol: The protocol.
+        until: The fraction of the time until the deadline after which the stage ends.
+        settings: The protocol's settings, as text.
+        kept: The search is restarted whenever it ends, and each robot keeps its value of the best assignment with this
+            probability. None: there is one search.
+    """
+
+    protocol: str
+    until: float
+    settings: Mapping[str, str] = {}
+    kept: float | None = None
+
+
 @dataclass(frozen=True)
 class Options:
     """The options of a run. `run/compatibility` decides which of them can be combined.
@@ -151,6 +168,8 @@ class Options:
             without a start value begin as in any run.
         cold: True if later epochs do not begin from the last assignment. Dynamic protocols begin with their own
             knowledge in any case.
+        stages: The protocols that search in turn until the deadline, of which `protocol` is the last (empty: only
+            `protocol` searches). They are chosen, not given.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
@@ -187,6 +206,7 @@ class Options:
     cluster: str | None = None
     start: Mapping[str, int | None] = field(default_factory=dict)
     cold: bool = False
+    stages: tuple[Stage, ...] = ()
 
     def __post_init__(self) -> None:
         for name, given in vars(self).copy().items():
@@ -265,6 +285,7 @@ _CONVERTERS = MappingProxyType(
         "cluster": optional(text),
         "start": start_values,
         "cold": flag,
+        "stages": items_of(instance_of(Stage), "objects of the class Stage"),
     }
 )
 """The converter for each field of `Options`. A field without a converter cannot be set."""

@@ -26,6 +26,10 @@ class RunPhase:
     `name` is the protocol's name, `parameters` are common to all robots. If `withdrawal` is set, robots may withdraw.
     `takes_over` is true in the second phase, in which another protocol replaces the chosen one. `start_cost` is the
     cost of the start assignment, if it is a solution (`run/starts.py`).
+
+    In a run with stages (`run/stages.py`), `reserved_s` are the seconds that are left for later stages. If `kept` is
+    set, the search is restarted whenever it ends, and each robot keeps its value of the best assignment with this
+    probability.
     """
 
     name: str
@@ -34,6 +38,8 @@ class RunPhase:
     withdrawal: bool = False
     takes_over: bool = False
     start_cost: float | None = None
+    reserved_s: float = 0.0
+    kept: float | None = None
 
     def beginning_with(self, start: Start) -> RunPhase:
         """Return this phase, which begins with `start`. Its cost is passed to robots that can use it."""

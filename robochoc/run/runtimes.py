@@ -28,6 +28,7 @@ from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.posix import IS_POSIX, REQUIREMENT
 
 if TYPE_CHECKING:
+    from robochoc.communication.arrays.session import Layouts
     from robochoc.communication.simulator.losses import Losses
     from robochoc.communication.simulator.schedule import Schedule
 
@@ -58,6 +59,8 @@ class SessionRequest:
         kills: The robots whose processes are to be killed.
         changes: True if the problem may change after the first search.
         deadline: The end of the run's time, on the monotonic clock. None: no limit.
+        restarts: True if the search is restarted many times.
+        layouts: The arrays of earlier sessions with the same team.
     """
 
     protocol: type[Protocol]
@@ -69,6 +72,8 @@ class SessionRequest:
     kills: KillSchedule | None = None
     changes: bool = False
     deadline: float | None = None
+    restarts: bool = False
+    layouts: Layouts | None = None
 
     @property
     def common(self) -> CommonArguments:
@@ -137,7 +142,9 @@ def open_simulator(request: SessionRequest) -> Session:
     from robochoc.communication.arrays.session import SimulatedArrays  # noqa: PLC0415 - start-up: numpy
 
     try:
-        session = SimulatedArrays(request.team, request.protocol, deadline=request.deadline, **request.common)
+        session = SimulatedArrays(
+            request.team, request.protocol, deadline=request.deadline, layouts=request.layouts, **request.common
+        )
     except UnsupportedError:
         return _simulation(request)
     session.simulate = partial(_simulation, request)
@@ -150,7 +157,7 @@ def _is_for_arrays(request: SessionRequest) -> bool:
     settings = read_settings(protocol, parameters.settings) if protocol.traits.arrays else None
     return (
         isinstance(settings, CycleCount)
-        and settings.cycles * len(request.team.team.robots) >= ROBOT_CYCLES
+        and (request.restarts or settings.cycles * len(request.team.team.robots) >= ROBOT_CYCLES)
         and request.observer is None
         and not request.changes
         and options.schedule == ScheduleName.CONCURRENT
@@ -198,7 +205,14 @@ def open_arrays(request: SessionRequest) -> Session:
     cluster = request.options.cluster
     if cluster is not None and request.observer is not None:
         raise UnsupportedError("an observer cannot be used with --cluster: remove one of them")
-    return ArraysRun(request.team, request.protocol, deadline=request.deadline, cluster=cluster, **request.common)
+    return ArraysRun(
+        request.team,
+        request.protocol,
+        deadline=request.deadline,
+        cluster=cluster,
+        layouts=request.layouts,
+        **request.common,
+    )
 
 
 def _schedule_of(options: Options) -> Schedule:

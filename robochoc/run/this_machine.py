@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import Epoch, Session
@@ -28,11 +28,16 @@ from robochoc.run.preprocessing import preprocessing_phase, removed_values, rest
 from robochoc.run.recording import objective_to_record
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
+from robochoc.run.stages import Restarts
 from robochoc.run.starts import Start, start_in
 from robochoc.solver.agent_problem import RunParameters, StartValues
 from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.system.stopping import stop_requested
 from robochoc.verification.objective import withdrawal_cost
+
+if TYPE_CHECKING:
+    from robochoc.communication.arrays.session import Layouts
 
 
 class StartEvents:
@@ -42,13 +47,21 @@ class StartEvents:
         self._observer = observer
         self._writer = TeamWriter()
 
-    def report(self, protocol: type[Protocol], start: EpochStart, session: Session | None = None) -> None:
+    def report(
+        self,
+        protocol: type[Protocol],
+        start: EpochStart,
+        session: Session | None = None,
+        *,
+        continues: bool = False,
+    ) -> None:
         """Report the start of a search.
 
         Args:
             protocol: The protocol of the search.
             start: The start of the epoch.
             session: The session of the search; None if it is opened later.
+            continues: True if earlier searches for the same problem count.
         """
         if self._observer is None:
             return
@@ -56,6 +69,8 @@ class StartEvents:
         detail: dict[str, Any] = {"epoch": number, "opened_by": opened_by} if number else {}
         if protocol.traits.costs:
             detail["minimises"] = True
+        if continues:
+            detail["continues"] = True
         self._observer(Began(t=0, protocol=protocol.__name__, **detail, **start_fields(epoch.parameters)))
         fresh = epoch.team.order if session and session.starts_fresh else epoch.restarted
         lossless = session is None or session.lossless
@@ -103,6 +118,11 @@ class ThisMachine(Deployment):
         """The compiled team of the last `search`. Before the first search, none of its robots is compiled."""
         self._phase: RunPhase | None = None
         """The phase of the current epoch, with its start."""
+        self._stage_team: CompiledTeam | None = None
+        """The compiled team of all stages."""
+        self._layouts: Layouts = {}
+        self._continues = False
+        """True if earlier searches for the same problem count."""
         self._preprocessings: list[Preprocessing] = []
         self._cut_short = ""
         """The reason why the last preprocessing did not finish."""
@@ -153,14 +173,24 @@ class ThisMachine(Deployment):
         """See `Deployment.left_s`."""
         return self._context.left_s()
 
+    def begun_from(self, phase: RunPhase, answer: PhaseAnswer) -> RunPhase:
+        """See `Deployment.begun_from`."""
+        team = self._scenario.team
+        withdrawn = {
+            one.name: None for robot in team.robots if robot.name in answer.withdrawn for one in robot.variables
+        }
+        values = answer.assignment | withdrawn
+        return phase.beginning_with(start_in(team, values, phase.parameters.withdrawal_cost)) if values else phase
+
     def remove(self, lost: Mapping[str, str]) -> None:
         """See `Deployment.remove`."""
+        self._stage_team, self._continues = None, False
         self._scenario.remove(lost.keys())
 
     def solve(self, phase: RunPhase) -> PhaseAnswer:
         """See `Deployment.solve`. The problem may change in the first phase only."""
         if not phase.withdrawal:
-            return self._solve_epochs(phase)
+            return self._solve_stage(phase) if self.options.stages else self._solve_epochs(phase)
         answer = replace(super().solve(phase), witness=None)  # `witness` explains the no-solution of the whole team
         return replace(answer, reason=answer.reason or self._absence_reason(answer, withdrawal=True))
 
@@ -169,13 +199,31 @@ class ThisMachine(Deployment):
         team = self._scenario.ordered_team()
         if phase.takes_over and phase.traits.costs and not self._order_requested:
             team = with_dom_deg_order(team)  # faster
-        self._searched = self._compiler.compile(team, every=True)
+        if self._searched.team != team or len(self._searched.robots) < len(team.robots):
+            self._searched = self._compiler.compile(team, every=True)
         epoch = Epoch(self._searched, parameters=phase.parameters)
-        self._start_events.report(phase.protocol, EpochStart(epoch))
+        self._start_events.report(phase.protocol, EpochStart(epoch), continues=self._continues)
+        self._continues = bool(self.options.stages)
         with self._session(phase, epoch.compiled) as session:
+            session.brief = phase.kept is not None
             self._watch(phase, EpochStart(epoch), session)
-            result = session.search(self.left_s(), self.options.messages)
+            result = session.search(self.search_s(phase), self.options.messages)
+            if phase.kept is not None:
+                result = self._restarted(phase, session, result)
         return self._checkable(phase, result, self._scenario.team, epoch.compiled)
+
+    def _restarted(self, phase: RunPhase, session: Session, result: SearchResult) -> SearchResult:
+        """Restart a search that has ended with `result` until its time is over; return the result of all searches."""
+        restarts = Restarts(self._searched, phase)
+        restarts.add(result)
+        while result.verdict == Verdict.SOLUTION and not (result.lost or stop_requested()) and self.search_s(phase):
+            epoch = Epoch(self._searched, parameters=restarts.next_parameters)
+            session.change(epoch)
+            self._start_events.report(phase.protocol, EpochStart(epoch), session, continues=True)
+            result = session.search(self.search_s(phase), self.options.messages)
+            restarts.add(result)
+        self.searches = restarts.searches
+        return restarts.result(result)
 
     def confirm(self, phase: RunPhase, answer: PhaseAnswer) -> tuple[str, ...]:
         """See `Deployment.confirm`."""
@@ -195,7 +243,24 @@ class ThisMachine(Deployment):
         before = total_preprocessing(self._preprocessings)
         return self._with_epochs(PhaseAnswer(Verdict.UNKNOWN, reason=reason, preprocessing=before))
 
+    def _solve_stage(self, phase: RunPhase) -> PhaseAnswer:
+        """Return the answer of a stage (`run/stages.py`)."""
+        self.searches = 1
+        try:
+            self._searched = self._stage_team or self._scenario.compiled()
+        except NoLocalSolutionError as alone:
+            return self._without_local_solution(alone)
+        self._stage_team = self._searched
+        answer = super().solve(phase)
+        why = answer.reason or self._absence_reason(answer, withdrawal=False)
+        return replace(answer, reason=why)
+
     # Epochs
+
+    def _without_local_solution(self, alone: NoLocalSolutionError) -> PhaseAnswer:
+        """Return the answer for a team with a robot that has no values."""
+        answer = PhaseAnswer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
+        return answer.confirmed_as(self._confirmed(alone.robot))
 
     def _solve_epochs(self, phase: RunPhase) -> PhaseAnswer:
         """Return the answer of the last epoch, with the metrics of all epochs."""
@@ -205,8 +270,7 @@ class ThisMachine(Deployment):
         try:
             compiled = scenario.compiled()
         except NoLocalSolutionError as alone:
-            answer = PhaseAnswer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
-            return answer.confirmed_as(self._confirmed(alone.robot))
+            return self._without_local_solution(alone)
         if self.options.preprocess is not None:
             compiled = scenario.prepared()
             if scenario.found is not None and not self._dynamic:
@@ -385,6 +449,8 @@ class ThisMachine(Deployment):
             context.kills,
             changes=self._dynamic,
             deadline=None if self._dynamic and self.options.deadline is not None else context.deadline,
+            restarts=phase.kept is not None,
+            layouts=self._layouts if self.options.stages else None,
         )
         return open_session(request)
 

@@ -53,7 +53,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
-    lines += [*_dropped(outcome), *_chosen(outcome), *_preprocessing(outcome)]
+    lines += [*_dropped(outcome), *_chosen(outcome), *_stages(outcome), *_preprocessing(outcome)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
@@ -75,8 +75,20 @@ def _dropped(outcome: Outcome) -> list[str]:
 def _chosen(outcome: Outcome) -> list[str]:
     """Return a line with the chosen protocol and order, and the reasons; empty if the user chose both."""
     names = {"protocol": outcome.protocol, "order": f"order {outcome.order}"}
-    words = [f"{names[part]}, as {why}" for part, why in outcome.chosen.items()]
+    words = [f"{names[part]}, as {why}" for part, why in outcome.chosen.items() if part in names]
     return [f"  chosen: {'; '.join(words)}"] if words else []
+
+
+def _stages(outcome: Outcome) -> list[str]:
+    """Return a line with the protocols that searched in turn, if there were several."""
+    if not outcome.stages:
+        return []
+    words = []
+    for stage in outcome.stages:
+        searches = f" in {stage.searches:,} searches" if stage.searches > 1 else ""
+        cost = "" if stage.cost is None else f": {_number(stage.cost)}"
+        words.append(f"{stage.protocol} {stage.seconds:.2f} s{searches}{cost}")
+    return [f"  stages: {'; '.join(words)}"]
 
 
 def _preprocessing(outcome: Outcome) -> list[str]:

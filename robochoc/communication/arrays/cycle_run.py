@@ -76,6 +76,7 @@ class CycleRun(ABC):
         tally: The counts of sent messages.
         checks: The constraint checks of all robots together.
         border: The connection to the robots in other processes.
+        starts: See `Description.starts`.
     """
 
     settings: CycleCount
@@ -108,6 +109,7 @@ class CycleRun(ABC):
         """For each message from all neighbours that `clocks` do not include, the checks after that message."""
         self._started_clocks = False
         self.border: Border = WHOLE_TEAM
+        self.starts = layout.description.starts
         names = layout.description.names
         self.draws = Draws(seed, (names[robot] for robot in layout.robots.tolist()), layout.many)
         self._firsts = [np.arange(group.active) * group.size for group in layout.groups]
@@ -182,7 +184,7 @@ class CycleRun(ABC):
 
     def choose_first_values(self) -> None:
         """Choose the start value, or a random value, for each robot with neighbours."""
-        starts = self.layout.description.starts
+        starts = self.starts
         for group in self.layout.groups:
             rows = np.arange(group.first, group.first + group.active)
             if starts is not None:

@@ -8,21 +8,22 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from robochoc.communication.arrays.array_runs import array_run_for
+from robochoc.communication.arrays.array_types import Integers
 from robochoc.communication.arrays.blocks import Limits, RunBlock, run_on_cluster
-from robochoc.communication.arrays.cycle_run import CycleChange, cycles_of
+from robochoc.communication.arrays.cycle_run import CycleChange, CycleRun, cycles_of
 from robochoc.communication.arrays.description import describe_team
 from robochoc.communication.arrays.layout import ArrayLayout
 from robochoc.communication.search_result import Progress, SearchResult
 from robochoc.communication.search_watch import snapshot_of
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Concluded, Decided, Observer
-from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Team
-from robochoc.protocols.findings import Findings, Trail
+from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import INFINITE, Team, Value
+from robochoc.protocols.findings import NO_FINDINGS, Findings, Trail
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import read_settings
 from robochoc.protocols.shared.cycles import CycleProtocol
-from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, StartValues
 from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
@@ -30,9 +31,14 @@ from robochoc.system.garbage import collection_paused
 from robochoc.system.stopping import stop_requested
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
+Layouts = dict[tuple[int, bool, bool], tuple[CompiledTeam, ArrayLayout]]
+"""The arrays of teams, by the identity of the team and the traits of the protocol on which the arrays depend."""
+MOST_CHANGES = 2_000_000
+"""The largest number of changed values that are recorded in a search that nobody observes."""
+
 
 class ArraysRun(Session):
-    """Runs one team as arrays. The team's problem cannot change.
+    """Runs one team as arrays. The team's problem cannot change, only the seed and the start values.
 
     Args:
         team: The team, whether compiled or not.
@@ -42,6 +48,8 @@ class ArraysRun(Session):
         parameters: The robots' parameters besides the problem.
         deadline: The end of the run's time, on the monotonic clock. None: no limit.
         cluster: See `Options.cluster`.
+        layouts: The arrays of teams in earlier sessions, for which the arrays need not be built again. New arrays are
+            added.
 
     Raises:
         UnsupportedError: if the protocol cannot run as arrays, or costs or tables are too large.
@@ -58,6 +66,7 @@ class ArraysRun(Session):
         parameters: RunParameters = DEFAULT_PARAMETERS,
         deadline: float | None = None,
         cluster: str | None = None,
+        layouts: Layouts | None = None,
     ) -> None:
         super().__init__(team)
         self._cluster = cluster
@@ -68,14 +77,33 @@ class ArraysRun(Session):
         assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
         given = read_settings(protocol, parameters.settings)
         settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
+        layouts = {} if layouts is None else layouts
+        key = id(self.compiled), protocol.traits.shared_scopes, protocol.traits.tree
+        if key not in layouts:
+            layouts[key] = self.compiled, self._laid_out(protocol, parameters, deadline)
+        self._layout = layouts[key][1]
+        self._form, self._settings = form, settings
+        self._names = self._layout.description.names
+        self._places: dict[str, dict[Value, int]] = {}
+        self._run = self._new_run(parameters)
+
+    def _laid_out(self, protocol: type[Protocol], parameters: RunParameters, deadline: float | None) -> ArrayLayout:
         try:
             with collection_paused():
                 parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
-                self._layout = computed_by(deadline, _laid_out, parts)
+                return computed_by(deadline, _laid_out, parts)
         except TimeLimitError:
             raise TeamCompileTimeoutError("the time was over before the robots knew their problems") from None
-        self._run = form(self._layout, settings, parameters.seed, changes=True)
-        self._names = self._layout.description.names
+
+    def _new_run(self, parameters: RunParameters) -> CycleRun:
+        """Return a run that has not started."""
+        self._recorded = 0
+        run = self._form(self._layout, self._settings, parameters.seed, changes=True)
+        if parameters.start:
+            run.starts = np.array([self._start_of(name, parameters.start) for name in self._names], np.int64)
+        else:
+            run.starts = None
+        return run
 
     @property
     def lossless(self) -> bool:
@@ -89,10 +117,13 @@ class ArraysRun(Session):
         began = time.monotonic()
         run = self._run
         verdict = Verdict.UNKNOWN
+        if self.brief and self._observer is None:
+            run.changes = None
         for _ in cycles_of(run):
             elapsed_s = time.monotonic() - began
             self._report(elapsed_s)
             self._watched()
+            self._limit_changes()
             if not run.is_over and (
                 self._is_to_stop
                 or (timeout is not None and elapsed_s > timeout)
@@ -105,9 +136,28 @@ class ArraysRun(Session):
         if self._observer and witness is not None:
             self._observer(Concluded(t=run.cycle, robot=witness, verdict=str(verdict)))
         metrics = run.metrics(time.monotonic() - began)
+        return self._result(verdict, witness, metrics)
+
+    def _result(self, verdict: Verdict, witness: str | None, metrics: Metrics) -> SearchResult:
+        costs = self.costs
+        best = self._own_values(self._run.best) if costs and min(costs) < INFINITE else {}
         return SearchResult(
-            verdict, witness, self._assignments(), metrics, findings=self._findings(), cycle_costs=self.costs
+            verdict,
+            witness,
+            self._assignments(),
+            metrics,
+            findings=self._findings(),
+            cycle_costs=costs,
+            best_cycle=best,
         )
+
+    def _limit_changes(self) -> None:
+        """Stop recording the changes of a long search, unless they are observed. The best cycle is known anyway."""
+        run = self._run
+        if run.changes and self._observer is None:
+            self._recorded += len(run.changes[-1].rows)
+            if self._recorded > MOST_CHANGES:
+                run.changes = None
 
     def _search_on(self, cluster: str, limits: Limits) -> SearchResult:
         """Search on a cluster. The observer receives nothing."""
@@ -133,9 +183,20 @@ class ArraysRun(Session):
     def _is_to_stop(self) -> bool:
         return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
-    def change(self, epoch: Epoch) -> None:  # noqa: ARG002 - of `Session`
-        """Raise `UnsupportedError`: this runtime does not support changes."""
-        raise UnsupportedError("--runtime arrays is for problems that do not change: use --runtime simulator")
+    def change(self, epoch: Epoch) -> None:
+        """See `Session.change`. Only the seed and the start values may change. Raises `UnsupportedError`."""
+        if epoch.compiled is not self.compiled or self._cluster is not None:
+            raise UnsupportedError("--runtime arrays is for problems that do not change: use --runtime simulator")
+        self._run = self._new_run(epoch.parameters)
+
+    def _start_of(self, name: str, start: StartValues) -> int:
+        """Return the index of a robot's start value; -1: there is none."""
+        if not self._places:
+            self._places = {
+                one: {value: place for place, value in enumerate(self.compiled[one].values)} for one in self._names
+            }
+        value = [start.get(variable) for variable in self.compiled.robots[name].robot.interface]
+        return self._places[name].get(tuple([part for part in value if part is not None]), -1)
 
     def close(self) -> None:
         """Do nothing: arrays have no resources to release."""
@@ -163,14 +224,20 @@ class ArraysRun(Session):
             self._observer(Decided(t=run.cycle, robot=name, assignment=assignment, clock=clock))
 
     def _assignments(self) -> dict[str, dict[str, int]]:
+        return self._own_values(self._run.values)
+
+    def _own_values(self, values: Integers) -> dict[str, dict[str, int]]:
+        """Return the values of each robot's variables; `values` contains the index for each row."""
         found: dict[str, dict[str, int]] = {name: {} for name in self._names}
-        for robot, value in zip(self._layout.robots.tolist(), self._run.values.tolist(), strict=True):
+        for robot, value in zip(self._layout.robots.tolist(), values.tolist(), strict=True):
             found[self._names[robot]] = self.compiled[self._names[robot]].solution(value)
         return found
 
     def _findings(self) -> dict[str, Findings]:
-        """Return each robot's values in every cycle."""
+        """Return each robot's values in every cycle; nothing if they were not recorded."""
         run = self._run
+        if run.changes is None:
+            return dict.fromkeys(self._names, NO_FINDINGS)
         entries: list[list[tuple[int, int]]] = [[] for _ in range(self._layout.many)]
         for cycle, (rows, values) in enumerate(run.changes or ()):
             for row, value in zip(rows.tolist(), values.tolist(), strict=True):
