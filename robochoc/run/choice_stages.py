@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import MappingProxyType
 
 from robochoc.run.facts import Facts
 from robochoc.run.options import AnswerRule, Options, Runtime, Stage
@@ -21,16 +22,28 @@ FIRST = 0.1
 """The end of the first complete search, as a fraction of the time until the deadline."""
 FIRST_ON_TREES = 0.5
 """The same for a protocol with tables on a pseudo-tree: it ends soon, or has no assignment."""
-MAXSUM_UNTIL, DSA_UNTIL, MGM2_UNTIL = 0.3, 0.6, 0.75
-"""The ends of the local searches."""
+CROWDED = 0.6
+"""The share of linked pairs of robots from which hard constraints are those of a crowd, such as different values for
+all: Max-Sum then finds no assignment, and MGM-2 the best ones."""
+LARGE_S = 400
+"""The robots and links for each second until the deadline from which the set-up of further searches takes too long."""
+LOCAL_SEARCHES = MappingProxyType(
+    {
+        (False, False): (("maxsum", 0.3), ("maxsum-ad", 0.5), ("dsa", 0.65), ("mgm2", 0.8)),
+        (True, False): (("dsa", 0.3), ("mgm2", 0.8)),
+        (False, True): (("maxsum-ad", 0.5), ("dsa", 1.0)),
+        (True, True): (("dsa", 0.3), ("mgm2", 1.0)),
+    }
+)
+"""The local searches and their ends for teams that are (crowded, large for the deadline). Only local search is used in
+large teams."""
 KEPT = 0.9
 """The probability that a robot keeps its value of the best assignment when a local search is restarted."""
 RENEWED = 2
 """The mean number of robots with new values in a small team, in which `KEPT` would renew fewer."""
 CYCLES = 30
-"""The number of cycles of a local search until it is restarted."""
+"""The number of cycles of DSA and MGM-2 until they are restarted."""
 MAXSUM_CYCLES = 1000
-
 
 WHY = "several protocols search in turn until the deadline, each from the best assignment so far"
 
@@ -69,19 +82,25 @@ def _applies(options: Options, facts: Facts) -> bool:
 
 
 def _stages(options: Options, facts: Facts) -> list[Stage]:
-    name = options.protocol
-    traits = protocol_named(name).traits
+    name, traits = options.protocol, protocol_named(options.protocol).traits
+    large = facts.robots + facts.links > LARGE_S * (options.deadline or 0.0)
+    crowded = facts.forbids and facts.share_linked >= CROWDED
     kept = min(KEPT, 1 - RENEWED / max(facts.robots, RENEWED))
-    cycles = {"cycles": str(CYCLES)}
-    local = [
-        Stage("maxsum", MAXSUM_UNTIL, {"cycles": str(MAXSUM_CYCLES)}),
-        Stage("dsa", DSA_UNTIL, cycles, kept),
-        Stage("mgm2", MGM2_UNTIL, cycles, kept),
-    ]
-    if not traits.complete:
-        return [*local[:-1], local[-1]._replace(until=1.0)]
+    local = [_local_search(one, until, kept) for one, until in LOCAL_SEARCHES[crowded, large]]
+    if large or not traits.complete:
+        return _within(local, 0.0, 1.0)
     if traits.wide_tables:
-        left = 1 - FIRST_ON_TREES
-        later = [one._replace(until=FIRST_ON_TREES + left * one.until / MGM2_UNTIL) for one in local]
-        return [Stage(name, FIRST_ON_TREES, options.settings), *later]
+        return [Stage(name, FIRST_ON_TREES, options.settings), *_within(local, FIRST_ON_TREES, 1.0)]
     return [Stage(name, FIRST, options.settings), *local, Stage(name, 1.0, options.settings)]
+
+
+def _local_search(name: str, until: float, kept: float) -> Stage:
+    if name.startswith("maxsum"):
+        return Stage(name, until, {"cycles": str(MAXSUM_CYCLES)})
+    return Stage(name, until, {"cycles": str(CYCLES)}, kept)
+
+
+def _within(stages: list[Stage], begin: float, end: float) -> list[Stage]:
+    """Return `stages` with the same proportions, the last of which ends at `end`."""
+    last = stages[-1].until
+    return [one._replace(until=begin + (end - begin) * one.until / last) for one in stages]

@@ -196,7 +196,7 @@ class ThisMachine(Deployment):
 
     def search(self, phase: RunPhase) -> Search:
         """See `Deployment.search`."""
-        team = self._scenario.ordered_team()
+        team = self._scenario.ordered_team() if self._stage_team is None else self._stage_team.team
         if phase.takes_over and phase.traits.costs and not self._order_requested:
             team = with_dom_deg_order(team)  # faster
         if self._searched.team != team or len(self._searched.robots) < len(team.robots):

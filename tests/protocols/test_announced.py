@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from operator import attrgetter
 from random import Random
 
 import pytest
 
-from robochoc.journal.events import AnyEvent, Began, Decided, Improved
-from robochoc.journal.journal import read_journal
-from robochoc.journal.recorder import JournalRecorder
-from robochoc.model.cost_units import Cost
+from robochoc.journal.events import AnyEvent, Began, Decided
 from robochoc.model.costs import normalized
-from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, solve
-from robochoc.run.known_costs import DecidedValues, KnownCosts
+from robochoc.run.known_costs import DecidedValues
 from robochoc.run.options import AnswerRule
-from robochoc.run.recording import journal_header, objective_to_record
+from robochoc.run.recording import objective_to_record
 from robochoc.run.registry import protocol_named
-from robochoc.verification.checker import assignment_cost
 from robochoc.verification.objective import Objective
 from tests.support.allocation_problems import ANY_TEAM
+from tests.support.announcements import best_of, check_announcements, observed
 from tests.support.cases import looped
 from tests.support.cost_problems import random_cost_team, random_hard_team, with_costs
 
@@ -31,42 +27,6 @@ MINIMISING = tuple(name for name in ANY_TEAM if protocol_named(name).traits.cost
 INCOMPLETE = tuple(name for name in MINIMISING if not protocol_named(name).traits.complete)
 COMPLETE = ("adopt", "bnb-adopt", "sfb", "syncbb")
 CYCLES = 8
-
-
-def observed(team: Team, options: Options) -> tuple[Outcome, list[AnyEvent], list[Cost]]:
-    """Return the outcome of a run, its events in the order of the reports, and all costs that were announced."""
-    events: list[AnyEvent] = []
-    recorder = JournalRecorder(journal_header(team, options), objective_to_record(team, options))
-
-    def observe(event: AnyEvent) -> None:
-        events.append(event)
-        recorder(event)
-
-    outcome = solve(team, options, observer=observe)
-    costs = [event.cost for event in read_journal(recorder.content()).events if isinstance(event, Improved)]
-    make = objective_to_record(team, options)
-    assert make is not None
-    known = KnownCosts(make())
-    for event in events:
-        known.add(event)
-        costs += [] if known.best is None else [known.best]
-    return outcome, events, costs
-
-
-def best(team: Team, costs: Iterable[Cost]) -> Cost:
-    return (max if team.user_units.maximize else min)(costs)
-
-
-def check(team: Team, options: Options) -> bool:
-    """Assert that the answer of a run is the best that was announced; return whether anything was."""
-    outcome, _, costs = observed(team, options)
-    if not costs:
-        return False
-    assert outcome.assignment, options
-    assert outcome.cost is not None
-    assert best(team, [outcome.cost, *costs]) == outcome.cost, options
-    assert assignment_cost(normalized(team), outcome.assignment) is not None
-    return True
 
 
 def some_team(chance: Random, number: int) -> Team:
@@ -89,7 +49,7 @@ def test_the_answer_is_the_best_that_was_announced(protocol: str) -> None:
         options = Options(
             protocol=protocol, runtime=Runtime.SIMULATOR, seed=number, schedule=schedule, settings=settings_of(protocol)
         )
-        any_announced += check(team, options)
+        any_announced += check_announcements(team, options)
     assert any_announced
 
 
@@ -102,7 +62,7 @@ def test_the_answer_of_a_search_that_was_cut_is_the_best_that_was_announced(prot
             protocol=protocol, runtime=Runtime.SIMULATOR, seed=number, messages=chance.choice((20, 60)),
             settings=settings_of(protocol), cache=False,
         )  # fmt: skip
-        any_announced += check(team, options)
+        any_announced += check_announcements(team, options)
     assert any_announced or protocol in {"duct", "maxsum", "bounded-maxsum"}
 
 
@@ -110,7 +70,9 @@ def test_the_answer_of_a_search_that_was_cut_is_the_best_that_was_announced(prot
 @pytest.mark.parametrize("protocol", ["dsa", "mgm2", "maxsum"])
 def test_that_it_is_so_in_other_runtimes(protocol: str, runtime: Runtime) -> None:
     team = random_cost_team(Random(4), n_ary=False)
-    assert check(team, Options(protocol=protocol, runtime=runtime, seed=2, settings=settings_of(protocol)))
+    assert check_announcements(
+        team, Options(protocol=protocol, runtime=runtime, seed=2, settings=settings_of(protocol))
+    )
 
 
 def test_a_better_assignment_between_two_cycles_is_the_answer() -> None:
@@ -121,7 +83,7 @@ def test_a_better_assignment_between_two_cycles_is_the_answer() -> None:
         options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, seed=seed, settings=settings)
         seen, unseen = observed(team, options)[0], solve(team, options)
         assert (seen.metrics.messages, seen.metrics.ncccs) == (unseen.metrics.messages, unseen.metrics.ncccs)
-        assert unseen.cost is None or (seen.cost is not None and best(team, [seen.cost, unseen.cost]) == seen.cost)
+        assert unseen.cost is None or (seen.cost is not None and best_of(team, [seen.cost, unseen.cost]) == seen.cost)
         better += seen.cost != unseen.cost
     assert better
 
@@ -142,7 +104,7 @@ def test_the_final_values_are_the_answer_on_request() -> None:
         if objective.cost < float("inf"):
             assert outcome.verdict is Verdict.SOLUTION
             assert outcome.cost == objective.in_user_units(objective.cost)
-            worse += best(team, costs) != outcome.cost
+            worse += best_of(team, costs) != outcome.cost
         else:
             assert outcome.verdict is Verdict.UNKNOWN
         assert solve(team, options).cost == outcome.cost

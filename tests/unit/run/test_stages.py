@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.coloring import coloring
-from robochoc.generators.random_csp import random_csp
+from robochoc.generators.families import FAMILIES
 from robochoc.journal.events import AnyEvent, Began, Decided
 from robochoc.model.costs import normalized
 from robochoc.model.outcome import Outcome, SearchStage, Verdict
@@ -18,7 +18,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import choose
 from robochoc.run.options import AnswerRule, Stage, Withdrawal
 from robochoc.verification.checker import assignment_cost
-from tests.protocols.test_announced import check
+from tests.support.announcements import check_announcements
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
 
@@ -73,9 +73,9 @@ def test_the_answer_is_never_worse_than_that_of_any_stage() -> None:
 def test_whatever_is_announced_in_a_stage_is_kept() -> None:
     for seed in range(3):
         team = random_cost_team(Random(seed), n_ary=False)
-        check(team, replace(IN_TURN, seed=seed, deadline=0.3))
+        check_announcements(team, replace(IN_TURN, seed=seed, deadline=0.3))
         dsa = (Stage("dsa", 0.5, {"cycles": "3"}, 0.5), Stage("mgm", 1.0, {"cycles": "3"}, 0.5))
-        check(team, replace(IN_TURN, seed=seed, deadline=0.3, protocol="mgm", stages=dsa))
+        check_announcements(team, replace(IN_TURN, seed=seed, deadline=0.3, protocol="mgm", stages=dsa))
 
 
 def test_arrays_and_objects_search_alike_from_a_start() -> None:
@@ -94,7 +94,7 @@ def test_arrays_and_objects_search_alike_from_a_start() -> None:
 
 
 def test_a_maximised_problem_and_robots_that_may_withdraw() -> None:
-    utilities = random_csp(agents=8, domain=3, density=0.5, max_cost=9, maximize=True, seed=1)
+    utilities = FAMILIES["random"](agents=8, domain=3, density=0.5, max_cost=9, maximize=True, seed=1)
     alone = solve(utilities, Options(protocol="sfb", runtime=Runtime.SIMULATOR))
     assert solve(utilities, IN_TURN).cost == alone.cost
     for seed in range(6):
@@ -105,8 +105,9 @@ def test_a_maximised_problem_and_robots_that_may_withdraw() -> None:
 
 
 def test_processes_search_in_turn() -> None:
-    team = random_cost_team(Random(3), n_ary=False)
-    outcome = solve(team, replace(IN_TURN, runtime=Runtime.PROCESSES, deadline=4.0))
+    team = random_cost_team(Random(4), n_ary=False)
+    stages = (Stage("dsa", 0.3, {"cycles": "3"}, 0.7), Stage("sfb", 1.0))
+    outcome = solve(team, replace(IN_TURN, runtime=Runtime.PROCESSES, deadline=5.0, stages=stages))
     assert outcome.verdict is Verdict.OPTIMAL
     assert outcome.cost == least_cost(team)
     assert outcome.stages[0].searches > 1
@@ -119,7 +120,8 @@ def test_auto_chooses_stages_only_for_a_deadline_and_costs() -> None:
     team = coloured()
     options = Options(runtime=Runtime.SIMULATOR, deadline=1.0)
     chosen = choose(team, options).options
-    assert [stage.protocol for stage in chosen.stages] == [chosen.protocol, "maxsum", "dsa", "mgm2", chosen.protocol]
+    names = [stage.protocol for stage in chosen.stages]
+    assert names == [chosen.protocol, "maxsum", "maxsum-ad", "dsa", "mgm2", chosen.protocol]
     assert [stage.until for stage in chosen.stages] == sorted(stage.until for stage in chosen.stages)
     assert chosen.stages[-1].until == 1.0
     assert "stages" in chosen.chosen
