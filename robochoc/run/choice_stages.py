@@ -37,6 +37,12 @@ LOCAL_SEARCHES = MappingProxyType(
 )
 """The local searches and their ends for teams that are (crowded, large for the deadline). Only local search is used in
 large teams."""
+PROCESSES_S = 20
+"""The same if each robot is a process: the number of robots for each second. Then there is only one search."""
+FIRST_IN_PROCESSES, DSA_IN_PROCESSES_UNTIL = 0.25, 0.6
+"""The ends of the first complete search and of DSA in processes."""
+MANY_CYCLES = 1_000_000
+"""The number of cycles of a search that ends only with its stage."""
 KEPT = 0.9
 """The probability that a robot keeps its value of the best assignment when a local search is restarted."""
 RENEWED = 2
@@ -45,6 +51,7 @@ CYCLES = 30
 """The number of cycles of DSA and MGM-2 until they are restarted."""
 MAXSUM_CYCLES = 1000
 
+ONLY_LOCAL = "the team is large for the deadline: only local searches give an answer in time"
 WHY = "several protocols search in turn until the deadline, each from the best assignment so far"
 
 
@@ -64,7 +71,10 @@ def with_stages(options: Options, facts: Facts, accepts: Callable[[str, Options]
     )
     if all(one.protocol == options.protocol for one in stages):
         return options
-    return replace(options, stages=stages, chosen={**options.chosen, "stages": WHY})
+    if options.protocol in {one.protocol for one in stages}:
+        return replace(options, stages=stages, chosen={**options.chosen, "stages": WHY})
+    last = stages[-1].protocol
+    return replace(options, protocol=last, stages=stages, chosen={"protocol": ONLY_LOCAL, "stages": WHY})
 
 
 def _applies(options: Options, facts: Facts) -> bool:
@@ -83,6 +93,8 @@ def _applies(options: Options, facts: Facts) -> bool:
 
 def _stages(options: Options, facts: Facts) -> list[Stage]:
     name, traits = options.protocol, protocol_named(options.protocol).traits
+    if options.runtime == Runtime.PROCESSES:
+        return _stages_in_processes(options, facts)
     large = facts.robots + facts.links > LARGE_S * (options.deadline or 0.0)
     crowded = facts.forbids and facts.share_linked >= CROWDED
     kept = min(KEPT, 1 - RENEWED / max(facts.robots, RENEWED))
@@ -92,6 +104,18 @@ def _stages(options: Options, facts: Facts) -> list[Stage]:
     if traits.wide_tables:
         return [Stage(name, FIRST_ON_TREES, options.settings), *_within(local, FIRST_ON_TREES, 1.0)]
     return [Stage(name, FIRST, options.settings), *local, Stage(name, 1.0, options.settings)]
+
+
+def _stages_in_processes(options: Options, facts: Facts) -> list[Stage]:
+    """Return the stages if each robot is a process: few, because the processes of each stage have to start."""
+    name, traits = options.protocol, protocol_named(options.protocol).traits
+    if facts.robots > PROCESSES_S * (options.deadline or 0.0) or not traits.complete:
+        return [Stage("dsa", 1.0, {"cycles": str(MANY_CYCLES)})]
+    first = Stage(name, FIRST_ON_TREES if traits.wide_tables else FIRST_IN_PROCESSES, options.settings)
+    local = Stage("dsa", DSA_IN_PROCESSES_UNTIL, {"cycles": str(MANY_CYCLES)})
+    if traits.wide_tables:
+        return [first, local._replace(until=1.0)]
+    return [first, local, Stage(name, 1.0, options.settings)]
 
 
 def _local_search(name: str, until: float, kept: float) -> Stage:
