@@ -37,7 +37,7 @@ LOCAL_SEARCHES = MappingProxyType(
 )
 """The local searches and their ends for teams that are (crowded, large for the deadline). Only local search is used in
 large teams."""
-PROCESSES_S = 20
+PROCESSES_S = 6
 """The same if each robot is a process: the number of robots for each second. Then there is only one search."""
 FIRST_IN_PROCESSES, DSA_IN_PROCESSES_UNTIL = 0.25, 0.6
 """The ends of the first complete search and of DSA in processes."""
