@@ -10,6 +10,8 @@ from typing import Any
 from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.model.outcome import Verdict
+from robochoc.run.defaults import AUTO, CENTRAL
+from robochoc.run.registry import protocol_named
 from robochoc.system.errors import RobochocError
 
 _OWN = "PROBLEM"
@@ -87,6 +89,7 @@ def repeat_commands(task: Task) -> str:
     words += ["--preprocess", setup.preprocess] if setup.preprocess else []
     words += ["--answer", setup.answer] if setup.answer != "best" else []
     words += ["--cold"] * setup.cold
+    words += ["--no-repair"] * (not setup.repair and _can_be_repaired(setup.protocol))
     words += ["--verify"] * setup.verify
     words += ["--owner", str(problem.parameters["owner"])] if problem.path and "owner" in problem.parameters else []
     words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]
@@ -118,3 +121,8 @@ def _options(words: list[str], parameters: Mapping[str, Any]) -> str:
         if value is not False:
             words += [option] if value is True else [word for one in several for word in (option, one)]
     return shlex.join([*words, "-o", _OWN])
+
+
+def _can_be_repaired(protocol: str) -> bool:
+    """Return whether a repair may follow the protocol called `protocol`."""
+    return protocol == AUTO or (protocol != CENTRAL and not protocol_named(protocol).traits.complete)

@@ -22,7 +22,7 @@ from robochoc.solver.errors import UnsupportedError
 
 RUN_KEYS = (
     "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw",
-    "preprocess", "answer", "cold", "verify", "timeout", "messages", "ncccs", "cycles",
+    "preprocess", "answer", "cold", "repair", "verify", "timeout", "messages", "ncccs", "cycles",
 )  # fmt: skip
 _CHOICES: Mapping[str, Sequence[str]] = {
     "runtime": tuple(map(str, Runtime)),
@@ -34,7 +34,9 @@ _CHOICES: Mapping[str, Sequence[str]] = {
 }
 MOST_SETUPS = 2000
 """The maximum number of ways to run in a table."""
-_LABELLED = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "answer", "cold", "verify")
+_LABELLED = (
+    "order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "answer", "cold", "repair", "verify",
+)  # fmt: skip
 """The options that a label may contain, in addition to the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
 _WITHIN = ("label", "settings", "seed", *_OWN_LIMITS)
@@ -179,6 +181,6 @@ def _differences(one: Setup, others: Sequence[Setup]) -> list[str]:
 def _label_word(name: str, value: object) -> str:
     if isinstance(value, ChannelModel):
         return value.name
-    if name in {"delay", "cold", "verify"}:
+    if name in {"delay", "cold", "repair", "verify"}:
         return f"{name}={_text(value)}" if value else ""
     return str(value) if value is not None else GIVEN if name == "order" else ""

@@ -53,6 +53,8 @@ class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
 class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """A protocol with its options. The attributes have the meaning of those in `robochoc.run.options.Options`.
 
+    By default there is no repair: a study compares the protocols themselves.
+
     `label` is the setup's name in tables and figures. `source` is the digest of the protocol's files, so that the runs
     of a changed protocol are repeated; it is empty for protocols of robochoc.
     """
@@ -70,6 +72,7 @@ class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=Tru
     preprocess: str | None = None
     answer: str = "best"
     cold: bool = False
+    repair: bool = False
     verify: bool = False
 
 

@@ -251,6 +251,8 @@ class Answer:
             constraints.
         violations: The hard constraints that the best complete assignment violates, if the verdict is `UNKNOWN` because
             no known assignment satisfies all of them.
+        repair: The protocol that continued after the chosen protocol had ended, because all its assignments violated
+            hard constraints. None: there was no repair.
     """
 
     verdict: Verdict
@@ -275,6 +277,7 @@ class Answer:
     improvements: tuple[Improvement, ...] = ()
     dropped_constraints: tuple[DroppedConstraint, ...] = ()
     violations: Violations | None = None
+    repair: str | None = None
 
     def assignment_parts(self) -> dict[str, Any]:
         """Return the fields that describe the assignment, by name. These fields belong together."""
@@ -378,7 +381,7 @@ class Outcome(Answer):
     @property
     def protocols(self) -> str:
         """The protocol of the run, and the protocol that decided the withdrawal if it is another one."""
-        return f"{self.protocol}, then {self.placed_by}" if self.placed_by else self.protocol
+        return ", then ".join(filter(None, [self.protocol, self.repair, self.placed_by]))
 
     @property
     def withdrawn_alive(self) -> tuple[str, ...]:

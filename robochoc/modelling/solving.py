@@ -91,6 +91,7 @@ class Solvable(ABC):
         bounds: bool = False,
         preprocess: str | None = None,
         answer: str = AnswerRule.BEST,
+        repair: bool = True,
         cluster: str | None = None,
         journal: Path | str | None = None,
         html: Path | str | None = None,
@@ -149,6 +150,8 @@ class Solvable(ABC):
                 preprocessing.
             answer: The answer of a search that proves nothing: `best`, the cheapest assignment found, or `final`, the
                 robots' last values.
+            repair: True if a local search repairs the assignment of an incomplete protocol that has ended with violated
+                hard constraints, unless the answer is `final` or there are limits other than on time.
             cluster: With arrays: the address of a Dask scheduler, or the path of its file. Its workers compute the run.
                 None: this process does.
             journal: The file to which the journal of the run is written: all messages and decisions.

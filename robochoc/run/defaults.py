@@ -10,6 +10,8 @@ DEFAULT_COST_PROTOCOL = "sfb"
 """The default protocol for a problem with costs. It also finds a minimum withdrawal if the chosen protocol cannot."""
 PREPROCESSING = "ac"
 """The protocol of `--preprocess ac`, which makes domains arc consistent. Users cannot choose it by name."""
+REPAIR = "gdba"
+"""The protocol that repairs an assignment that violates hard constraints (`run/phases.py`)."""
 FIRST_FIT = "first-fit"
 """The protocol of `--withdraw maximal`, which decides which robots withdraw. Users cannot choose it by name."""
 MOST_LOSS = 0.9

@@ -17,8 +17,8 @@ from robochoc.model.outcome import Metrics, Outcome, SearchStage, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
-from robochoc.run.options import Options
-from robochoc.run.phases import RunPhase, first_phase, second_phase
+from robochoc.run.options import AnswerRule, Options
+from robochoc.run.phases import MOST_REPAIRED, RunPhase, first_phase, repair_phase, second_phase
 from robochoc.run.registry import protocol_named
 from robochoc.run.starts import Start
 from robochoc.solver.compile import TeamCompileTimeoutError
@@ -27,6 +27,7 @@ from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"
 STOPPED = "somebody has asked to stop"
+NOTHING_SPENT = Metrics()
 FOUND_NOTHING = "ended, and found no assignment that satisfies all hard constraints"
 
 
@@ -112,8 +113,19 @@ class Deployment(ABC):
             RobotsLostError: if all robots were lost.
             RefutedError: if the check refutes the answer.
         """
-        phase, search = self._search_without_losses(phase)
-        answer = self.evaluated(phase, search)
+        spent = Metrics()
+        while True:
+            phase, search = self._search_without_losses(phase, spent)
+            answer = self.evaluated(phase, search)
+            if not self.needs_repair(phase, answer):
+                break
+            repair = repair_phase(self.options, answer.nearest)
+            again = self.search(repair)
+            if not again.result.lost:
+                answer = answer.repaired(self.evaluated(repair, again), repair.name)
+                break
+            spent = answer.metrics + again.result.metrics
+            phase = self._without(again.result.lost, phase)
         return replace(answer, reason=answer.reason or self.why_unknown(phase, answer))
 
     def evaluated(self, phase: RunPhase, search: Search) -> PhaseAnswer:
@@ -121,7 +133,9 @@ class Deployment(ABC):
         deadline = self.options.deadline if self.search_s(phase) == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.in_user_units, deadline))
         if self._found_nothing(phase, search, answer):
-            answer = replace(answer, violations=search.violations())
+            nearest = search.nearest()
+            if nearest is not None:
+                answer = replace(answer, violations=nearest.violations, nearest=nearest.assignment)
         if answer.verdict in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
             return answer.confirmed_as(self.confirm(phase, answer))
         return answer
@@ -131,6 +145,23 @@ class Deployment(ABC):
         if answer.verdict != Verdict.UNKNOWN or answer.assignment or search.result.lost or phase.withdrawal:
             return False
         return answer.ended or phase.traits.costs or self.options.deadline is not None
+
+    def needs_repair(self, phase: RunPhase, answer: PhaseAnswer) -> bool:
+        """Return whether `answer`, from the protocol of `phase`, is to be repaired: see `run/phases.py`.
+
+        There is no repair in runs with limits on messages, checks or cycles, of final assignments (if the options ask
+        for these), of large teams, and of runs in stages.
+        """
+        options = self.options
+        wanted = options.repair and options.answer == AnswerRule.BEST and not options.stages
+        limited = (options.messages, options.ncccs, options.cycles) != (None, None, None)
+        over = self.left_s() == 0 or stop_requested()
+        found = answer.ended and 0 < len(answer.nearest) <= MOST_REPAIRED and not phase.traits.complete
+        return wanted and found and not (limited or over) and self.can_repair(phase)
+
+    def can_repair(self, phase: RunPhase) -> bool:
+        """Return whether repairs support the constraints of the team, which the protocol of `phase` supports."""
+        return not phase.traits.partially_known
 
     def concluded(self, phase: RunPhase, search: Search, answer: PhaseAnswer) -> PhaseAnswer:  # noqa: ARG002 - as `confirm`
         """Return `answer`, the answer of `search`, or a better one found during the search."""
@@ -146,7 +177,8 @@ class Deployment(ABC):
             return why_spoiled(phase, answer.metrics)
         nearest = f"the best assignment violates {answer.violations}" if answer.violations else ""
         if answer.ended:
-            return "; ".join(filter(None, [f"{phase.name} {FOUND_NOTHING}", nearest]))
+            names = f"{phase.name}, then {answer.repair}," if answer.repair else phase.name
+            return "; ".join(filter(None, [f"{names} {FOUND_NOTHING}", nearest]))
         return "; ".join(filter(None, [self._limit_reached(answer.metrics), nearest, self.unsettled]))
 
     def _limit_reached(self, spent: Metrics) -> str:
@@ -179,22 +211,29 @@ class Deployment(ABC):
             return None
         return 0 if answer.verdict == Verdict.NO_SOLUTION else answer.count
 
-    def _search_without_losses(self, phase: RunPhase) -> tuple[RunPhase, Search]:
-        """Search until no robot is lost during a search. The metrics include all these searches.
+    def _search_without_losses(self, phase: RunPhase, spent: Metrics = NOTHING_SPENT) -> tuple[RunPhase, Search]:
+        """Search until no robot is lost during a search. The metrics include all these searches, and those `spent`.
 
         Returns the last search, and `phase` as it was in this search.
         """
-        spent = Metrics()
         while True:
             search = self.search(phase)
             result: SearchResult = search.result
             spent += result.metrics
             if not result.lost:
                 return phase, search._replace(result=replace(result, metrics=spent))
-            self.remove(result.lost)
-            if self.is_empty:
-                raise RobotsLostError(result.lost)
-            phase = self.without_lost(phase)
+            phase = self._without(result.lost, phase)
+
+    def _without(self, lost: Mapping[str, str], phase: RunPhase) -> RunPhase:
+        """Remove lost robots from the team, and return `phase` for the others.
+
+        Raises:
+            RobotsLostError: if no robot is left.
+        """
+        self.remove(lost)
+        if self.is_empty:
+            raise RobotsLostError(lost)
+        return self.without_lost(phase)
 
 
 def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: Outcome) -> Outcome:

@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import field, replace
 from typing import NamedTuple
 
 from robochoc.communication.search_result import SearchResult
@@ -37,31 +37,40 @@ Check = Callable[[], Answer | None]
 """A function that checks the assignment of a search. Returns it with an undecided verdict, or None if it is invalid."""
 
 
+class Nearest(NamedTuple):
+    """The best assignment of all robots, by variable, if all violate hard constraints, and its `violations`."""
+
+    assignment: dict[str, int]
+    violations: Violations
+
+
 def _nothing_known() -> None:
-    """Return None: nothing is known about violated constraints."""
+    """Return None: no assignment of all robots is known."""
 
 
 class Search(NamedTuple):
     """A finished search: its result, and the check of its assignment.
 
-    `violations` returns the hard constraints that the best assignment violates, if no known one satisfies all of them.
-    None: the robots never had values together, or it is unknown.
+    If no known assignment satisfies all hard constraints, `nearest` returns the best one. None: the robots never had
+    values together, or it is unknown.
     """
 
     result: SearchResult
     check: Check
-    violations: Callable[[], Violations | None] = _nothing_known
+    nearest: Callable[[], Nearest | None] = _nothing_known
 
 
 @dataclass(frozen=True, kw_only=True)
 class PhaseAnswer(Answer):
     """The answer of a phase of a run. `withdrawn` contains the robots that withdrew, without lost robots.
 
-    `ended`: true if the protocol terminated by itself, before any limit was reached.
+    `ended`: true if the protocol terminated by itself, before any limit was reached. `nearest` is the assignment to
+    which `violations` refer.
     """
 
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
+    nearest: dict[str, int] = field(default_factory=dict)
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> PhaseAnswer:
         """Return this answer, confirmed by the central `solvers`. Only they can verify `no-solution`."""
@@ -79,6 +88,15 @@ class PhaseAnswer(Answer):
             epochs=self.epochs,
             preprocessing=self.preprocessing,
         )
+
+    def repaired(self, second: PhaseAnswer, name: str) -> PhaseAnswer:
+        """Return the answer after a repair by the protocol called `name`, whose answer is `second`."""
+        violations = [one.violations for one in (second, self) if one.violations is not None]
+        least = min(violations, key=lambda one: one.number) if second.violations else None
+        found = replace(self.then(second), repair=name, violations=least, bound=self.bound)
+        if found.bound is not None and found.cost == found.bound:
+            return replace(found, verdict=Verdict.OPTIMAL, bound=None)
+        return found
 
     def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
         """Return the epoch that ended with this answer. Preprocessing is reported once, for the whole run."""
@@ -242,10 +260,10 @@ def check_with_files(
 
 
 @collection_paused()
-def violations_in_files(result: SearchResult, team: Team, compiled: CompiledTeam) -> Violations | None:
-    """Return the constraints in the files that the best assignment of a search violates; see `Search.violations`."""
+def nearest_by_files(result: SearchResult, team: Team, compiled: CompiledTeam) -> Nearest | None:
+    """Return the assignment of a search that violates the fewest constraints in the files; see `Search.nearest`."""
     nearest = least_violating(compiled, result)
-    return None if nearest is None else violated_constraints(team, nearest)
+    return None if nearest is None else Nearest(nearest, violated_constraints(team, nearest))
 
 
 def _checked_optima(

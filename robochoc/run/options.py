@@ -139,6 +139,8 @@ class Options:
             deadline).
         improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
         answer: The answer of a search that proves nothing: the best known assignment, or the last one.
+        repair: True if a local search repairs the assignment of an incomplete protocol that has ended without one that
+            satisfies all hard constraints (`run/phases.py`).
         withdraw: The rule by which robots withdraw if the team has no solution (None: no robot withdraws).
         schedule: The order of events in the simulator.
         delay: The longest delay of a message in the simulator, in constraint checks.
@@ -180,6 +182,7 @@ class Options:
     deadline: float | None = None
     improve: float | None = None
     answer: AnswerRule = AnswerRule.BEST
+    repair: bool = True
     withdraw: Withdrawal | None = None
     schedule: ScheduleName = ScheduleName.CONCURRENT
     delay: int = 0
@@ -259,6 +262,7 @@ _CONVERTERS = MappingProxyType(
         "deadline": optional(seconds),
         "improve": optional(seconds),
         "answer": one_of(AnswerRule),
+        "repair": flag,
         "withdraw": _withdrawal,
         "schedule": one_of(ScheduleName),
         "delay": count,

@@ -17,15 +17,18 @@ from robochoc.model.orders import Order, compute_order, with_dom_deg_order
 from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preprocessing, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.requirements import unmet_requirement
 from robochoc.run.context import RunContext
+from robochoc.run.defaults import REPAIR
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, violations_in_files
+from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, nearest_by_files
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.known_costs import DecidedValues
 from robochoc.run.options import AnswerRule, Runtime
-from robochoc.run.phases import RunPhase
+from robochoc.run.phases import RunPhase, repair_phase
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.recording import objective_to_record
+from robochoc.run.registry import protocol_or_stage
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.stages import Restarts
@@ -193,6 +196,11 @@ class ThisMachine(Deployment):
             return self._solve_stage(phase) if self.options.stages else self._solve_epochs(phase)
         answer = replace(super().solve(phase), witness=None)  # `witness` explains the no-solution of the whole team
         return replace(answer, reason=answer.reason or self._absence_reason(answer, withdrawal=True))
+
+    def can_repair(self, phase: RunPhase) -> bool:  # noqa: ARG002 - an implementation needs it
+        """See `Deployment.can_repair`."""
+        team, traits = self._scenario.team, protocol_or_stage(REPAIR).traits
+        return not any(unmet_requirement(robot, traits, team.owner) for robot in team.robots)
 
     def search(self, phase: RunPhase) -> Search:
         """See `Deployment.search`."""
@@ -402,14 +410,28 @@ class ThisMachine(Deployment):
             phase = phase.beginning_with(Start({}))
         search = self._checkable(phase, epoch.result, epoch.team, epoch.epoch.compiled)
         answer = self.evaluated(phase, search)
+        if self.needs_repair(phase, answer):
+            answer = self._repaired(epoch, answer)
         self._improvements = None
         return answer
+
+    def _repaired(self, epoch: FinishedEpoch, answer: PhaseAnswer) -> PhaseAnswer:
+        """Return the answer of a repair in `epoch`, or `answer` if a robot is lost during the repair."""
+        repair = repair_phase(self.options, answer.nearest)
+        number, compiled = len(self.epochs), epoch.epoch.compiled
+        start = EpochStart(Epoch(compiled, parameters=repair.parameters), number, epoch.opened_by if number else "")
+        self._start_events.report(repair.protocol, start)
+        with self._session(repair, compiled) as session:
+            self._watch(repair, start, session)
+            result = session.search(self.left_s())
+        search = self._checkable(repair, result, epoch.team, compiled)
+        return answer if search.result.lost else answer.repaired(self.evaluated(repair, search), repair.name)
 
     def _checkable(self, phase: RunPhase, result: SearchResult, team: Team, compiled: CompiledTeam) -> Search:
         """Return a finished search whose assignment is checked against the files of `team`."""
         final = self.options.answer == AnswerRule.FINAL
         check = partial(check_with_files, phase, result, team, compiled, self._decided, final=final)
-        return Search(result, check, partial(violations_in_files, result, team, compiled))
+        return Search(result, check, partial(nearest_by_files, result, team, compiled))
 
     def _ask_environment(self) -> None:
         """Pass the last epoch's answer to the environment, if there is one. The environment may add an event."""
@@ -438,12 +460,14 @@ class ThisMachine(Deployment):
 
     def _session(self, phase: RunPhase, compiled: CompiledTeam) -> Session:
         """Open a session for the phase's protocol."""
-        context = self._context
+        context, options = self._context, self.options
+        if options.runtime == Runtime.ARRAYS and not phase.traits.arrays:  # a repair
+            options = replace(options, runtime=Runtime.SIMULATOR, cluster=None)
         request = SessionRequest(
             phase.protocol,
             compiled,
             phase.parameters,
-            self.options,
+            options,
             self._observer,
             context.progress,
             context.kills,

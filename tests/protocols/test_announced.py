@@ -80,7 +80,7 @@ def test_a_better_assignment_between_two_cycles_is_the_answer() -> None:
     for seed in range(30):
         team = random_cost_team(chance, n_ary=False)
         settings = {"cycles": "3", "probability": "0.9"}
-        options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, seed=seed, settings=settings)
+        options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, seed=seed, settings=settings, repair=False)
         seen, unseen = observed(team, options)[0], solve(team, options)
         assert (seen.metrics.messages, seen.metrics.ncccs) == (unseen.metrics.messages, unseen.metrics.ncccs)
         assert unseen.cost is None or (seen.cost is not None and best_of(team, [seen.cost, unseen.cost]) == seen.cost)

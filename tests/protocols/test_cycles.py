@@ -120,7 +120,9 @@ def test_the_answer_is_the_cheapest_cycle(protocol: type[CycleProtocol], teams: 
             if result.verdict is Verdict.NO_SOLUTION:
                 continue
             costs = [sum(c.price(values) for c in team.constraints()) for values in assignments_by_cycle(team, result)]
-            options = Options(protocol=NAMES[protocol], runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "12"})
+            options = Options(
+                protocol=NAMES[protocol], runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "12"}, repair=False
+            )
             outcome = solve(team, options)
             assert outcome.cost == (None if min(costs) == INFINITE else min(costs))
 
@@ -137,8 +139,11 @@ def test_the_fewest_violations_of_any_cycle_are_reported(protocol: type[CyclePro
             for values in assignments_by_cycle(team, result)
         ]
         options = Options(protocol=NAMES[protocol], runtime=Runtime.SIMULATOR, seed=seed, settings={"cycles": "2"})
-        outcome = solve(team, options)
+        repaired, outcome = solve(team, options), solve(team, replace(options, repair=False))
+        assert (repaired.repair, outcome.repair) == ("gdba", None)
+        assert repaired.violations is not None
         assert outcome.violations is not None
+        assert repaired.violations.number <= outcome.violations.number
         assert (outcome.violations.number, outcome.violations.hard) == (min(broken), 6)
         assert len(outcome.violations.first) == min(broken) > 0
 
@@ -166,7 +171,7 @@ def test_where_no_cycle_is_a_solution_that_is_said_or_robots_withdraw() -> None:
     """Settings are not those of the protocol that says which robots withdraw."""
     team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
     options = Options(protocol="maxsum", runtime=Runtime.SIMULATOR, settings={"cycles": "3"})
-    outcome = solve(team, replace(options, protocol="dsa"))
+    outcome = solve(team, replace(options, protocol="dsa", repair=False))
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.reason == (
         "dsa ended, and found no assignment that satisfies all hard constraints; "

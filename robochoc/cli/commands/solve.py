@@ -41,6 +41,7 @@ from robochoc.cli.options.solve import (
     options_of,
     preprocess_option,
     protocol_option,
+    repair_option,
     settings_option,
     start_option,
     withdraw_option,
@@ -56,8 +57,8 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": (
-        "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--messages", "--ncccs", "--cycles",
-        "--count", "--with", "--cluster",
+        "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--no-repair", "--messages", "--ncccs",
+        "--cycles", "--count", "--with", "--cluster",
     ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
@@ -143,6 +144,7 @@ _SECTIONS: Sections = {
 @cold_option
 @preprocess_option
 @answer_option
+@repair_option
 @messages_option
 @click.option(
     "--ncccs",

@@ -82,6 +82,14 @@ answer_option = click.option(
     metavar="KIND",
     help="Answer without a proof: best (default) or final values.",
 )
+repair_option = click.option(
+    "--no-repair",
+    "repair",
+    is_flag=True,
+    flag_value=False,
+    default=True,
+    help="Do not repair violated hard constraints.",
+)
 preprocess_option = click.option(
     "--preprocess",
     type=click.Choice(["ac"]),
@@ -144,7 +152,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
-    "central_with", "cluster", "answer", "cold",
+    "central_with", "cluster", "answer", "cold", "repair",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

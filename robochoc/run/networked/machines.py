@@ -23,7 +23,7 @@ from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import ALL_ROBOTS, Answer, Improvement, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import PhaseAnswer, Search, is_proven
+from robochoc.run.evaluation import Nearest, PhaseAnswer, Search, is_proven
 from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
@@ -136,7 +136,7 @@ class Machines(Deployment):
         )
         if not result.lost:
             self._refuse_contradictions()
-        return Search(result, partial(self._check, phase, result), lambda: self._master.state.violations)
+        return Search(result, partial(self._check, phase, result), self._nearest)
 
     # Answers while the robots search
 
@@ -264,6 +264,11 @@ class Machines(Deployment):
             if assigned and not assignments[name]:
                 raise RobotsLostError({name: "it has reported that it has values, but not which"})
         return dict(assignments)
+
+    def _nearest(self) -> Nearest | None:
+        """Return the values that the robots have reported at the end, and the constraints that they found violated."""
+        violations = self._master.state.violations
+        return None if violations is None else Nearest(merged_values(self._values), violations)
 
     def _refuse_contradictions(self) -> None:
         """Raise `RefutedError` if robots contradict each other. It is unknown which robot lies."""

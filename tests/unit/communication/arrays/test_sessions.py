@@ -67,7 +67,7 @@ def test_a_limit_on_time_ends_the_run() -> None:
 
 def test_decisions_are_told_cycle_by_cycle_after_the_progress() -> None:
     seen: list[AnyEvent | Progress] = []
-    solve(random_cost_team(Random(3)), ARRAYS, observer=seen.append, progress=seen.append)
+    solve(random_cost_team(Random(3)), replace(ARRAYS, repair=False), observer=seen.append, progress=seen.append)
     decided = [event for event in seen if isinstance(event, Decided)]
     assert decided
     assert [event.t for event in decided] == sorted(event.t for event in decided)
