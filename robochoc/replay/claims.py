@@ -134,15 +134,18 @@ def _header_contradictions(
     """Yield contradictions between the header and the robots' parameters.
 
     If `placed_by` is given, the search was omitted because a robot had no solution by itself, and the first run is by
-    one of these protocols. Preprocessing before the search is not a run of the protocol.
+    one of these protocols. Preprocessing before the search is not a run of the protocol. If protocols search in turn,
+    the header's protocol is one of them, and restarts have other seeds.
     """
-    names = [run.began.protocol for run in runs if run.began and run.began.protocol != DisAC.__name__]
+    began = [run.began for run in runs if run.began and run.began.protocol != DisAC.__name__]
+    in_turn = any(one.continues is True for one in began)
     # The class may also be one that is not registered under a name.
-    found = protocol_by_class(names[0], [header.protocol]) if names else None
-    if found is not None and found[0] not in (header.protocol, placed_by):
+    names = [protocol_by_class(one.protocol, [header.protocol]) for one in (began if in_turn else began[:1])]
+    found = [one[0] for one in names if one is not None]
+    if len(found) == len(names) and found and not {header.protocol, placed_by} & {*found}:
         yield Contradiction(what="the header's protocol", recorded=header.protocol, replayed=found[0])
     for run in runs:
-        given = run.given
+        given = run.given if run.began is None or run.began.continues is not True else None
         if given and given.seed != header.seed:
             yield Contradiction(what="the header's seed", recorded=header.seed, replayed=given.seed)
             return

@@ -11,12 +11,16 @@ from robochoc.formats.result import read_result, result_json
 from robochoc.generators.coloring import coloring
 from robochoc.generators.families import FAMILIES
 from robochoc.journal.events import AnyEvent, Began, Decided
+from robochoc.journal.journal import read_journal
+from robochoc.journal.recorder import JournalRecorder
 from robochoc.model.costs import normalized
 from robochoc.model.outcome import Outcome, SearchStage, Verdict
 from robochoc.model.problem import INFINITE, Team
+from robochoc.replay import replay
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import choose
 from robochoc.run.options import AnswerRule, Stage, Withdrawal
+from robochoc.run.recording import journal_header, objective_to_record
 from robochoc.verification.checker import assignment_cost
 from tests.support.announcements import check_announcements
 from tests.support.brute_force import least_cost
@@ -111,6 +115,18 @@ def test_processes_search_in_turn() -> None:
     assert outcome.verdict is Verdict.OPTIMAL
     assert outcome.cost == least_cost(team)
     assert outcome.stages[0].searches > 1
+
+
+def test_a_journal_of_stages_is_replayed() -> None:
+    team = coloured()
+    stages = (Stage("dsa", 0.5, {"cycles": "5"}, 0.9), Stage("mgm2", 1.0, {"cycles": "5"}, 0.9))
+    options = replace(IN_TURN, protocol="mgm2", stages=stages, deadline=0.6)
+    recorder = JournalRecorder(journal_header(team, options), objective_to_record(team, options))
+    recorder.outcome = solve(team, options, observer=recorder)
+    journal = read_journal(recorder.content())
+    assert replay(journal).identical
+    began = [event for event in journal.events if isinstance(event, Began)]
+    assert len(began) == sum(stage.searches for stage in recorder.outcome.stages)
 
 
 # The choice
