@@ -43,12 +43,13 @@ FIRST_IN_PROCESSES, DSA_IN_PROCESSES_UNTIL = 0.25, 0.6
 """The ends of the first complete search and of DSA in processes."""
 MANY_CYCLES = 1_000_000
 """The number of cycles of a search that ends only with its stage."""
-KEPT = 0.9
-"""The probability that a robot keeps its value of the best assignment when a local search is restarted."""
+CYCLES, KEPT = 30, 0.9
+"""The number of cycles of DSA and MGM-2 until they are restarted, and the probability that a robot then keeps its value
+of the best assignment."""
+CYCLES_IF_EQUAL, KEPT_IF_EQUAL = 100, 0.95
+"""The same for DSA if all costs are equal: its robots then also leave assignments without a better one nearby."""
 RENEWED = 2
 """The mean number of robots with new values in a small team, in which `KEPT` would renew fewer."""
-CYCLES = 30
-"""The number of cycles of DSA and MGM-2 until they are restarted."""
 MAXSUM_CYCLES = 1000
 
 ONLY_LOCAL = "the team is large for the deadline: only local searches give an answer in time"
@@ -97,8 +98,7 @@ def _stages(options: Options, facts: Facts) -> list[Stage]:
         return _stages_in_processes(options, facts)
     large = facts.robots + facts.links > LARGE_S * (options.deadline or 0.0)
     crowded = facts.forbids and facts.share_linked >= CROWDED
-    kept = min(KEPT, 1 - RENEWED / max(facts.robots, RENEWED))
-    local = [_local_search(one, until, kept) for one, until in LOCAL_SEARCHES[crowded, large]]
+    local = [_local_search(one, until, facts) for one, until in LOCAL_SEARCHES[crowded, large]]
     if large or not traits.complete:
         return _within(local, 0.0, 1.0)
     if traits.wide_tables:
@@ -118,10 +118,12 @@ def _stages_in_processes(options: Options, facts: Facts) -> list[Stage]:
     return [first, local, Stage(name, 1.0, options.settings)]
 
 
-def _local_search(name: str, until: float, kept: float) -> Stage:
+def _local_search(name: str, until: float, facts: Facts) -> Stage:
     if name.startswith("maxsum"):
         return Stage(name, until, {"cycles": str(MAXSUM_CYCLES)})
-    return Stage(name, until, {"cycles": str(CYCLES)}, kept)
+    is_longer = name == "dsa" and facts.has_equal_costs
+    cycles, kept = (CYCLES_IF_EQUAL, KEPT_IF_EQUAL) if is_longer else (CYCLES, KEPT)
+    return Stage(name, until, {"cycles": str(cycles)}, min(kept, 1 - RENEWED / max(facts.robots, RENEWED)))
 
 
 def _within(stages: list[Stage], begin: float, end: float) -> list[Stage]:

@@ -173,6 +173,13 @@ class Facts:
         taken = -sum(math.log2(_share_allowed(one, self._domains, chance, most)) for one in self._sample)
         return taken * sum(1 for _ in self.first.constraints()) / len(self._sample) / bits
 
+    @cached_property
+    def has_equal_costs(self) -> bool:
+        """True if all costs of the sampled constraints are equal. Then many assignments cost the same."""
+        chance = Random(0)  # noqa: S311 - as above
+        costs = {cost for one in self._sample for cost in _sampled_costs(one, self._domains, chance)}
+        return len(costs - {0, INFINITE}) == 1
+
     @property
     def share_linked(self) -> float:
         """The share of pairs of robots that are parent and child."""
@@ -259,6 +266,16 @@ def _share_allowed(
     sampled = product(*columns) if many <= DRAWS else (_drawn(columns, chance) for _ in range(DRAWS))
     price = cost_function(constraint, constraint.variables)
     return max(sum(price(values) <= most for values in sampled), 1 / 2) / number
+
+
+def _sampled_costs(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> set[float]:
+    """Return the costs of a relation's tuples, or of some value combinations of another constraint."""
+    definition = constraint.definition
+    if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
+        return {*definition.costs, definition.default_cost}
+    columns = [list(domains[name]) for name in constraint.variables]
+    price = cost_function(constraint, constraint.variables)
+    return {price(_drawn(columns, chance)) for _ in range(DRAWS)} if all(columns) else set()
 
 
 def _largest_share_excluded(constraint: Constraint, domains: Mapping[str, Collection[int]]) -> float:
