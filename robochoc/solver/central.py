@@ -183,6 +183,18 @@ class CentralSolver:
                     assignment.update(zip(part.names, part.decoded(codes), strict=True))
                 yield {name: assignment[name] for name in team.variables}
 
+    def first_solution(self, part: Component) -> SolverAnswer:
+        """Return one solution of a connected component, or the answer that there is none.
+
+        Raises:
+            SolverTimeoutError: if the deadline has passed during the search.
+            TimeLimitError: if the deadline has passed before the search.
+        """
+        with ExitStack() as processes:
+            ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
+            spare = processes.enter_context(AceProcess(always=True))
+            return self._solve(part, ace, spare, count=False)
+
     def _all_components(self, team: Team, *, count: bool) -> CentralAnswer:
         """Solve the components of a problem without costs, the smallest first, or multiply their counts."""
         with ExitStack() as processes:

@@ -40,7 +40,7 @@ _CHUNK = 1 << 20
 
 
 class ExternalProcess:
-    """The process of `program`, started by the first task. `close` ends it, with the programs that it has started."""
+    """The process of `program`, started by the first task. `close` ends it, and the programs that it has started."""
 
     def __init__(self, program: ExternalProgram) -> None:
         self.program = program
@@ -138,7 +138,7 @@ class ExternalProcess:
     def close(self) -> None:
         """End the process."""
         if self._process is not None:
-            if IS_POSIX:
+            if IS_POSIX and self.program.ends_group:
                 with suppress(ProcessLookupError):
                     os.killpg(self._process.pid, signal.SIGKILL)
             self._process.kill()
@@ -157,7 +157,9 @@ class ExternalProcess:
         if isinstance(message, TaskFailed):
             self.close()
             if message.missing:
-                raise SolverMissingError(f"{self.name} cannot be used ({message.why}); run: {self.program.install}")
+                is_complete = "; run: " in message.why  # by `AceProcess`
+                why = f"{self.name} cannot be used ({message.why}); run: {self.program.install}"
+                raise SolverMissingError(message.why if is_complete else why)
             raise SolverLostError(f"{self.name} failed: {message.why}")
         if message.codes is not None:
             if len(message.codes) != len(task.domains):

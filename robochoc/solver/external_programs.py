@@ -1,4 +1,4 @@
-"""The external solvers of networks: CP-SAT of OR-Tools, toulbar2 and cosoco, each with its package and its limits."""
+"""The external solvers of networks: CP-SAT of OR-Tools, toulbar2, cosoco and ACE, each with its package and limits."""
 
 from __future__ import annotations
 
@@ -22,11 +22,12 @@ class ExternalProgram(NamedTuple):
 
     Attributes:
         name: Its name in messages.
-        extra: The extra of robochoc that installs it; also the value of `--with`.
+        extra: The extra of robochoc that installs it; also the value of `--with`. Empty for ACE.
         package: Its Python package.
         module: The module that runs as its process.
         refusal: Returns the reason why it cannot solve a network with costs (None: it can).
         interrupt: A signal after which its process returns the best solution found (None: it observes the deadline).
+        ends_group: True if the programs that its process has started must be ended, too.
     """
 
     name: str
@@ -35,10 +36,13 @@ class ExternalProgram(NamedTuple):
     module: str
     refusal: Callable[[Network, Costs], str | None]
     interrupt: int | None = None
+    ends_group: bool = True
 
     @property
     def install(self) -> str:
-        """Return the command that installs it."""
+        """Return the command that installs it. ACE comes with robochoc."""
+        if not self.extra:
+            return "pip install --force-reinstall robochoc"
         return f"pip install 'robochoc[{self.extra}]'"
 
     def is_installed(self) -> bool:
@@ -46,7 +50,7 @@ class ExternalProgram(NamedTuple):
         return importlib.util.find_spec(self.package) is not None
 
 
-def _no_refusal(network: Network, costs: Costs) -> str | None:  # noqa: ARG001 - CP-SAT supports all networks
+def _no_refusal(network: Network, costs: Costs) -> str | None:  # noqa: ARG001 - these support all networks
     return None
 
 
@@ -86,4 +90,5 @@ TOULBAR2 = ExternalProgram(
     getattr(signal, "SIGVTALRM", None),
 )
 COSOCO = ExternalProgram("cosoco", "cosoco", "cosoco_bin", "robochoc.solver.cosoco_process", _refusal_of_cosoco)
+ACE_NETWORK = ExternalProgram("ACE", "", "pycsp3", "robochoc.solver.ace_network_process", _no_refusal, ends_group=False)
 PROGRAMS = {program.extra: program for program in (CP_SAT, TOULBAR2, COSOCO)}

@@ -1,7 +1,7 @@
 """A central solver that gives each independent component to an external solver, or to two of them in parallel.
 
-Solvers receive the tables over codes that ACE receives (`solver/encoding.py`, `solver/weighted.py`), without cliques
-and symmetries. The sum of costs is at most `weighted.MAX_TOTAL_COST`, which fits in 64 bits.
+Solvers receive tables over codes (`solver/encoding.py`, `solver/weighted.py`). The sum of costs is at most
+`weighted.MAX_TOTAL_COST`, which fits in 64 bits.
 """
 
 from __future__ import annotations
@@ -10,15 +10,14 @@ import select
 import time
 from collections.abc import Callable, Iterator, Sequence
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Self
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.solver.ace import AceProcess, SolverAnswer
-from robochoc.solver.central import ACE, ENUMERATION, HEDGE_S, CentralAnswer
-from robochoc.solver.encoding import Costs, Network
-from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError, UnsupportedError
-from robochoc.solver.external_process import REPORT_TIME_S
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.central import ENUMERATION, HEDGE_S, CentralAnswer
+from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
+from robochoc.solver.external_process import REPORT_TIME_S, ExternalProcess
 from robochoc.solver.network_task import TaskAnswer
 from robochoc.solver.weighted import WeightedComponent, constant_costs, priced_components
 from robochoc.system.time_limit import TimeLimitError, computed_by
@@ -29,76 +28,6 @@ NOTHING = TaskAnswer(None, proven=False)
 
 class Pending:
     """Only a part of an answer has arrived."""
-
-
-class Runner(Protocol):
-    """A solver of networks in a process: `ExternalProcess` or `AceRunner`."""
-
-    @property
-    def name(self) -> str:
-        """The name of the solver."""
-
-    def fileno(self) -> int:
-        """See `ExternalProcess.fileno`."""
-
-    def submit(self, network: Network, costs: Costs, deadline: float | None) -> None:
-        """See `ExternalProcess.submit`."""
-
-    def receive(self) -> TaskAnswer | None:
-        """See `ExternalProcess.receive`."""
-
-    def interrupt(self) -> None:
-        """See `ExternalProcess.interrupt`."""
-
-    def last_answer(self, until: float) -> TaskAnswer:
-        """See `ExternalProcess.last_answer`."""
-
-    def close(self) -> None:
-        """See `ExternalProcess.close`."""
-
-
-class AceRunner:
-    """ACE as a runner."""
-
-    name = ACE
-
-    def __init__(self) -> None:
-        self._ace = AceProcess(always=True)
-        self._costs: Costs = ()
-
-    def fileno(self) -> int:
-        """See `AceProcess.fileno`."""
-        return self._ace.fileno()
-
-    def submit(self, network: Network, costs: Costs, deadline: float | None) -> None:
-        """See `ExternalProcess.submit`."""
-        self._costs = costs
-        try:
-            self._ace.submit(network, limit=1, costs=costs, deadline=deadline)
-        except SolverTimeoutError:
-            raise TimeLimitError from None
-
-    def receive(self) -> TaskAnswer | None:
-        """Return the answer after `fileno` has become readable."""
-        return self._answer(self._ace.answer(), proven=True)
-
-    def interrupt(self) -> None:
-        """Do nothing: `last_answer` reads the solutions that ACE has written."""
-
-    def last_answer(self, until: float) -> TaskAnswer:  # noqa: ARG002 - an override
-        """Return the best solution that ACE has written, and end it."""
-        best = self._ace.abort().best
-        return NOTHING if best is None else TaskAnswer(best, proven=False)
-
-    def close(self) -> None:
-        """End the process."""
-        self._ace.close()
-
-    def _answer(self, found: SolverAnswer, *, proven: bool) -> TaskAnswer:
-        if not found.found:
-            return TaskAnswer(None, proven=proven)
-        codes = found.solutions[0]
-        return TaskAnswer(codes, proven=proven, bound=sum(unit * codes[place] for place, unit in self._costs))
 
 
 class RacingSolver:
@@ -112,7 +41,7 @@ class RacingSolver:
     def __init__(
         self,
         name: str,
-        runners: Sequence[Runner],
+        runners: Sequence[ExternalProcess],
         deadline: float | None = None,
         progress: Callable[[], None] | None = None,
         *,
@@ -235,8 +164,8 @@ class RacingSolver:
         return _best(part, answers)
 
     def _next_started(
-        self, part: WeightedComponent, waiting: Iterator[Runner], failures: list[Exception]
-    ) -> list[Runner]:
+        self, part: WeightedComponent, waiting: Iterator[ExternalProcess], failures: list[Exception]
+    ) -> list[ExternalProcess]:
         """Start the next solver that supports the component, if any. Add the errors of others to `failures`."""
         for runner in waiting:
             try:
@@ -255,7 +184,7 @@ class RacingSolver:
         return _TICK_S if self._deadline is None else max(0.0, min(_TICK_S, self._deadline - time.monotonic()))
 
 
-def _received(runner: Runner, failures: list[Exception]) -> TaskAnswer | Pending | None:
+def _received(runner: ExternalProcess, failures: list[Exception]) -> TaskAnswer | Pending | None:
     """Return the answer of a runner. None: it has failed; the error is added to `failures`."""
     try:
         return runner.receive() or Pending()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection
 
 from robochoc.model.outcome import CENTRAL_SOLVER
 from robochoc.model.problem import ProblemKind, Team
@@ -11,20 +11,29 @@ from robochoc.solver.cache import SolutionCache
 from robochoc.solver.central import ACE, ENUMERATION, CentralAnswer, CentralSolver
 from robochoc.solver.errors import SolverMissingError
 from robochoc.solver.external_process import ExternalProcess
-from robochoc.solver.external_programs import COSOCO, CP_SAT, TOULBAR2, ExternalProgram
-from robochoc.solver.racing import AceRunner, RacingSolver, Runner
+from robochoc.solver.external_programs import ACE_NETWORK, COSOCO, CP_SAT, TOULBAR2, ExternalProgram
+from robochoc.solver.racing import RacingSolver
 
 FOR_COSTS = (TOULBAR2, CP_SAT)
-FOR_SATISFACTION = (CP_SAT, COSOCO)
+FOR_SATISFACTION = (COSOCO, CP_SAT)
 
 
-def programs(*, has_costs: bool) -> list[ExternalProgram]:
-    """Return the installed external solvers for problems with or without costs, the best first."""
-    return [one for one in (FOR_COSTS if has_costs else FOR_SATISFACTION) if one.is_installed()]
+def programs(*, has_costs: bool, without: Collection[str] = ()) -> list[ExternalProgram]:
+    """Return the external solvers for problems with or without costs, the best first, with ACE among them.
+
+    `without` are the names of solvers that must not be used. The list is empty if only ACE is left: `CentralSolver`
+    does more than ACE as an external solver.
+    """
+    listed = FOR_COSTS if has_costs else FOR_SATISFACTION
+    chosen = [one for one in listed if one.name not in without and one.is_installed()]
+    if chosen and ACE not in without:
+        # Without costs ACE is the second one, because its cliques prove what others do not.
+        chosen.insert(len(chosen) if has_costs else 1, ACE_NETWORK)
+    return chosen
 
 
 class AutoSolver:
-    """Solves teams with the best installed solver (`programs`), and ACE in parallel if it takes long.
+    """Solves teams with the best installed solver (`programs`), and the next one in parallel if it takes long.
 
     ACE alone counts solutions, and solves all problems if no external solver is installed. For the arguments see
     `CentralSolver`; `without` are the names of solvers that must not be used.
@@ -38,7 +47,7 @@ class AutoSolver:
         deadline: float | None = None,
         progress: Callable[[], None] | None = None,
         solver: AceProcess | None = None,
-        without: Sequence[str] = (),
+        without: Collection[str] = (),
     ) -> None:
         self._enumerates = ENUMERATION not in without
         self._central = CentralSolver(
@@ -51,17 +60,15 @@ class AutoSolver:
     def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
         """Solve `team`. For the arguments, the answer and the errors see `CentralSolver.solve`."""
         has_costs = withdrawal_cost is not None or team.kind == ProblemKind.DISWCSP
-        chosen = [one for one in programs(has_costs=has_costs) if one.name not in self._without]
-        may_use_ace = ACE not in self._without
-        if not chosen and not may_use_ace:
+        chosen = programs(has_costs=has_costs, without=self._without)
+        if not chosen and ACE in self._without:
             raise SolverMissingError(
                 f"--verify requires a solver other than ACE, which found the answer; run: {CP_SAT.install}"
             )
         if count or not chosen:
             return self._central.solve(team, count=count, withdrawal_cost=withdrawal_cost)
 
-        runners: list[Runner] = [ExternalProcess(one) for one in chosen]
-        runners += [AceRunner()] if may_use_ace else []
+        runners = [ExternalProcess(one) for one in chosen]
         racing = RacingSolver(self.name, runners, self._deadline, self._progress, enumerates=self._enumerates)
         return racing.solve(team, withdrawal_cost=withdrawal_cost)
 

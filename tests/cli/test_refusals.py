@@ -45,7 +45,7 @@ REFUSED = {
         ("--order ''", "neither a known order"),
         ("--order dfs --protocol central", "--protocol central"),
         ("--protocol abt --count", "--count"),
-        ("--protocol central --verify", "--verify"),
+        ("--protocol central --verify --count", "--verify"),
         ("--protocol central --withdraw maximal", "--withdraw"),
         ("--protocol central --count --html page.html", "--html"),
         ("--local-solutions=0", "--local-solutions"),

@@ -22,7 +22,7 @@ EPOCH_KEYS = {
     "verdict", "opened_by", "robots", "assignment", "cost", "withdrawn", "verified", "messages_by_type",
     *(one.name for one in fields(Metrics)),
 }  # fmt: skip
-EPOCH_EXTRAS = {"witness", "dropped_constraints"}
+EPOCH_EXTRAS = {"solved_by", "witness", "dropped_constraints"}
 """Keys of an epoch that are missing where they are empty."""
 METRICS = ("messages", "bytes", "ncccs", "checks")
 

@@ -63,6 +63,8 @@ class AceStable:
         start, close = vars(ExternalProcess)["_start"], ExternalProcess.close
 
         def take_over(solver: ExternalProcess) -> object:
+            if solver.program.extra not in PROGRAMS:  # ACE, whose process starts another one
+                return start(solver)
             idle = self._idle_external[solver.program.extra]
             if not idle:
                 with shared_by_tests():
@@ -72,7 +74,7 @@ class AceStable:
 
         def leave(solver: ExternalProcess) -> None:
             parts = vars(solver)
-            if _runs(parts) and parts["_task"] is None:
+            if solver.program.extra in PROGRAMS and _runs(parts) and parts["_task"] is None:
                 self._idle_external[solver.program.extra].append({name: parts[name] for name in _EXTERNAL})
                 parts.update(dict.fromkeys(_EXTERNAL))
             close(solver)

@@ -14,7 +14,8 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
-from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.solver.central import CentralAnswer
+from robochoc.solver.solver_choice import AutoSolver
 from robochoc.verification.checker import violations
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
@@ -64,11 +65,11 @@ def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> Non
     team = graph_team(["AB", "BC", "AC"])
     seen = []
 
-    def judged(_judge: CentralSolver, merged: Team, **_: object) -> CentralAnswer:
+    def judged(_judge: AutoSolver, merged: Team, **_: object) -> CentralAnswer:
         seen.append(merged)
         return CentralAnswer(Verdict.NO_SOLUTION)
 
-    monkeypatch.setattr(CentralSolver, "solve", judged)
+    monkeypatch.setattr(AutoSolver, "solve", judged)
     assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified
     solve(team, replace(SIMULATED, seed=1, protocol="central"))
     assert [one is team for one in seen] == [True, True]

@@ -28,7 +28,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import ENUMERATION, CentralAnswer, CentralSolver
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.solver.external_process import ExternalProcess
-from robochoc.solver.external_programs import COSOCO, CP_SAT, PROGRAMS, TOULBAR2, ExternalProgram
+from robochoc.solver.external_programs import ACE_NETWORK, COSOCO, CP_SAT, PROGRAMS, TOULBAR2, ExternalProgram
 from robochoc.solver.network_task import LENGTH, TaskAnswer
 from robochoc.solver.racing import RacingSolver
 from robochoc.solver.solver_choice import AutoSolver, only
@@ -58,9 +58,18 @@ def program(request: pytest.FixtureRequest) -> ExternalProgram:
     return chosen
 
 
+@pytest.fixture(params=[*PROGRAMS, "ace"])
+def any_program(request: pytest.FixtureRequest) -> ExternalProgram:
+    """An external solver, or ACE in the process in which it runs beside one."""
+    chosen = PROGRAMS.get(request.param, ACE_NETWORK)
+    if not chosen.is_installed():
+        pytest.skip(f"the extra {chosen.extra} is not installed")
+    return chosen
+
+
 @pytest.fixture
-def solver(program: ExternalProgram) -> Iterator[RacingSolver]:
-    with only(program) as one:
+def solver(any_program: ExternalProgram) -> Iterator[RacingSolver]:
+    with only(any_program) as one:
         yield one
 
 
@@ -149,14 +158,14 @@ def test_a_time_limit_ends_its_process_and_returns_the_best_solution(
     assert not any(is_running(pid) for pid in pids if pid)
 
 
-def test_a_solver_that_reports_nothing_is_killed(program: ExternalProgram, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_solver_that_reports_nothing_is_killed(any_program: ExternalProgram, monkeypatch: pytest.MonkeyPatch) -> None:
     clock = MovedClock()
     monkeypatch.setattr(racing, "time", clock)
     monkeypatch.setattr(external_process, "time", clock)
     monkeypatch.setattr(ExternalProcess, "interrupt", lambda _: None)
-    solver = only(program, time.monotonic() + HANG_S, clock.end)
-    assert solver.solve(LONG).verdict is Verdict.UNKNOWN
-    assert process_of(solver).pid is None
+    limited = only(any_program, time.monotonic() + HANG_S, clock.end)
+    assert limited.solve(LONG).verdict is Verdict.UNKNOWN
+    assert process_of(limited).pid is None
 
 
 def test_without_time_nothing_is_started(program: ExternalProgram) -> None:
@@ -166,17 +175,19 @@ def test_without_time_nothing_is_started(program: ExternalProgram) -> None:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
-def test_no_process_survives_a_killed_parent(program: ExternalProgram) -> None:
+def test_no_process_survives_a_killed_parent(any_program: ExternalProgram) -> None:
+    program = any_program
     code = (
-        "import sys, os, signal; from robochoc.generators.random_csp import random_csp;"
-        "from robochoc.solver.solver_choice import only; from robochoc.solver.external_programs import PROGRAMS;"
-        "solver = only(PROGRAMS[sys.argv[1]], None, lambda: print(solver._runners[0].pid, flush=True));"
+        "import sys; from robochoc.generators.random_csp import random_csp;"
+        "from robochoc.solver.solver_choice import only; from robochoc.solver import external_programs as programs;"
+        "program = programs.PROGRAMS.get(sys.argv[1], programs.ACE_NETWORK);"
+        "solver = only(program, None, lambda: print(solver._runners[0].pid, flush=True));"
         "solver.solve(random_csp(30, 8, 0.3, 0, 1, max_cost=100))"
     )
     with subprocess.Popen([sys.executable, "-c", code, program.extra], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         pid = int(parent.stdout.readline())
-        while program is COSOCO and len(group_of(pid)) < 2:
+        while program in (COSOCO, ACE_NETWORK) and len(group_of(pid)) < 2:
             time.sleep(0.01)
         assert pid in group_of(pid)
         parent.kill()
@@ -310,7 +321,7 @@ class TestAuto:
         """Two external solvers die, and ACE answers."""
         broken = tuple(one._replace(module="robochoc.no_such_module", package="msgspec") for one in (TOULBAR2, CP_SAT))
         monkeypatch.setattr("robochoc.solver.solver_choice.FOR_COSTS", broken)
-        team = random_csp(12, 5, 0.5, 0, 1, max_cost=20)
+        team = random_csp(6, 4, 0.6, 0, 1, max_cost=9)
         found = AutoSolver(without=[ENUMERATION]).solve(team)
         assert (found.verdict, found.solvers) == (Verdict.OPTIMAL, ("ACE",))
         assert found.cost == only_ace(team)
@@ -330,7 +341,7 @@ class TestAuto:
         monkeypatch.setattr(
             "robochoc.solver.solver_choice.FOR_COSTS", (TOULBAR2._replace(name="silent", package="msgspec"),)
         )
-        found = AutoSolver(without=[ENUMERATION]).solve(random_csp(12, 5, 0.5, 0, 1, max_cost=20))
+        found = AutoSolver(without=[ENUMERATION]).solve(random_csp(6, 4, 0.6, 0, 1, max_cost=9))
         assert (found.verdict, found.solvers) == (Verdict.OPTIMAL, ("ACE",))
 
     @pytest.mark.usefixtures("shared_solvers")
@@ -372,8 +383,8 @@ def test_the_command_line_and_json(tmp_path_factory: pytest.TempPathFactory, pro
 
 
 def test_nothing_is_left_in_the_folder_for_temporary_files(
-    program: ExternalProgram, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    any_program: ExternalProgram, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TMPDIR", str(tmp_path))
-    assert only(program).solve(random_csp(6, 4, 0.6, 0, 1, max_cost=9)).verdict is Verdict.OPTIMAL
+    assert only(any_program).solve(random_csp(6, 4, 0.6, 0, 1, max_cost=9)).verdict is Verdict.OPTIMAL
     assert os.listdir(tmp_path) == []  # noqa: PTH208 - names
