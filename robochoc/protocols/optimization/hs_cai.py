@@ -66,21 +66,36 @@ MOST_CELLS = 1 << 17
 
 
 class RobotTable(NamedTuple):
-    """Costs, with an axis for each robot in `names`."""
+    """Costs, with an axis for each robot in `names`.
+
+    `codes` contains, for each robot, the index of each value on its axis; None if the values are the indices. It is
+    empty if all are None.
+    """
 
     names: tuple[str, ...]
     costs: NDArray[np.float64]
+    codes: Sequence[Sequence[int] | None] = ()
 
     def at(self, places: Mapping[str, int]) -> RobotTable:
         """Return the part of the table for these robots' values, given as indices."""
-        index = tuple([places.get(name, slice(None)) for name in self.names])
-        return RobotTable(tuple(name for name in self.names if name not in places), self.costs[index])
+        coded = [*zip(self.names, self.codes or [None] * len(self.names), strict=True)]
+        index = tuple(
+            [
+                slice(None) if name not in places else places[name] if codes is None else codes[places[name]]
+                for name, codes in coded
+            ]
+        )
+        left = [one for one in coded if one[0] not in places]
+        return RobotTable(tuple(name for name, _ in left), self.costs[index], [codes for _, codes in left])
 
     def over(self, names: Sequence[str]) -> NDArray[np.float64]:
         """Return the least costs with an axis for each of `names`, in this order; of length 1 if the table has none."""
         gone = tuple(axis for axis, name in enumerate(self.names) if name not in names)
         left = [name for name in self.names if name in names]
         least = self.costs.min(axis=gone)
+        codes = [one for name, one in zip(self.names, self.codes, strict=True) if name in names] if self.codes else []
+        for axis, coded in enumerate(codes):
+            least = least if coded is None else least.take(coded, axis)
         least = least.transpose([left.index(name) for name in names if name in left])
         aligned: NDArray[np.float64] = least[tuple([slice(None) if name in left else np.newaxis for name in names])]
         return aligned
@@ -371,7 +386,9 @@ class HSCAI(BranchingProtocol):
             self.search(self.limit, self.problem.charges)
             return
         made = self.problem.tables({name: self.domains[name] for name in self.ancestors})
-        self._own_tables = [RobotTable((*table.agents, self.problem.agent), table.joined()) for table in made]
+        self._own_tables = [
+            RobotTable((*table.agents, self.problem.agent), table.charges, table.distinct_codes()) for table in made
+        ]
         axes, costs = self._least({}, self.tables)
         dropped = [axis for name, axis in self._axes.items() if axis not in axes]
         self.send(self.parent, PreUtil(axes, dropped, dearest, costs))
