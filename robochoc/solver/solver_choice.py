@@ -14,8 +14,8 @@ from robochoc.solver.external_process import ExternalProcess
 from robochoc.solver.external_programs import ACE_NETWORK, COSOCO, CP_SAT, TOULBAR2, ExternalProgram
 from robochoc.solver.racing import RacingSolver
 
-FOR_COSTS = (TOULBAR2, CP_SAT)
-FOR_SATISFACTION = (COSOCO, CP_SAT)
+FOR_COSTS = (TOULBAR2, COSOCO, CP_SAT)
+FOR_SATISFACTION = (COSOCO, TOULBAR2, CP_SAT)
 
 
 def programs(*, has_costs: bool, without: Collection[str] = ()) -> list[ExternalProgram]:
