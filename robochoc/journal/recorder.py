@@ -13,6 +13,7 @@ from pathlib import Path
 from threading import Lock
 
 import msgspec
+from msgspec import UNSET
 
 from robochoc.journal.blocks import BEGINNING, MAX_BLOCK_BYTES, PREAMBLE, frame_block
 from robochoc.journal.columns import columns_of
@@ -160,7 +161,8 @@ class JournalRecorder:
             match entry:
                 case Began():
                     lines += self._improvements(cost_events or (), given)
-                    cost_events = [] if entry.minimises is True else None
+                    start = [entry] if entry.upper_bound is not UNSET else []
+                    cost_events = [*start] if entry.minimises is True else None
                 case Given():
                     given.append(entry)
                 case Decided() | Heard() if cost_events is not None:
@@ -279,8 +281,10 @@ class _SinkState:
                 self.failure = error
 
 
-def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
+def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:  # noqa: C901 - a case for each event
     """Yield `events`, with an `Improved` after each event that makes the assignment cheaper than all earlier ones.
+
+    A `Began` with a start whose cost is known counts as such an event.
 
     `objective` may be the one of the team's files: `Given` events define the variables that robots show.
     """
@@ -308,6 +312,11 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
                 cost, now = event.cost, objective.shown(event.values)
             case Given():
                 objective.interfaces = interfaces_given(reader, event)
+                continue
+            case Began(start=dict() as start, upper_bound=int() | float() as cost) if cost < best:
+                best = cost
+                known = {name: value for name, value in start.items() if value is not None}
+                yield Improved(t=event.t, cost=objective.in_user_units(best), assignment=known)
                 continue
             case _:
                 continue

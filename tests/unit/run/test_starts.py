@@ -12,7 +12,8 @@ import pytest
 import robochoc
 from robochoc.communication.search_result import SearchResult
 from robochoc.formats import write_team
-from robochoc.journal.events import AnyEvent, Began
+from robochoc.journal.events import AnyEvent, Began, Improved
+from robochoc.journal.journal import JournalRecorder, read_journal
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, RemoveValue, ScenarioEvent, Team
 from robochoc.model.team_edits import without_robots
@@ -33,6 +34,7 @@ from tests.support.brute_force import solutions
 from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import random_team
 from tests.support.program import robochoc_within
+from tests.support.replays import header_of
 from tests.support.small_teams import pair
 
 SIMULATED = Options(protocol="syncbb", runtime=Runtime.SIMULATOR)
@@ -268,3 +270,12 @@ def test_robots_without_costs_keep_a_solution(protocol: str) -> None:
         outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, start=start))
         for name in (name for robot in team.robots for name in robot.interface):
             assert outcome.assignment[name] == start[name]
+
+
+def test_a_journal_records_the_start_as_the_first_improvement() -> None:
+    team = with_costs(pair(values=2))
+    recorder = JournalRecorder(header_of(team, SIMULATED), lambda: Objective(team))
+    recorder(Began(t=0, protocol="SyncBB", minimises=True, start={"A": 1, "B": 2}, upper_bound=4))
+    recorder.outcome = solve(team, SIMULATED)
+    found = [event for event in read_journal(recorder.content()).events if isinstance(event, Improved)]
+    assert [(event.t, event.cost, event.assignment) for event in found] == [(0, 4, {"A": 1, "B": 2})]
