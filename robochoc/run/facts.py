@@ -12,6 +12,7 @@ from random import Random
 from robochoc.model.change import team_after_events
 from robochoc.model.orders import Graph, constraint_graph
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
+from robochoc.run.divided_tables import divided_tables
 from robochoc.run.pigeonholes import Crowd, find_crowd
 from robochoc.solver.encoding import MAX_TUPLES, cost_function, is_soft
 from robochoc.system.lazy_dataclass import dataclass
@@ -212,8 +213,17 @@ class Facts:
 
     @cached_property
     def tree(self) -> TreeTables:
-        """The tables of dynamic programming on the robots' pseudo-tree. The analysis stops at a large table."""
-        return tree_tables(self.graph, self.first.order, self.sizes, LARGE)
+        """The tables of dynamic programming on the robots' pseudo-tree. The analysis stops at a large table.
+
+        If robots have several variables, these are DPOP's divided tables, unless the problem changes: S-DPOP divides no
+        tables. A robot that may withdraw cannot choose its variables separately.
+        """
+        seen = {name for scope in self._named for name in scope}
+        has_one_variable = len({self.first.owner[name] for name in seen}) == len(seen)
+        if has_one_variable or self.changes or self.withdrawal:
+            return tree_tables(self.graph, self.first.order, self.sizes, LARGE)
+        above = tree_order(self.graph, self.first.order)
+        return TreeTables(*divided_tables(self.first, above, self.sizes, LARGE))
 
     @cached_property
     def declared_table(self) -> int:
@@ -330,6 +340,11 @@ def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: floa
         sizes: The number of values of each robot.
         enough: The analysis stops at the first table with more entries than this.
     """
+    return _joined(tree_order(graph, order), sizes, enough)
+
+
+def tree_order(graph: Graph, order: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """Return each robot's neighbours above it in the tree of `tree_tables`, roots first."""
     rank = {name: place for place, name in enumerate(order)}
 
     def strength(name: str) -> tuple[int, int]:
@@ -347,7 +362,7 @@ def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: floa
                 branch.popitem()
             left = next(reversed(branch.values()), iter(()))
             coming = next((name for name in left if name not in above), None)
-    return _joined(above, sizes, enough)
+    return above
 
 
 def _joined(above: dict[str, tuple[str, ...]], sizes: Sizes, enough: float) -> TreeTables:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, pairwise
 from math import log2, prod
 from random import Random
 from typing import Any
@@ -226,7 +226,7 @@ def test_what_is_chosen() -> None:
         (coloring(300, 300, 3, conflicts="hard"), {}, "abt", None),
         (queens3d(5, "full", "rows"), {}, "sfb", Order.MIN_WIDTH),
         (queens3d(6, "full", "rows"), {}, "afc-ng", Order.MAX_DEGREE),
-        (slots_and_tasks(8), {}, "sfb", Order.MAX_DEGREE),
+        (slots_and_tasks(8), {}, "dpop", None),
         (slots_and_tasks(10), {}, "afb", Order.MAX_DEGREE),
         (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.1}, "gdba", None),
         (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.2}, "dsa", None),
@@ -332,6 +332,30 @@ def test_the_tree_is_the_one_that_robots_build(many: int) -> None:
         sizes = Facts(team).declared_sizes
         cells = [prod(sizes[one] for one in (name, *above)) for name, above in found.items()]
         assert Facts(team).tree == TreeTables(max(map(len, found.values())), max(cells))
+
+
+def test_the_tree_of_robots_with_several_variables_has_divided_tables() -> None:
+    def model(*, private: bool) -> Model:
+        found = Model("chain")
+        owned = []
+        for number in range(8):
+            robot = found.robot(f"R{number}")
+            owned.append(
+                (robot.variable("slot", range(3)), robot.variable("task", range(5)), robot.variable("own", range(9)))
+            )
+            if private:
+                found.add(owned[-1][0] + owned[-1][2] <= owned[-1][1] + 8)
+        for (slot, task, _), (next_slot, next_task, _) in pairwise(owned):
+            found.add(slot != next_slot, cost=1)
+            found.add(task != next_task, cost=2)
+        return found
+
+    assert Facts(model(private=False).team).tree == TreeTables(1, 25)
+    assert Facts(model(private=True).team).tree == TreeTables(1, 15 * 15)
+    assert Facts(model(private=False).team, withdrawal=True).tree == TreeTables(1, 15 * 15)
+    assert Facts(model(private=False).team, environment=True).tree == TreeTables(1, 15 * 15)
+    chosen = model(private=False).solve(protocol="dpop", runtime="simulator")
+    assert chosen.metrics.messages["SplitDimensions"] == 7
 
 
 @pytest.mark.parametrize(("maximise", "fact"), [(False, "costs are minimised"), (True, "utilities are maximised")])
