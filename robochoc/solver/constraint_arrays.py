@@ -58,6 +58,11 @@ def cost_array(
     return np.broadcast_to(costs, [len(column) for column in columns])
 
 
+def no_costs(shape: Sequence[int]) -> NDArray[np.float64]:
+    """Return the costs of a constraint that is dropped."""
+    return np.zeros(shape)
+
+
 def rows_of_bits(costs: NDArray[np.float64]) -> Iterator[bytes]:
     """Yield, for each combination on the other axes, which costs on the last axis are finite: bit i for the i-th."""
     packed = np.packbits(np.isfinite(costs), axis=-1, bitorder="little")

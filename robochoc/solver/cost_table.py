@@ -9,6 +9,7 @@ have at most `MAX_TUPLES` entries.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -109,14 +110,33 @@ def cost_table(constraint: SharedConstraint, domains: Mapping[str, Sequence[Valu
 def _charges(constraint: SharedConstraint, axes: Sequence[Axis]) -> tuple[int, Array]:
     """Return the number of combinations of the others' values, and the costs on `axes`."""
     charges: Array = np.zeros([len(one.parts) for one in axes], np.float64)
-    if charges.size >= MIN_ENTRIES:
-        present = [[index for index, part in enumerate(one.parts) if None not in part] for one in axes]
-        found = constraint.cost_array([[one.parts[at] for at in kept] for one, kept in zip(axes, present, strict=True)])
-        if found is not None:
-            charges[np.ix_(*present)] = found
-            return math.prod(map(len, present[:-1])), charges
+    if charges.size >= MIN_ENTRIES and fill_at_once(charges, constraint, axes):
+        counts = constraint.counts_when_absent
+        return math.prod([sum(counts or None not in part for part in one.parts) for one in axes[:-1]]), charges
     evaluated = 0
     for place, others in constraint.combinations(axes[:-1]):
         evaluated += 1
         charges[place] = constraint.distinct_costs(others)
     return evaluated, charges
+
+
+def fill_at_once(charges: Array, constraint: SharedConstraint, axes: Sequence[Axis]) -> bool:
+    """Store the costs in `charges`, block by block; return False if they must be evaluated one by one.
+
+    A block contains the combinations in which the same robots have withdrawn.
+    """
+    withdrawn = [[at for at, part in enumerate(one.parts) if None in part] for one in axes]
+    present = [[at for at, part in enumerate(one.parts) if None not in part] for one in axes]
+    absent = [place for place, parts in enumerate(withdrawn) if parts and constraint.counts_when_absent]
+    partly = any(None in part and any(one is not None for one in part) for one in axes for part in one.parts)
+    if partly or charges.size < MIN_ENTRIES << len(absent):
+        return False
+    for many in range(len(absent) + 1):
+        for gone in itertools.combinations(absent, many):
+            kept = [withdrawn[place] if place in gone else present[place] for place in range(len(axes))]
+            columns = [[one.parts[at] for at in indices] for one, indices in zip(axes, kept, strict=True)]
+            found = constraint.cost_array(columns, gone)
+            if found is None:
+                return False
+            charges[np.ix_(*kept)] = found
+    return True

@@ -321,23 +321,41 @@ class SharedConstraint:
             prices = self._costs_by[part] = self.costs((part,))
         return prices
 
-    def cost_array(self, columns: Sequence[Sequence[Value]]) -> NDArray[float64] | None:
+    @property
+    def counts_when_absent(self) -> bool:
+        """True if the constraint may cost something when some of its robots have withdrawn."""
+        return self._counts_when_absent
+
+    def cost_array(
+        self, columns: Sequence[Sequence[Value]], absent: Container[int] = frozenset()
+    ) -> NDArray[float64] | None:
         """Return the costs for all combinations of `columns`, the parts of the others' and then of this robot's values.
 
-        None: the combinations must be evaluated one by one. No part may be None.
+        The columns at `absent` have a single part: the robot has withdrawn. No other part may be None. The result is
+        None if the combinations must be evaluated one by one.
 
         Raises:
             ValueError: if a value is undeclared.
         """
-        from robochoc.solver.constraint_arrays import cost_array  # noqa: PLC0415 - numpy, for large tables only
+        from robochoc.solver.constraint_arrays import cost_array, no_costs  # noqa: PLC0415 - numpy, for large tables
 
-        if not all(columns) or self._counts_when_absent:
+        if not all(columns):
             return None
         least = [column[0] for column in columns[:-1]]
         for place, column in enumerate(columns[:-1]):
             for part in column:
                 self._refuse_undeclared(tuple(itertools.chain(*least[:place], part, *least[place + 1 :])))
-        return cost_array(self._constraint, self._all_names, columns)
+        names = iter(self._all_names)
+        named = [[next(names) for _ in column[0]] for column in columns]
+        gone = [name for place, owned in enumerate(named) if place in absent for name in owned]
+        constraint = restated(self._constraint, gone) if gone else self._constraint
+        present = [place for place in range(len(columns)) if place not in absent]
+        shape = [1 if place in absent else len(column) for place, column in enumerate(columns)]
+        if constraint is None:
+            return no_costs(shape)
+        left = [name for place in present for name in named[place]]
+        found = cost_array(constraint, left, [columns[place] for place in present])
+        return None if found is None else found.reshape(shape)
 
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[Cost]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.

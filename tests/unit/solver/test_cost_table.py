@@ -5,18 +5,20 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from robochoc.model.problem import Value
-from robochoc.solver import local_problem, shared_constraint
+from robochoc.solver import cost_table, local_problem, shared_constraint
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.errors import TooLargeError
 from robochoc.solver.local_problem import LocalProblem, steps_of
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team
 from tests.support.examples import count, drawn
+from tests.support.several_variables import random_model
 from tests.support.solver_networks import compiled_by_brute_force
 
 
@@ -96,3 +98,34 @@ def test_rows_that_are_evaluated_together_allow_the_same_values(monkeypatch: pyt
                         place = sum(step for (step,) in steps_of([[code] for code in codes], table.sizes))
                         assert mask == table.masks[place]
             assert problem.checks == others[name].checks
+
+
+@count("teams", 40, 1000)
+@pytest.mark.parametrize("withdrawal_cost", [None, 9])
+def test_costs_that_are_computed_at_once_are_those_of_single_combinations(
+    monkeypatch: pytest.MonkeyPatch, teams: int, withdrawal_cost: int | None
+) -> None:
+    at_once = 0
+
+    def counted(*args: Any) -> bool:  # noqa: ANN401 - those of `fill_at_once`
+        nonlocal at_once
+        filled = fill(*args)
+        at_once += filled and withdrawal_cost is not None and args[1].counts_when_absent
+        return filled
+
+    fill = cost_table.fill_at_once
+    monkeypatch.setattr(cost_table, "fill_at_once", counted)
+    for number in range(teams):
+        chance = drawn(f"at once {number}")
+        team = random_model(chance, costs=True).team if chance.random() < 0.7 else random_complex_cost_team(chance)
+        parts = agent_problems(compiled_by_brute_force(team), RunParameters(withdrawal_cost=withdrawal_cost))
+        found = []
+        for entries in (0, 10**9):
+            monkeypatch.setattr(cost_table, "MIN_ENTRIES", entries)
+            problems = {name: LocalProblem(part._replace(known=replace(part.known))) for name, part in parts.items()}
+            values: dict[str, Sequence[Value]] = {name: problem.values for name, problem in problems.items()}
+            tables = [problem.tables(values) for problem in problems.values()]
+            costs = [(table.key, table.charges.tolist()) for made in tables for table in made]
+            found.append((costs, [problem.checks for problem in problems.values()]))
+        assert found[0] == found[1], number
+    assert at_once or withdrawal_cost is None
