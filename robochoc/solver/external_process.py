@@ -78,8 +78,11 @@ class ExternalProcess:
             raise UnsupportedError(f"{why}; use --with auto")
         if not self.program.is_installed():
             raise SolverMissingError(f"{self.name} is not installed; run: {self.program.install}")
-        self._task = computed_by(deadline, _task, network, costs, deadline)
-        body = msgspec.msgpack.encode(self._task)
+        task = computed_by(deadline, _task, network, costs, deadline)
+        if self.program.is_single_use:
+            self.close()
+        self._task = task
+        body = msgspec.msgpack.encode(task)
         connection = self._socket or self._start()
         try:
             computed_by(deadline, connection.sendall, LENGTH.pack(len(body)) + body)

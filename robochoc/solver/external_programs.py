@@ -28,6 +28,7 @@ class ExternalProgram(NamedTuple):
         refusal: Returns the reason why it cannot solve a network with costs (None: it can).
         interrupt: A signal after which its process returns the best solution found (None: it observes the deadline).
         ends_group: True if the programs that its process has started must be ended, too.
+        is_single_use: True if its process solves one network only, because global state would remain.
     """
 
     name: str
@@ -37,6 +38,7 @@ class ExternalProgram(NamedTuple):
     refusal: Callable[[Network, Costs], str | None]
     interrupt: int | None = None
     ends_group: bool = True
+    is_single_use: bool = False
 
     @property
     def install(self) -> str:
@@ -88,6 +90,7 @@ TOULBAR2 = ExternalProgram(
     "robochoc.solver.toulbar2_process",
     _refusal_of_toulbar2,
     getattr(signal, "SIGVTALRM", None),
+    is_single_use=True,
 )
 COSOCO = ExternalProgram("cosoco", "cosoco", "cosoco_bin", "robochoc.solver.cosoco_process", _refusal_of_cosoco)
 ACE_NETWORK = ExternalProgram("ACE", "", "pycsp3", "robochoc.solver.ace_network_process", _no_refusal, ends_group=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import select
 import time
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import TracebackType
 from typing import Self
 
@@ -93,7 +94,7 @@ class RacingSolver:
         assignment: dict[str, int] | None = {}
         proven, solvers = True, dict[str, None]()
         for part in sorted(parts, key=lambda part: len(part.network.domains)):
-            found, solver = self._cheapest(part)
+            found, solver = self._cheapest(part if withdrawal_cost is not None else self._unpropagated(part))
             solvers |= {solver: None} if solver else {}
             if found.codes is None and found.proven:
                 return CentralAnswer(Verdict.NO_SOLUTION, solvers=(solver,))
@@ -113,6 +114,15 @@ class RacingSolver:
             return CentralAnswer(Verdict.SOLUTION, assignment, solvers=names)
         verdict = Verdict.OPTIMAL if proven else Verdict.UNKNOWN
         return CentralAnswer(verdict, assignment, cost=cost, bound=bound, solvers=names)
+
+    def _unpropagated(self, part: WeightedComponent) -> WeightedComponent:
+        """Return `part`, with its network before propagation if propagation has shown that it has no solution.
+
+        So a solver decides, unless small components are enumerated.
+        """
+        if self._small is not None or not part.network.impossible:
+            return part
+        return replace(part, network=part.part.network, costs=())
 
     def _cheapest(self, part: WeightedComponent) -> tuple[TaskAnswer, str]:
         """Return the answer for one component, and the solver."""

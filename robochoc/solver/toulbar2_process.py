@@ -63,8 +63,10 @@ def _solve(task: NetworkTask) -> TaskAnswer:
     for table in task.tables:
         _fill(table, columns, codes)
     cost = sum(unit * codes[place] for place, unit in task.costs)
-    bound = max(0, math.ceil(problem.GetDDualBound() - 1e-6))
-    return TaskAnswer(tuple(codes), proven=bound >= cost or not _is_over(task), bound=min(bound, cost))
+    if not _is_over(task):
+        return TaskAnswer(tuple(codes), proven=True, bound=cost)
+    bound = min(cost, max(0, math.ceil(problem.GetDDualBound() - 1e-6)))
+    return TaskAnswer(tuple(codes), proven=bound == cost, bound=bound)
 
 
 def _is_over(task: NetworkTask) -> bool:

@@ -265,7 +265,7 @@ def test_without_the_extra_it_says_how_to_get_it(monkeypatch: pytest.MonkeyPatch
 @pytest.mark.usefixtures("shared_solvers")
 @needs_ortools
 def test_verify_asks_two() -> None:
-    outcome = solve(with_costs(queens3d(4)), SIMULATED)
+    outcome = solve(with_costs(queens3d(3)), SIMULATED)
     assert outcome.confirmed
     assert outcome.confirmed_by == (CENTRAL_SOLVER, "OR-Tools")
 
