@@ -5,6 +5,7 @@ The runtime `arrays` solves them (docs/guides/arrays.md).
 
 from __future__ import annotations
 
+import copy
 import operator
 import re
 import time
@@ -131,6 +132,7 @@ class ArrayProblem:
         timeout: float | None = None,
         ncccs: bool = True,
         cluster: str | None = None,
+        start: ArrayLike | None = None,
         **settings: object,
     ) -> ArraySolution:
         """Solve the problem by a protocol that supports arrays, and check the cost of the answer.
@@ -142,6 +144,8 @@ class ArrayProblem:
             ncccs: True to count NCCCs, which takes up to a fifth of the time of mgm2 and maxsum.
             cluster: The address of a Dask scheduler, or the path of its file. Its workers compute one block of robots
                 each, with the same results. None: this process computes all robots.
+            start: The value with which each robot begins, such as the `values` of an earlier solution; -1: a random
+                value. None: all begin with random values. `maxsum` ignores it.
             **settings: The protocol's settings, such as `cycles` or `variant`.
 
         Returns:
@@ -160,20 +164,29 @@ class ArrayProblem:
         if cluster is not None:
             with _errors_in_python():
                 how = RunBlock(*_how(protocol, seed, settings, cluster=True), Limits(limit_s), ncccs)
-                report = run_on_cluster(cluster, self._described(), how)
+                described = replace(self._described(), starts=self._starts(start))
+                report = run_on_cluster(cluster, described, how)
             return self._solution(report, report.robots, replace(report.metrics, wall_s=time.monotonic() - began))
-        run = self.run(protocol, seed=seed, ncccs=ncccs, **settings)
+        run = self.run(protocol, seed=seed, ncccs=ncccs, start=start, **settings)
         for _ in cycles_of(run):
             if limit_s is not None and time.monotonic() - began > limit_s and not run.is_over:
                 run.end()
                 break
         return self._solution(run, run.layout.robots, run.metrics(time.monotonic() - began))
 
-    def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
+    def run(
+        self,
+        protocol: str = "dsa",
+        *,
+        seed: int = 0,
+        ncccs: bool = True,
+        start: ArrayLike | None = None,
+        **settings: object,
+    ) -> CycleRun:
         """Return an unstarted run, for callers that need each cycle (`cycles_of`). See `solve` for the arguments."""
         with _errors_in_python():
             form, chosen, seed = _how(protocol, seed, settings)
-            return form(self.layout, chosen, seed, clocks=ncccs)
+            return form(self._layout_from(self._starts(start)), chosen, seed, clocks=ncccs)
 
     def cost(self, values: ArrayLike) -> float:
         """Return the cost of an assignment to all robots. Raises `ValueError` if a value is missing or invalid."""
@@ -190,6 +203,25 @@ class ArrayProblem:
     def layout(self) -> ArrayLayout:
         """The arrays for the runtime, computed once."""
         return ArrayLayout(self._described())
+
+    def _starts(self, start: ArrayLike | None) -> Integers | None:
+        """Return the start values. Raises `ValueError` if a value is missing or invalid."""
+        if start is None:
+            return None
+        values = _whole("start", start)
+        if values.shape != (self.robots,) or not _within(values + 1, self.values + 1):
+            raise ValueError(
+                f"start must have a value from 0 to {self.values - 1:,}, or -1, for each of {self.robots:,} robots"
+            )
+        return values
+
+    def _layout_from(self, starts: Integers | None) -> ArrayLayout:
+        """Return the arrays for a run with these start values."""
+        if starts is None:
+            return self.layout
+        layout = copy.copy(self.layout)
+        layout.description = replace(layout.description, starts=starts)
+        return layout
 
     def __repr__(self) -> str:
         return f"<array problem: {self.robots:,} robots, {len(self.edges):,} edges, {self.values:,} values>"

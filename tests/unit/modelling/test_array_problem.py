@@ -245,3 +245,28 @@ def test_all_draw_at_once_what_each_draws() -> None:
         assert draws.draw(rows).tolist() == [streams[row]() for row in rows]
     assert draws.choose(some, np.ones(len(some), np.int64)).tolist() == [0] * len(some)
     assert draws.choose(some, np.full(len(some), 7)).tolist() == [int(streams[row]() * 7) for row in some]
+
+
+@pytest.mark.parametrize("protocol", ["dsa", "mgm", "mgm2"])
+def test_a_run_begins_from_known_values(protocol: str) -> None:
+    for seed in range(12):
+        problem = ArrayProblem(**random_arrays(seed))
+        draw = np.random.default_rng(seed)
+        start = draw.integers(-1, problem.values, size=problem.robots)
+        first = next(cycles_of(problem.run(protocol, seed=seed, start=start, cycles=3)))
+        values = dict(zip(first.layout.robots.tolist(), first.values.tolist(), strict=True))
+        active = {*problem.edges.ravel().tolist()}
+        assert all(values[robot] == start[robot] for robot in active if start[robot] >= 0)
+        whole = problem.solve(protocol, seed=seed, cycles=5)
+        if whole.values is not None:
+            again = problem.solve(protocol, seed=seed + 1, start=whole.values, cycles=5)
+            assert again.cost is not None
+            assert whole.cost is not None
+            assert again.cost <= whole.cost
+
+
+def test_invalid_starts_are_refused() -> None:
+    problem = ArrayProblem(2, 2, PAIR, SAME)
+    for start in ([0], [0, 2], [0, -2]):
+        with pytest.raises(ValueError, match="start must have a value from 0 to 1, or -1, for each of 2 robots"):
+            problem.solve(start=start)
