@@ -21,6 +21,7 @@ import central_solvers
 import choice
 import command_time
 import crowd
+import deadline
 import flagship
 import flight
 import journal_tools
@@ -64,6 +65,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "auctions": auctions.measured,
     "central": central_solvers.measured,
     "choice": choice.measured,
+    "deadline": deadline.measured,
     "wide": wide_tables.measured,
     "starts": warm_starts.measured,
     "growth": scale.measured,

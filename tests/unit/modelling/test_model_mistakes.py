@@ -198,7 +198,7 @@ def test_names_of_the_library_are_listed_and_guessed() -> None:
 
 def test_every_option_of_a_run_has_its_name() -> None:
     named = {*inspect.signature(robochoc.Problem.solve).parameters}
-    assert {one.name for one in fields(Options)} - {"chosen"} <= named  # which says what the run has chosen
+    assert {one.name for one in fields(Options)} - {"chosen", "stages"} <= named  # what the run has chosen
 
 
 OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
