@@ -24,6 +24,7 @@ from report import Row, Section, table
 from robochoc.model.costs import normalized
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, solve
+from robochoc.run.options import CentralSolverName
 from robochoc.system.errors import RobochocError
 
 SEEDS = {1.0: range(5), 2.0: range(3), 5.0: range(1)}
@@ -41,8 +42,8 @@ NOTES = (
     "60 problems of 12 families (6 to 271 robots): at 1 s all of them, at 2 s 36, at 5 s 12. Columns: problems with an"
     " answer, those within 1 % and 3 % of the best known cost (that of any contestant at any deadline, and of CP-SAT"
     f" in {LONG_S:g} s), and the mean and the longest time of a run. Local searches have no limit on cycles."
-    " CP-SAT solves the merged model in a process of its own, whose start counts. The machine was busy with other work; the"
-    " measuring process was preferred (`nice -n -18`). All rows: [results/deadline.csv](results/deadline.csv)."
+    " CP-SAT solves the merged model in a process of its own, whose start counts. The machine was busy with other"
+    " work; the measuring process was preferred (`nice -n -18`). All rows: `results/deadline.csv`."
 )
 
 
@@ -92,7 +93,7 @@ def run(team: Team, family: str, seed: int, contestant: str, deadline_s: float) 
         protocol=contestant, runtime=Runtime.SIMULATOR, deadline=deadline_s, settings=settings, cache=False
     )
     if contestant in {CENTRAL, BEST_KNOWN}:
-        options = Options(protocol="central", central_with="ortools", timeout=deadline_s)
+        options = Options(protocol="central", central_with=CentralSolverName.ORTOOLS, timeout=deadline_s)
     began = time.monotonic()
     cost: float | None = None
     try:

@@ -27,16 +27,26 @@ CROWDED = 0.6
 all: Max-Sum then finds no assignment, and MGM-2 the best ones."""
 LARGE_S = 400
 """The robots and links for each second until the deadline from which the set-up of further searches takes too long."""
+CROWD, EQUAL, FORBIDDING, OTHER = "crowd", "equal", "forbidding", "other"
+"""The kinds of teams: see `CROWDED`; all costs are equal; constraints forbid something; none of these."""
 LOCAL_SEARCHES = MappingProxyType(
     {
-        (False, False): (("maxsum", 0.3), ("maxsum-ad", 0.5), ("dsa", 0.65), ("mgm2", 0.8)),
-        (True, False): (("dsa", 0.3), ("mgm2", 0.8)),
-        (False, True): (("maxsum-ad", 0.5), ("dsa", 1.0)),
-        (True, True): (("dsa", 0.3), ("mgm2", 1.0)),
+        CROWD: (("dsa", 0.3), ("mgm2", 0.8)),
+        EQUAL: (("maxsum-ad", 0.35), ("dsa", 0.85)),
+        FORBIDDING: (("maxsum", 0.25), ("maxsum-ad", 0.65), ("dsa", 0.75), ("mgm2", 0.85)),
+        OTHER: (("maxsum", 0.3), ("maxsum-ad", 0.5), ("dsa", 0.65), ("mgm2", 0.8)),
     }
 )
-"""The local searches and their ends for teams that are (crowded, large for the deadline). Only local search is used in
-large teams."""
+"""The local searches and their ends, by the kind of the team."""
+LOCAL_SEARCHES_IF_LARGE = MappingProxyType(
+    {
+        CROWD: (("dsa", 0.3), ("mgm2", 1.0)),
+        EQUAL: (("maxsum-ad", 0.35), ("dsa", 1.0)),
+        FORBIDDING: (("maxsum-ad", 0.7), ("dsa", 1.0)),
+        OTHER: (("maxsum-ad", 0.5), ("dsa", 1.0)),
+    }
+)
+"""The same for teams that are large for the deadline (`LARGE_S`), in which only local searches are used."""
 PROCESSES_S = 6
 """The same if each robot is a process: the number of robots for each second. Then there is only one search."""
 FIRST_IN_PROCESSES, DSA_IN_PROCESSES_UNTIL = 0.25, 0.6
@@ -97,13 +107,20 @@ def _stages(options: Options, facts: Facts) -> list[Stage]:
     if options.runtime == Runtime.PROCESSES:
         return _stages_in_processes(options, facts)
     large = facts.robots + facts.links > LARGE_S * (options.deadline or 0.0)
-    crowded = facts.forbids and facts.share_linked >= CROWDED
-    local = [_local_search(one, until, facts) for one, until in LOCAL_SEARCHES[crowded, large]]
+    searches = (LOCAL_SEARCHES_IF_LARGE if large else LOCAL_SEARCHES)[_kind(facts)]
+    local = [_local_search(one, until, facts) for one, until in searches]
     if large or not traits.complete:
         return _within(local, 0.0, 1.0)
     if traits.wide_tables:
         return [Stage(name, FIRST_ON_TREES, options.settings), *_within(local, FIRST_ON_TREES, 1.0)]
     return [Stage(name, FIRST, options.settings), *local, Stage(name, 1.0, options.settings)]
+
+
+def _kind(facts: Facts) -> str:
+    """Return the kind of the team."""
+    if facts.forbids:
+        return CROWD if facts.share_linked >= CROWDED else FORBIDDING
+    return EQUAL if facts.has_equal_costs else OTHER
 
 
 def _stages_in_processes(options: Options, facts: Facts) -> list[Stage]:
