@@ -298,7 +298,7 @@ class UTIL(Message, frozen=True):
         return piece_in_words(self.costs, self.width)
 
     def proves(self, reception: Reception) -> Sequence[Proof] | None:
-        """Return the bounds on the sender's costs. There is no rule for large tables.
+        """Return the bounds on the sender's costs. There is no rule for large tables, or several of them.
 
         For each combination of values, some value of the sender costs no more than its cell, because all robots below
         cost at least 0. If all neighbours of the sender are above it, no robot is below; then no value costs less.
