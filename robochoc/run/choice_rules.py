@@ -339,7 +339,18 @@ RULES = (
         "domains are large, and it needs no tables",
         Order.MAX_DEGREE,
     ),
-    Rule("afb", (LARGE_TABLE,), "domains are large, and it needs no tables", Order.MAX_DEGREE),
+    Rule(
+        "afb",
+        (
+            Condition(
+                lambda f: f.largest_needed_table > MAX_TUPLES,
+                f"{LARGE_TABLE.text} that must be a table: over two robots, a relation, or with div, mod or pow",
+                f"no constraint that must be a table has more than {MAX_TUPLES:,} combinations of values",
+            ),
+        ),
+        "domains are large, and it needs no tables",
+        Order.MAX_DEGREE,
+    ),
     Rule("sfb", (COSTS,), "it needs few messages, on hard problems too", Order.MAX_DEGREE),
     Rule("sfb", (), "it needs few messages, on hard problems too", Order.MIN_WIDTH),
 )

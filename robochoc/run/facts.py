@@ -10,6 +10,7 @@ from itertools import product
 from random import Random
 
 from robochoc.model.change import team_after_events
+from robochoc.model.expression.tree import is_total
 from robochoc.model.orders import Graph, constraint_graph
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run.divided_tables import divided_tables
@@ -128,7 +129,7 @@ class Facts:
 
         A table is over the variables that the constraint names (`CostTable`), whatever other variables the robots have.
         """
-        return self._largest_table(self.sizes)
+        return self._largest_table(self.sizes, self._named)
 
     @property
     def is_binary(self) -> bool:
@@ -228,7 +229,21 @@ class Facts:
     @cached_property
     def declared_table(self) -> int:
         """The same as `largest_table`, with the declared sizes."""
-        return self._largest_table(self.declared_sizes)
+        return self._largest_table(self.declared_sizes, self._named)
+
+    @cached_property
+    def largest_needed_table(self) -> int:
+        """The number of entries in the largest table that `sfb` cannot avoid by evaluating single rows."""
+        if self.withdrawal or not self.has_costs:
+            return self.largest_table
+        needed = {frozenset(one.variables) for one in self._shared if not self._has_rows(one)}
+        return self._largest_table(self.sizes, needed)
+
+    def _has_rows(self, constraint: Constraint) -> bool:
+        """Return whether `sfb` can evaluate rows of the constraint: see `LocalProblem.tables_or_rows`."""
+        robots = {self.first.owner[name] for name in constraint.variables}
+        definition = constraint.definition
+        return len(robots) > _TWO and not isinstance(definition, Relation) and is_total(definition.body)
 
     @property
     def largest_pair(self) -> int:
@@ -246,12 +261,16 @@ class Facts:
     @cached_property
     def _named(self) -> set[frozenset[str]]:
         """The variables of each shared constraint."""
-        return {frozenset(one.variables) for robot in self.first.robots for one in robot.shared}
+        return {frozenset(one.variables) for one in self._shared}
 
-    def _largest_table(self, sizes: Sizes) -> int:
+    @property
+    def _shared(self) -> Iterator[Constraint]:
+        return (one for robot in self.first.robots for one in robot.shared)
+
+    def _largest_table(self, sizes: Sizes, scopes: Collection[frozenset[str]]) -> int:
         owner, domains = self.first.owner, self._domains
         largest = 1
-        for scope in self._named:
+        for scope in scopes:
             named: dict[str, int] = {}
             for name in scope:
                 named[owner[name]] = named.get(owner[name], 1) * len(domains[name])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from robochoc.model.expression.tree import Apply, Constant, Expression, Name
 from robochoc.model.problem import Constraint, Function, Predicate, Value
+from robochoc.solver.encoding import is_soft
 
 LARGEST = 2**62
 """Integers must be smaller, so that they cannot exceed 64 bits."""
@@ -42,20 +43,65 @@ def cost_array(
         names: Its variables, in the order of the values in a combination.
         columns: For each axis, the values of one or more variables. They are not withdrawn.
     """
+    found = _costs(constraint, _arrays(names, columns))
+    return None if found is None else np.broadcast_to(found.array, [len(column) for column in columns])
+
+
+class RowCosts:
+    """The costs of a constraint whose table would be too large: of rows of values, for all values of one robot.
+
+    Args:
+        constraint: The constraint.
+        names: Its variables, in the order of the values of `columns`.
+        columns: For each robot, the values of one or more variables, by the index of the robot's value. The last but
+            one robot is the one whose values are all evaluated. No robot has withdrawn.
+    """
+
+    def __init__(self, constraint: Constraint, names: Sequence[str], columns: Sequence[Sequence[Value]]) -> None:
+        self._constraint = constraint
+        left = iter(names)
+        self._columns = [
+            [(next(left), np.array(values, np.int64), max(map(abs, values))) for values in zip(*column, strict=True)]
+            for column in columns
+        ]
+        found = self._costs([np.zeros(1, np.intp)] * (len(columns) - 1))
+        self.most = None if found is None else found.size
+        """An upper bound on the costs; None if the constraint can only be evaluated for single rows."""
+
+    def of(self, places: Sequence[NDArray[Any]]) -> NDArray[np.float64]:
+        """Return the costs for each row of the indices of values, of all robots but one: an entry for each value."""
+        found = self._costs(places)
+        assert found is not None  # noqa: S101 - depends on the constraint only
+        (*_, column, _) = self._columns
+        return np.broadcast_to(found.array, (len(places[0]), len(column[0][1])))
+
+    def _costs(self, places: Sequence[NDArray[Any]]) -> _Result | None:
+        *above, own = places
+        rows = iter([*above, None, own])
+        terms = {}
+        for column in self._columns:
+            row = next(rows)
+            for name, values, size in column:
+                terms[name] = _Result(values[None, :] if row is None else values[row][:, None], size)
+        return _costs(self._constraint, terms)
+
+
+def _costs(constraint: Constraint, values: Mapping[str, _Result]) -> _Result | None:
+    """Return the costs for the `values` of the variables, and an upper bound on finite costs; None if unsupported."""
     definition = constraint.definition
     if not isinstance(definition, Predicate | Function):
         return None
-    found = _arrays(names, columns)
     terms = {
-        name: found[term] if isinstance(term, str) else _constant(term)
+        name: values[term] if isinstance(term, str) else _constant(term)
         for name, term in zip(definition.parameters, constraint.parameters, strict=True)
     }
     try:
-        array = _evaluated(definition.body, terms).array
+        found = _evaluated(definition.body, terms)
     except _UnsupportedExpressionError:
         return None
-    costs = np.where(array, 0.0, constraint.cost) if isinstance(definition, Predicate) else array.astype(np.float64)
-    return np.broadcast_to(costs, [len(column) for column in columns])
+    if isinstance(definition, Function):
+        return _Result(found.array.astype(np.float64), found.size)
+    return _Result(np.where(found.array, 0.0, constraint.cost), int(constraint.cost) if is_soft(constraint) else 0)
 
 
 def no_costs(shape: Sequence[int]) -> NDArray[np.float64]:

@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Value, WhenAbsent
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import Cost
+from robochoc.solver.errors import TooLargeError
 from robochoc.solver.explanation import KeyedConstraint, constraints_above, parts_below
 from robochoc.solver.filters import Filters
 from robochoc.solver.shared_constraint import (
@@ -38,6 +39,7 @@ from robochoc.solver.shared_constraint import (
 
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
+    from robochoc.solver.constraint_arrays import RowCosts
     from robochoc.solver.cost_table import CostTable
     from robochoc.solver.exclusions import SharedTask
 
@@ -75,6 +77,13 @@ class TableScope(NamedTuple):
     agents: tuple[str, ...]
     places: tuple[tuple[int, ...], ...] | None
     max_cost: Cost
+
+
+class ConstraintRows(NamedTuple):
+    """A constraint with `agents` that is evaluated for rows of values during the search."""
+
+    agents: tuple[str, ...]
+    costs: RowCosts
 
 
 class AllowedValues(NamedTuple):
@@ -487,6 +496,32 @@ class LocalProblem:
         for constraint in self._constraints if lowest is None else self._with_lowest(lowest):
             if set(constraint.agents) <= domains.keys():
                 checks, table = cost_table(constraint, domains)
+                self.checks += checks
+                found.append(table)
+        return found
+
+    def tables_or_rows(self, domains: Mapping[str, Sequence[Value]], lowest: str) -> list[CostTable | ConstraintRows]:
+        """Return the result of `tables`, but `ConstraintRows` for n-ary constraints whose tables would be too large.
+
+        The caller counts the checks of rows.
+
+        Raises:
+            TooLargeError: if a table is too large, and the constraint cannot be evaluated in rows.
+        """
+        from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - as above
+
+        found: list[CostTable | ConstraintRows] = []
+        for constraint in self._with_lowest(lowest):
+            if not set(constraint.agents) <= domains.keys():
+                continue
+            try:
+                checks, table = cost_table(constraint, domains)
+            except TooLargeError:
+                rows = constraint.row_costs(domains) if len(constraint.agents) > 1 else None
+                if rows is None:
+                    raise
+                found.append(ConstraintRows(constraint.agents, rows))
+            else:
                 self.checks += checks
                 found.append(table)
         return found

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from numpy import float64
     from numpy.typing import NDArray
 
+    from robochoc.solver.constraint_arrays import RowCosts
+
 Conflict = Mapping[str, Value]
 """Assignments of other robots that exclude a value of this robot: the left side of a nogood."""
 
@@ -356,6 +358,28 @@ class SharedConstraint:
         left = [name for place in present for name in named[place]]
         found = cost_array(constraint, left, [columns[place] for place in present])
         return None if found is None else found.reshape(shape)
+
+    def row_costs(self, domains: Mapping[str, Sequence[Value]]) -> RowCosts | None:
+        """Return the constraint for evaluation row by row, with this robot last; None if this is not supported.
+
+        Raises:
+            ValueError: if a value is undeclared.
+        """
+        from robochoc.solver.constraint_arrays import RowCosts  # noqa: PLC0415 - as above
+
+        columns: list[Sequence[Value]] = []
+        for agent in self.agents:
+            places = [place for owner, place in self._seen if owner == agent]
+            columns.append([tuple([value[place] for place in places]) for value in domains[agent]])
+        columns.append([self._distinct[code] for code in self.codes])
+        if not all(columns) or any(None in part for column in columns for part in column):
+            return None
+        least = [column[0] for column in columns[:-1]]
+        for place, column in enumerate(columns[:-1]):
+            for part in dict.fromkeys(column):
+                self._refuse_undeclared(tuple(itertools.chain(*least[:place], part, *least[place + 1 :])))
+        found = RowCosts(self._constraint, self._all_names, columns)
+        return None if found.most is None else found
 
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[Cost]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.

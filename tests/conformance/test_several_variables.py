@@ -11,6 +11,8 @@ from robochoc.model.problem import INFINITE
 from robochoc.run import Options, Runtime
 from robochoc.run.choice import accepts
 from robochoc.run.registry import installed_protocols
+from robochoc.solver import shared_constraint
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from tests.support.examples import are_the_same, count, drawn
 from tests.support.loose_problems import minimum_cost
 from tests.support.several_variables import random_model, slots_and_tasks
@@ -48,3 +50,22 @@ def test_a_rule_over_six_slots_is_no_table_over_slots_and_tasks() -> None:
     assert {(outcome.verdict, outcome.cost) for outcome in outcomes.values()} == {
         (Verdict.OPTIMAL, outcomes["sfb"].cost)
     }
+
+
+def test_constraints_whose_tables_are_too_large_are_evaluated_row_by_row(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(key: str, entries: int) -> None:
+        if entries > 9:  # a pair of variables with three values
+            raise TooLargeError(key)
+
+    monkeypatch.setattr(shared_constraint, "refuse_large", refuse)
+    rows = 0
+    for number in range(12):
+        model = random_model(drawn(f"row by row {number}"), costs=True)
+        try:
+            outcome = model.solve(protocol="sfb", runtime="simulator")
+        except UnsupportedError:  # a constraint over three robots is a table
+            continue
+        least = minimum_cost(model.team)
+        assert (outcome.cost if outcome.verdict is Verdict.OPTIMAL else INFINITE) == least
+        rows += 1
+    assert rows > 3 or not are_the_same()

@@ -54,8 +54,18 @@ class ExcessiveValueError(UndefinedValueError):
     """Raised if the expression or a part of it has a value beyond +-`BOUND`. Teams that allow this are invalid."""
 
 
+PARTIAL = frozenset({"div", "mod", "pow"})
+"""The operators that are undefined for some integers within the bounds."""
+
 SYMBOLIC = ("eq", "ne", "in")
 """The operators that compare symbols."""
+
+
+def is_total(expression: Expression) -> bool:
+    """Return whether `expression` has no operator that may be undefined."""
+    if not isinstance(expression, Apply):
+        return True
+    return expression.operator not in PARTIAL and all(map(is_total, expression.arguments))
 
 
 def text(expression: Expression, symbolic: Collection[str] = (), symbols: Sequence[str] = ()) -> str:

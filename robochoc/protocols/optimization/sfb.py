@@ -39,7 +39,8 @@ same.
 
 Constraints may be n-ary: the second-last robot in a scope adds the costs that the last one will pay. Costs are read
 from tables that are computed before the search (see `LocalProblem.tables`), so the search itself makes no constraint
-checks.
+checks. Only constraints over three or more robots whose tables would be too large are evaluated during the search, for
+the rows of a batch at once. Without costs they are refused.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.constraint_arrays import RowCosts
 from robochoc.solver.cost_table import CostTable
-from robochoc.solver.local_problem import LocalProblem
+from robochoc.solver.local_problem import ConstraintRows, LocalProblem
 
 Domain = tuple[Value, ...]
 Rows = NDArray[np.integer[Any]]
@@ -56,6 +57,15 @@ class _NAry(NamedTuple):
         return found if lowest is None else found[:, lowest]
 
 
+class _Rows(NamedTuple):
+    """An n-ary constraint whose table would be too large: its costs are computed for each row (see `_NAry`)."""
+
+    ranks: tuple[int, ...]
+    columns: slice
+    costs: RowCosts
+    problem: LocalProblem
+
+
 class ForwardBounds:
     """The costs that the robot of `problem` adds to partial assignments; `domains` are the values of all robots.
 
@@ -82,7 +92,7 @@ class ForwardBounds:
             (rank, table)
             for rank, name in ranks
             if rank > self.rank
-            for table in problem.tables({**above, name: domains[rank]}, lowest=name)
+            for table in problem.tables_or_rows({**above, name: domains[rank]}, lowest=name)
         ]
         changed = [*dict.fromkeys([rank for rank, _ in found])]
         few = self._total <= FEW_COLUMNS
@@ -98,14 +108,20 @@ class ForwardBounds:
             self._changed = np.concatenate([np.arange(0), *parts])
         self._prices: NDArray[Any] = np.zeros((self._own, self._starts[-1]))
         self._n_ary: list[_NAry] = []
+        self._rows: list[_Rows] = []
         place = {rank: place for place, rank in enumerate(changed)}
         for rank, table in found:
-            self.most += int(table.charges[np.isfinite(table.charges)].max(initial=0))
             vector = slice(int(self._starts[place[rank]]), int(self._starts[place[rank] + 1]))
+            above_both = tuple([order.rank[one] for one in table.agents[:-1]])
+            if isinstance(table, ConstraintRows):
+                self.most += table.costs.most or 0
+                self._rows.append(_Rows(above_both, vector, table.costs, problem))
+                continue
+            self.most += int(table.charges[np.isfinite(table.charges)].max(initial=0))
             if len(table.agents) == 1:
                 self._prices[:, vector] += table.joined().T
             else:
-                self._n_ary.append(_n_ary(table, tuple([order.rank[one] for one in table.agents[:-1]]), vector))
+                self._n_ary.append(_n_ary(table, above_both, vector))
 
     def count_up_to(self, ceiling: int) -> None:
         """Set the `ceiling`, to which all larger costs are reduced from now on."""
@@ -198,6 +214,10 @@ class ForwardBounds:
         for one in self._n_ary:
             costs = one.costs([rows[row, VALUES + rank] for rank in one.ranks], value)
             vectors[:, one.columns] = np.minimum(vectors[:, one.columns] + costs, self.ceiling)
+        for each in self._rows:
+            costs = each.costs.of([*(rows[row, VALUES + rank] for rank in each.ranks), value])
+            each.problem.checks += costs.size
+            vectors[:, each.columns] = np.minimum(vectors[:, each.columns] + costs, self.ceiling)
         return vectors
 
     def _cheapest(self, vectors: Rows) -> Rows:
