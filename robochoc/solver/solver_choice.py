@@ -1,4 +1,17 @@
-"""The rules by which `--with auto` chooses a central solver."""
+"""The rules by which `--with auto` chooses a central solver.
+
+The order of the solvers follows a study (`python benchmarks/run.py central`, 100 instances of 20 families). Of the 74
+that are not enumerated, 35 have no costs and 39 have costs. Always choosing one solver, with a limit of 5 s of CPU:
+
+    solver     without costs             with costs
+    cosoco     33 decided, 21 s in all   27 decided,  68 s
+    toulbar2   33 decided, 26 s          34 decided,  31 s
+    ACE        30 decided, 48 s          23 decided, 119 s
+    CP-SAT     32 decided, 49 s          23 decided, 106 s
+    the best   34 decided, 18 s          34 decided,  30 s
+
+ACE is before CP-SAT only in the race without costs: it alone decided 3D queens with n = 10, by its cliques.
+"""
 
 from __future__ import annotations
 
