@@ -5,9 +5,10 @@ With other protocols a second phase with another protocol follows when it is kno
 
 A repair follows an incomplete protocol that has ended, and all of whose assignments violate hard constraints. The
 robots begin with the assignment that violates the fewest, and continue with `gdba`, which raises the weights of
-violated constraints until they are satisfied. In a local minimum, it raises single entries of their tables
-(`scope=E`): on 120 small problems with an easy solution this always found one, and the default, whole tables, left 8
-without one.
+violated constraints until they are satisfied. In a local minimum, each robot raises the entries of its present value
+(`scope=C`), whatever the others' values are. If many robots have taken the same place, none satisfies the capacity by
+its own move, so each robot must remember that the place is taken while the others change. Single entries (E) and whole
+tables (T, the default of `gdba`) leave some capacities violated.
 """
 
 from __future__ import annotations
@@ -91,5 +92,5 @@ MOST_REPAIRED = 300
 
 def repair_phase(options: Options, values: StartValues) -> RunPhase:
     """Return the phase that repairs the assignment `values`, which violates hard constraints."""
-    parameters = RunParameters(options.seed, {"scope": "E"}, message_loss=options.dropped)
+    parameters = RunParameters(options.seed, {"scope": "C"}, message_loss=options.dropped)
     return RunPhase(REPAIR, protocol_or_stage(REPAIR), parameters).beginning_with(Start(values))

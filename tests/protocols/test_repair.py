@@ -29,15 +29,16 @@ INCOMPLETE = [
 
 
 def berths(chance: Random, robots: int = 5) -> Team:
-    """Two robots fit into each of three berths, and neighbours prefer different ones. A solution is easy to see."""
+    """A third of the robots fit into each of three berths, which differ in their costs. A solution is easy to see."""
     names = [f"R{number}" for number in range(robots)]
     variables = {name: [Variable(f"{name}.at", Domain("D", (range(3),)))] for name in names}
     scope = tuple(own.name for (own,) in variables.values())
     constraints = []
+    letters = tuple("ABCDEFG"[:robots])
     for berth in range(3):
-        terms = ",".join(f"if(eq({letter},{berth}),1,0)" for letter in "ABCDE"[:robots])
-        text = f"le(add({terms}),2)"
-        definition = Predicate(f"P{berth}", tuple("ABCDE"[:robots]), parse(text, tuple("ABCDE"[:robots]), Type.BOOLEAN))
+        terms = ",".join(f"if(eq({letter},{berth}),1,0)" for letter in letters)
+        text = f"le(add({terms}),{-(-robots // 3)})"
+        definition = Predicate(f"P{berth}", letters, parse(text, letters, Type.BOOLEAN))
         constraints.append(Constraint(f"C{berth}", definition, scope, scope))
     for name in scope:
         costs = Relation(f"U{name}", 1, Semantics.SOFT, ((0,), (1,)), (chance.randint(0, 9), chance.randint(0, 9)), 9)
@@ -109,3 +110,14 @@ def test_there_is_no_repair_under_other_limits_or_of_a_final_assignment() -> Non
         outcome = solve(team, other)
         assert (outcome.verdict, outcome.repair) == (Verdict.UNKNOWN, None)
         assert outcome.violations is not None
+
+
+def test_a_place_that_all_have_taken_is_left_by_as_many_as_necessary() -> None:
+    """No robot satisfies the capacity by its own move, so each must learn by itself that the place is taken."""
+    chance = Random(3)
+    for seed in range(6):
+        team = berths(chance, robots=7)
+        start = dict.fromkeys(team.variables, 0)
+        options = replace(SIMULATOR, protocol="mgm", seed=seed, settings={"cycles": "1"}, start=start)
+        outcome = solve(team, options)
+        assert (outcome.verdict, outcome.repair) == (Verdict.SOLUTION, "gdba")
