@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from copy import copy, deepcopy
 from functools import cache
 from typing import Any, Self, cast, get_args
 
@@ -122,6 +123,15 @@ class Host:
         self._observer: Observer | None = None
         self._now: Callable[[], float] = lambda: 0.0
         self._then: Callable[[int], float] | None = None
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        """Return a copy that continues independently of this host, and reports to no observer."""
+        twin = copy(self)
+        twin.protocol, twin.dropper = deepcopy(self.protocol, memo), deepcopy(self.dropper, memo)
+        twin.sent, twin._stamps = dict(self.sent), [*self._stamps]  # noqa: SLF001 - of the same class
+        twin.checks_at_send = twin.protocol.checks_at_send
+        twin._observer = None  # noqa: SLF001
+        return twin
 
     def observe(
         self,

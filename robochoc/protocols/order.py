@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from copy import copy
+from typing import Self
 
 from robochoc.system.compiling import mypyc_attr
 
@@ -24,6 +26,9 @@ class PriorityOrder:
         self.names = tuple(names)
         self.rank = {name: place for place, name in enumerate(self.names)} if rank is None else rank
         self.tree = None if links is None else PseudoTree.induced(self.names, links)
+
+    def __deepcopy__(self, _: object) -> Self:
+        return copy(self)  # names and ranks never change
 
     def lowest(self, names: Iterable[str]) -> str:
         """Return the lowest-priority robot in `names`. Raises `ValueError` if `names` is empty."""

@@ -17,6 +17,7 @@ import itertools
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from copy import copy, deepcopy
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Value, WhenAbsent
@@ -175,6 +176,13 @@ class LocalProblem:
         self._rank = rank
         self._part = part
         self._set_constraints(part, OwnValues(robot.interface, self.values))
+
+    def __deepcopy__(self, memo: dict[int, object]) -> LocalProblem:
+        """Return a copy that counts its own checks. What is known about the team is shared."""
+        twin = copy(self)
+        memo |= {id(self._part): self._part, id(self._domain): self._domain, id(self._rank): self._rank}
+        vars(twin).update({name: deepcopy(value, memo) for name, value in vars(self).items()})
+        return twin
 
     def _set_constraints(self, part: AgentProblem, own: OwnValues) -> None:
         """Compile the constraints in `part` for the values `own`, and set all attributes that depend on them."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from copy import copy
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.absence import may_count_when_absent, restated
@@ -167,6 +168,12 @@ class SharedConstraint:
         self._price: Callable[[Sequence[int]], Cost] | None = None
         self._restated: dict[tuple[str, ...], Callable[[Sequence[int]], Cost] | None] = {}
         """The costs of the constraint if the owners of these variables are absent. None: the constraint is dropped."""
+
+    def __deepcopy__(self, _: object) -> SharedConstraint:
+        """Return a copy with its own record of evaluated combinations, which are counted. All results are shared."""
+        twin = copy(self)
+        twin._masks = dict(self._masks)  # noqa: SLF001 - of the same class
+        return twin
 
     def allow_absence(self) -> None:
         """Accept None as the value of withdrawn robots from now on (`model/absence.py`)."""

@@ -49,8 +49,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import partial
 from operator import add
-from typing import Annotated, ClassVar, NamedTuple, TypeVar
+from typing import Annotated, ClassVar, Generic, NamedTuple, TypeVar
 
 import msgspec
 import numpy as np
@@ -358,6 +359,14 @@ def _constraint_costs(scope: Group, costs: Sequence[float], sizes: Mapping[str, 
 T = TypeVar("T")
 
 
+class _Flood(NamedTuple, Generic[T]):
+    """Items that robots pass on: the type of the messages, the items known so far, and what is done with them."""
+
+    message_type: Callable[[dict[str, T]], wire.Message]
+    known: dict[str, T]
+    then: Callable[[dict[str, T]], None]
+
+
 class KOpt(CycleProtocol):
     """One agent of k-opt. State: the `region` that it knows, the `places` of the values there, and its own `offer`."""
 
@@ -399,27 +408,26 @@ class KOpt(CycleProtocol):
         then: Callable[[dict[str, T]], None],
     ) -> None:
         """Send `items` to all robots at most `links` away, then call `then` with the items of all these robots."""
-        known = dict(items)
+        self._send_new(_Flood(message_type, dict(items), then), items, links)
 
-        def send_new(new: Mapping[str, T], left: int) -> None:
-            if left == 0:
-                then(known)
-                return
-            self.multicast(self.problem.neighbours, message_type(dict(new)))
-            self.listen(self.problem.neighbours, lambda messages: receive_new(messages, left - 1))
+    def _send_new(self, flood: _Flood[T], new: Mapping[str, T], left: int) -> None:
+        """Send `new`, the items that arrived last, over the next of the `left` links."""
+        if left == 0:
+            flood.then(flood.known)
+            return
+        self.multicast(self.problem.neighbours, flood.message_type(dict(new)))
+        self.listen(self.problem.neighbours, partial(self._receive_new, flood, left - 1))
 
-        def receive_new(messages: Mapping[str, wire.Message], left: int) -> None:
-            new: dict[str, T] = {}
-            for name, message in messages.items():
-                if type(message) is not message_type:
-                    raise ValueError(f"{name} sent an unexpected message in this phase")
-                received: Mapping[str, T]
-                (received,) = msgspec.structs.astuple(message)
-                new |= {key: item for key, item in received.items() if key not in known}
-            known.update(new)
-            send_new(new, left)
-
-        send_new(items, links)
+    def _receive_new(self, flood: _Flood[T], left: int, messages: Mapping[str, wire.Message]) -> None:
+        new: dict[str, T] = {}
+        for name, message in messages.items():
+            if type(message) is not flood.message_type:
+                raise ValueError(f"{name} sent an unexpected message in this phase")
+            received: Mapping[str, T]
+            (received,) = msgspec.structs.astuple(message)
+            new |= {key: item for key, item in received.items() if key not in flood.known}
+        flood.known.update(new)
+        self._send_new(flood, new, left)
 
     # Once, before the search
 

@@ -67,6 +67,9 @@ class Ed25519(PrimeGroup):
         self._sodium = _bindings()
         self.one = self.multiple(b"\x01" + bytes(31))
 
+    def __deepcopy__(self, _: object) -> Ed25519:
+        return self  # it never changes, and modules cannot be copied
+
     def scalar(self, secret: Secret) -> bytes:
         """Draw a scalar: 512 bits, reduced by libsodium."""
         return bytes(self._sodium.crypto_core_ed25519_scalar_reduce(secret(512).to_bytes(64, "little")))

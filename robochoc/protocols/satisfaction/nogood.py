@@ -58,6 +58,17 @@ class NogoodStore:
         self._naming: dict[str, dict[int, LeftSide]] = {}
         """The left sides that contain a robot, by their `id`."""
 
+    def __getstate__(self) -> tuple[PriorityOrder, list[LeftSide | None], list[Explanation]]:
+        """Return what determines the store, for copies: in a copy, left sides have other `id`s."""
+        return self._order, self._by_value, self._because
+
+    def __setstate__(self, state: tuple[PriorityOrder, list[LeftSide | None], list[Explanation]]) -> None:
+        order, by_value, because = state
+        self.__init__(order, len(by_value))  # type: ignore[misc]
+        for index, lhs in enumerate(by_value):
+            if lhs is not None:
+                self.add(index, lhs, because[index])
+
     def __getitem__(self, index: int) -> LeftSide | None:
         return self._by_value[index]
 
