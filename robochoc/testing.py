@@ -14,15 +14,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterable, Mapping
 from typing import TypeVar
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.exploration.check import CheckOptions, checked
+from robochoc.exploration.problems import small_teams
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.run.options import Options, Runtime
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.verification.checker import violations
@@ -33,6 +37,7 @@ __all__ = [
     "Schedule",
     "Simulation",
     "agent_problems",
+    "check_protocol",
     "deliver",
     "protocol_objects",
     "start",
@@ -72,3 +77,58 @@ def deliver(robots: Mapping[str, Protocol]) -> list[tuple[str, str, Message]]:
     for sender, receiver, message in sent:
         robots[receiver].receive(sender, message)
     return sent
+
+
+def check_protocol(  # noqa: PLR0913 - options, by name
+    protocol: type[Protocol],
+    problems: Iterable[Team] | None = None,
+    *,
+    teams: int = 20,
+    robots: int = 3,
+    values: int = 2,
+    seed: int = 0,
+    states: int = 20_000,
+    packets: bool = False,
+    losses: int = 0,
+    settings: Mapping[str, str] | None = None,
+) -> int:
+    """Check a protocol in every order in which messages can arrive on small teams: `robochoc check` in one line.
+
+    In each order must hold: verdicts and bounds are right, no robot refuses a message or fails, and a protocol that is
+    `complete` ends with an answer.
+
+    Args:
+        protocol: The class of the protocol.
+        problems: The teams. None: random teams of the kinds that `protocol.traits` accept.
+        teams: The number of random teams.
+        robots: The maximum number of robots in a random team.
+        values: The maximum number of values of a robot in a random team.
+        seed: The seed of the random teams.
+        states: The maximum number of states explored per team.
+        packets: True to deliver also several waiting messages at once.
+        losses: The maximum number of messages that are lost.
+        settings: The settings of the protocol, as for `--set`.
+
+    Returns:
+        The number of states explored.
+
+    Raises:
+        AssertionError: if something does not hold. Its message contains the deliveries that lead there.
+        UnsupportedError: if the protocol does not accept one of `problems`.
+
+    Example:
+        >>> from robochoc.protocols.satisfaction.abt import ABT
+        >>> from robochoc.testing import check_protocol
+        >>> check_protocol(ABT, teams=5)
+        196
+    """
+    run = Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR, seed=seed, settings=dict(settings or {}))
+    options = CheckOptions(protocol, run, states, packets=packets, losses=losses)
+    if problems is None:
+        problems = itertools.islice(small_teams(protocol.traits, robots, values, seed), teams)
+    total = 0
+    for one in checked(problems, options):
+        total += one.exploration.states
+        if one.exploration.fault:
+            raise AssertionError(f"{protocol.__name__} on {one.team.name}, {one.in_words}\n{one.steps_in_words}")
+    return total

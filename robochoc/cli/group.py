@@ -28,6 +28,7 @@ COMMANDS = {
     "app": ("app", "Model, solve and fly in a browser, without formulas."),
     "authority": ("authority", "Enrol and revoke robots for runs on several machines."),
     "cache": ("cache", "Show or clear the cache of solved local problems."),
+    "check": ("check", "Explore every order of messages on small teams."),
     "compare": ("compare", "Compare protocols on problems: a table, a picture."),
     "compile": ("compile_team", "Compile the robots' local problems and show their sizes."),
     "completion": ("completion", "Print the completion script for bash, zsh or fish."),

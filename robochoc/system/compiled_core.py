@@ -17,6 +17,8 @@ from typing import Any
 _COMPILED_MODULE = "robochoc.protocols.protocol"
 """The name of one of the compiled modules."""
 
+PURE = "pure Python"
+
 
 class PurePython:
     """A module finder that loads robochoc's modules from their sources even if compiled modules exist."""
@@ -44,9 +46,9 @@ def is_compiled(found: ModuleSpec) -> bool:
 
 
 def kind_of_core() -> str:
-    """Return `compiled core` or `pure Python`."""
+    """Return `compiled core`, or `PURE`."""
     found = find_spec(_COMPILED_MODULE)
-    return "compiled core" if found is not None and is_compiled(found) else "pure Python"
+    return "compiled core" if found is not None and is_compiled(found) else PURE
 
 
 def attributes_of(thing: object) -> Mapping[str, Any]:

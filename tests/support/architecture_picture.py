@@ -13,7 +13,10 @@ from tests.support.program import ROOT
 PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 _SUBJECTS = {
     "people": ("#dbe9fb", ("cli", "app", "experiments", "api", "testing", "modelling")),
-    "around a run": ("#e3f3e1", ("privacy", "sniffer", "view", "replay", "ros", "vehicles", "robots", "generators")),
+    "around a run": (
+        "#e3f3e1",
+        ("privacy", "sniffer", "exploration", "view", "replay", "ros", "vehicles", "robots", "generators"),
+    ),
     "a run": ("#fdeccb", ("run", "flight", "communication", "authority", "services", "journal")),
     "data": ("#efe5f7", ("formats", "maps", "verification", "model", "system")),
     "reasoning": ("#fbdcd9", ("protocols", "solver")),

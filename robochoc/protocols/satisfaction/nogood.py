@@ -59,7 +59,7 @@ class NogoodStore:
         """The left sides that contain a robot, by their `id`."""
 
     def __getstate__(self) -> tuple[PriorityOrder, list[LeftSide | None], list[Explanation]]:
-        """Return what determines the store, for copies: in a copy, left sides have other `id`s."""
+        """Return the content of the store, for copies: in a copy, left sides have other `id`s."""
         return self._order, self._by_value, self._because
 
     def __setstate__(self, state: tuple[PriorityOrder, list[LeftSide | None], list[Explanation]]) -> None:

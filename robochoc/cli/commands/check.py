@@ -1,0 +1,152 @@
+"""`robochoc check`: explores every order in which messages can arrive, on small teams."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.options.paths import InputPath, OutputFile
+from robochoc.cli.options.solve import protocol_settings, settings_option
+from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
+from robochoc.cli.reports.failures import LIMIT, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from robochoc.exploration.check import CheckedTeam, CheckOptions
+    from robochoc.model.problem import Team
+
+MOST_ROBOTS, MOST_VALUES = 6, 6
+
+
+@click.command()
+@click.argument("protocol", type=ProtocolName())
+@click.argument("folders", nargs=-1, type=InputPath(), metavar="[TEAM...]")
+@click.option(
+    "--teams", type=WholeNumber(1), default=20, show_default=True, metavar="N", help="Number of random teams."
+)
+@click.option(
+    "--robots", type=WholeNumber(1, MOST_ROBOTS), default=3, show_default=True, metavar="N",
+    help="Maximum number of robots in a random team.",
+)  # fmt: skip
+@click.option(
+    "--values", type=WholeNumber(1, MOST_VALUES), default=2, show_default=True, metavar="N",
+    help="Maximum number of values of a robot in a random team.",
+)  # fmt: skip
+@click.option(
+    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of the random teams."
+)
+@click.option(
+    "--states", type=WholeNumber(1), default=100_000, show_default=True, metavar="N",
+    help="Maximum number of states per team.",
+)  # fmt: skip
+@click.option("--packets", is_flag=True, help="Deliver also several waiting messages at once, as runtimes do.")
+@click.option("--loss", type=WholeNumber(0), default=0, metavar="N", help="Lose up to N messages, any of them.")
+@settings_option
+@click.option("--timeout", type=Number(0, min_open=True), metavar="SECONDS", help="Time limit of the command.")
+@click.option("--journal", type=OutputFile(), metavar="FILE", help="Write the run that leads to the first fault.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
+@invalid_input_fails
+def check(  # noqa: PLR0913 - options, by name
+    protocol: str,
+    folders: tuple[Path, ...],
+    *,
+    teams: int,
+    robots: int,
+    values: int,
+    seed: int,
+    states: int,
+    packets: bool,
+    loss: int,
+    settings_given: tuple[str, ...],
+    timeout: float | None,
+    journal: Path | None,
+    as_json: bool,
+) -> None:
+    """Explore every order in which messages can arrive, with the code of PROTOCOL that robots run.
+
+    Each state of a team, and each order of deliveries, is visited once, up to --states. In each of them must hold:
+    verdicts are right, bounds too, no robot refuses a message, and a complete protocol ends with an answer. The teams
+    are small and random, or those in TEAM.
+
+    The table has the number of states, of steps between them, of states in which the search is over, and whether all
+    states were explored. Exit status: 0 without a fault if all were, 3 if not; 4 with a fault.
+
+    \b
+    robochoc check abt                          every order, on 20 random teams of at most 3 robots
+    robochoc check adopt --robots 4 --values 3  larger teams
+    robochoc check dsa --set cycles=3 --loss 1  any message may be lost
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.exploration.check import CheckOptions, checked
+    from robochoc.run.options import Options, Runtime
+    from robochoc.run.registry import protocol_named
+
+    with errors_as_failures(protocol):
+        run = Options(
+            protocol=protocol, runtime=Runtime.SIMULATOR, settings=protocol_settings(settings_given), seed=seed
+        )
+    began = time.monotonic()
+    with errors_as_failures(protocol):
+        options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss)
+        problems = _teams(folders, (teams, robots, values, seed), options)
+        found = list(_shown(checked(problems, options, None if timeout is None else began + timeout), as_json=as_json))
+    _end(found, journal, options)
+
+
+def _teams(folders: tuple[Path, ...], sizes: tuple[int, int, int, int], options: CheckOptions) -> Iterator[Team]:
+    """Return the teams to check. Raises `Failure` if the protocol cannot be checked with the options."""
+    from robochoc.exploration.problems import small_teams
+    from robochoc.formats import read_team
+
+    traits = options.protocol.traits
+    if options.losses and not traits.bears_loss:
+        raise Failure(USAGE, f"{options.run.protocol} does not tolerate lost messages; remove --loss")
+    if folders:
+        return map(read_team, folders)
+    count, robots, values, seed = sizes
+    return itertools.islice(small_teams(traits, robots, values, seed), count)
+
+
+def _shown(found: Iterator[CheckedTeam], *, as_json: bool) -> Iterator[CheckedTeam]:
+    """Yield `found`, and print each of them as JSON, or all of them as a table."""
+    from robochoc.cli.reports.table import print_table
+
+    rows = []
+    headings = ("team", "robots", "states", "steps", "ends", "explored")
+    for one in found:
+        explored = one.exploration
+        if as_json:
+            click.echo(json.dumps(one.as_dict()))
+        numbers = [len(one.team.robots), explored.states, explored.steps, explored.ends]
+        whole = "fault" if explored.fault else "all" if explored.is_complete else "in part"
+        rows.append([one.team.name, *(f"{number:,}" for number in numbers), whole])
+        yield one
+    if not as_json:
+        print_table(headings, rows, right=headings[1:-1])
+
+
+def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions) -> None:
+    """Report what was found. Raises `Failure` if there is a fault, or if not everything was explored."""
+    from robochoc.exploration.counterexample import write_counterexample
+    from robochoc.system.plain_text import counted
+
+    states = counted(sum(one.exploration.states for one in found), "state")
+    faulty = [one for one in found if one.exploration.fault]
+    if faulty:
+        first = faulty[0]
+        if journal is not None:
+            with errors_as_failures(journal):
+                write_counterexample(journal, first.case, first.exploration.path, options.run)
+            click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
+        raise Failure(LOST, "\n".join(f"{one.team.name}: {one.in_words}" for one in faulty))
+    partly = sum(not one.exploration.is_complete for one in found)
+    if partly:
+        raise Failure(
+            LIMIT, f"{states}, no fault so far; {counted(partly, 'team')} explored in part: increase --states"
+        )
+    click.echo(f"{states}, no fault in any order of deliveries", err=True)

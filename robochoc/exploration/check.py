@@ -1,0 +1,154 @@
+"""Checks a protocol on small teams: every order of deliveries, up to a number of states."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
+from functools import partial
+from typing import NamedTuple
+
+from robochoc.communication.host import Host
+from robochoc.communication.session import Epoch
+from robochoc.exploration.judgement import TeamJudge
+from robochoc.exploration.state_graph import Exploration, StateGraph
+from robochoc.model.costs import normalized
+from robochoc.model.problem import Team
+from robochoc.protocols.protocol import Protocol
+from robochoc.run.alternatives import refuse_team
+from robochoc.run.compatibility.setting_rules import refuse_settings
+from robochoc.run.options import Options
+from robochoc.run.phases import RunPhase, first_phase
+from robochoc.solver.compile import NoLocalSolutionError
+from robochoc.solver.compiled_team import CompiledTeam, ensure_compiled
+from robochoc.solver.errors import UnsupportedError
+from robochoc.system.compiled_core import PURE, kind_of_core
+from robochoc.system.plain_text import counted
+from robochoc.system.stopping import stop_requested
+from robochoc.verification.objective import withdrawal_cost
+
+
+class CheckOptions(NamedTuple):
+    """How to check.
+
+    Attributes:
+        protocol: The class of the protocol.
+        run: The options of the run: the protocol's name, its settings, the seed. Other options are not used.
+        states: The maximum number of states per team.
+        packets: True to deliver also several waiting messages at once.
+        losses: The maximum number of lost messages.
+    """
+
+    protocol: type[Protocol]
+    run: Options
+    states: int = 100_000
+    packets: bool = False
+    losses: int = 0
+
+
+class Case(NamedTuple):
+    """A team that is checked: compiled, with the phase of its run."""
+
+    compiled: CompiledTeam
+    phase: RunPhase
+
+
+def case_of(team: Team, protocol: type[Protocol], options: Options) -> Case:
+    """Return the case of `team`.
+
+    Raises:
+        UnsupportedError: if the protocol does not accept the team.
+        NoLocalSolutionError: if a robot has no value.
+    """
+    refuse_settings(options.protocol, protocol, options.settings)
+    refuse_team(team, options, protocol.traits)
+    counted_team = normalized(team)
+    phase = first_phase(options, protocol, partial(withdrawal_cost, counted_team))
+    return Case(ensure_compiled(counted_team), phase)
+
+
+def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = lambda _: False) -> Exploration:
+    """Explore every order of deliveries in the run of a team.
+
+    Args:
+        case: The team.
+        options: How to check.
+        is_over: Asked from time to time, with the number of states so far, whether to stop.
+
+    Raises:
+        UnsupportedError: with the compiled core.
+    """
+    if kind_of_core() != PURE:
+        raise UnsupportedError("compiled protocols cannot be copied; set the environment variable ROBOCHOC_PURE to 1")
+    compiled, phase = case
+    parts = Epoch(compiled, parameters=phase.parameters).parts(phase.protocol)
+    hosts = {name: Host.create(phase.protocol, part) for name, part in parts.items()}
+    graph = StateGraph(hosts, TeamJudge(compiled, phase), packets=options.packets, losses=options.losses)
+    found = graph.explore(options.states, is_over)
+    if found.is_cyclic and phase.traits.complete and not found.fault:
+        found.fault = ENDLESS
+    return found
+
+
+ENDLESS = (
+    "the robots may continue forever, although every message arrives, and the protocol claims to end on every problem"
+)
+
+
+class CheckedTeam(NamedTuple):
+    """A team with what was explored. `team` is in the form of the files."""
+
+    team: Team
+    case: Case
+    exploration: Exploration
+
+    @property
+    def in_words(self) -> str:
+        """The result as a sentence."""
+        found = self.exploration
+        if found.fault:
+            return f"after {counted(len(found.path), 'step')}: {found.fault}"
+        if not found.is_complete:
+            return "no fault so far; not all states were explored"
+        return "no fault in any order of deliveries"
+
+    @property
+    def steps_in_words(self) -> str:
+        """The deliveries that lead to the fault, one on each line."""
+        return "\n".join(f"{number}. {one.in_words}" for number, one in enumerate(self.exploration.path, 1))
+
+    def as_dict(self) -> dict[str, object]:
+        """Return the numbers and the fault, for JSON."""
+        found = self.exploration
+        return {
+            "team": self.team.name,
+            "robots": len(self.team.robots),
+            "states": found.states,
+            "steps": found.steps,
+            "ends": found.ends,
+            "local_states": found.local_states,
+            "complete": found.is_complete,
+            "cyclic": found.is_cyclic,
+            "fault": found.fault or None,
+            "path": [delivery._asdict() for delivery in found.path],
+        }
+
+
+def checked(teams: Iterable[Team], options: CheckOptions, deadline: float | None = None) -> Iterator[CheckedTeam]:
+    """Yield each of `teams` with what was explored, up to the `deadline` on the monotonic clock.
+
+    Teams with a robot that has no value are skipped: there is no search.
+
+    Raises:
+        UnsupportedError: if the protocol does not accept a team.
+    """
+    for team in teams:
+        if deadline is not None and time.monotonic() > deadline:
+            return
+        with suppress(NoLocalSolutionError):
+            case = case_of(team, options.protocol, options.run)
+            yield CheckedTeam(team, case, explore(case, options, lambda _: _is_past(deadline)))
+
+
+def _is_past(deadline: float | None) -> bool:
+    return stop_requested() or (deadline is not None and time.monotonic() > deadline)

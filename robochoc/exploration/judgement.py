@@ -1,0 +1,110 @@
+"""The properties that must hold in every order of deliveries.
+
+The answer at the end is evaluated as that of any run (`run/evaluation.py`), and compared with all assignments:
+
+- a solution satisfies every constraint, `optimal` has the minimum cost, and with `no-solution` there is no solution;
+- a complete protocol ends with an answer, unless a lost message explains that it has none;
+- at any time, the lower bound that the robots report is not above the minimum cost, and no known cost is below it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from robochoc.communication.search_result import SearchResult
+from robochoc.exploration.local_steps import LocalState
+from robochoc.model.costs import user_cost
+from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import INFINITE, Assignment, Team
+from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search
+from robochoc.run.incumbent import lower_bound
+from robochoc.run.phases import RunPhase
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.errors import UnsupportedError
+from robochoc.verification.checker import RefutedError, assignment_cost, violations
+
+MOST_ASSIGNMENTS = 100_000
+"""The maximum number of assignments of a team."""
+NO_SOLUTION_IS_WRONG = "the verdict is no-solution, but there is a solution"
+
+
+class TeamJudge:
+    """Judges the states of `compiled` during the search of `phase`. All assignments are tried once.
+
+    Raises `UnsupportedError` if there are too many.
+
+    Attributes:
+        minimum: The minimum cost of a solution (0 without costs), or `INFINITE` if there is no solution.
+    """
+
+    def __init__(self, compiled: CompiledTeam, phase: RunPhase) -> None:
+        self._compiled, self._phase = compiled, phase
+        self.minimum = _minimum(compiled.team)
+        self._judged: dict[tuple[int, ...], str] = {}
+
+    def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
+        """See `state_graph.Judge`."""
+        key = (*map(id, robots), losses)
+        if key not in self._judged:
+            self._judged[key] = self._fault_at_the_end(robots, witness, losses)
+        return self._judged[key]
+
+    def on_the_way(self, robots: Sequence[LocalState]) -> str:
+        """See `state_graph.Judge`."""
+        if self.minimum < INFINITE and any(one.verdict == Verdict.NO_SOLUTION for one in robots):
+            return NO_SOLUTION_IS_WRONG
+        bound = lower_bound({str(place): one.findings for place, one in enumerate(robots)})
+        if bound is not None and bound > self.minimum:
+            return f"the robots report the lower bound {bound}, but the minimum cost is {self.minimum}"
+        known = [one.findings.best.cost for one in robots if one.findings.best is not None]
+        if known and min(known) < self.minimum:
+            return f"a robot knows an assignment with the cost {min(known)}, but the minimum cost is {self.minimum}"
+        return ""
+
+    def _fault_at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
+        try:
+            answer = self._answer(robots, witness, losses)
+        except RefutedError as refuted:
+            return str(refuted)
+        if answer.verdict == Verdict.UNKNOWN and self._phase.traits.complete and not losses:
+            return "the search is over without an answer, although the protocol is complete"
+        if answer.verdict == Verdict.OPTIMAL and answer.cost != user_cost(self._compiled.team, self.minimum):
+            return f"the verdict is optimal with the cost {answer.cost}, but the minimum cost is {self.minimum}"
+        return ""
+
+    def _answer(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> PhaseAnswer:
+        """Return the answer of a run that ends in this state."""
+        team = self._compiled.team
+        verdict = Verdict.SOLUTION if witness is None else robots[witness].verdict
+        result = SearchResult(
+            verdict or Verdict.UNKNOWN,
+            None if witness is None else team.order[witness],
+            {name: one.assignment for name, one in zip(team.order, robots, strict=True)},
+            replace(Metrics(), lost_messages=losses),
+            findings={name: one.findings for name, one in zip(team.order, robots, strict=True)},
+        )
+        check = partial(check_with_files, self._phase, result, team, self._compiled)
+        return evaluate_search(self._phase, Search(result, check), team.kind, partial(user_cost, team))
+
+
+def _minimum(team: Team) -> float:
+    """Return the minimum cost of a solution of `team`; `INFINITE` if there is no solution.
+
+    Raises:
+        UnsupportedError: if there are too many assignments.
+    """
+    names = list(team.variables)
+    number = math.prod(len(variable.domain) for variable in team.variables.values())
+    if number > MOST_ASSIGNMENTS:
+        what = f"{team.name} has {number:,} assignments, more than {MOST_ASSIGNMENTS:,}"
+        raise UnsupportedError(f"{what}: too many to try; use a smaller team")
+    least: float = INFINITE
+    for values in itertools.product(*(team.variables[name].domain for name in names)):
+        assignment: Assignment = dict(zip(names, values, strict=True))
+        if not any(violations(team, assignment)):
+            least = min(least, assignment_cost(team, assignment) or 0)
+    return least

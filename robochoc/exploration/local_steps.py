@@ -1,0 +1,119 @@
+"""The steps of one robot, each computed once.
+
+A robot's step depends on nothing but its own state and the message. A team has many more states than its robots, so
+nearly all steps of a team are known, and exploring them needs neither copies nor messages, only numbers.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from typing import NamedTuple
+
+from robochoc.communication.host import BadMessageError, Host
+from robochoc.exploration.state_key import state_key
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.message import Envelope
+from robochoc.system.time_limit import TimeLimitError, computed_by
+
+LONGEST_STEP_S = 10.0
+"""The time after which a robot's step is a fault, in seconds."""
+
+
+class LocalState(NamedTuple):
+    """A state of a robot, as far as others see it.
+
+    Attributes:
+        verdict: The verdict that the robot concludes alone; None: the search continues.
+        assignment: The values of its variables.
+        findings: Its knowledge about the whole search.
+    """
+
+    verdict: Verdict | None
+    assignment: dict[str, int]
+    findings: Findings
+
+
+class Received(NamedTuple):
+    """A received message, and the number of messages from the same sender that were lost right before it."""
+
+    sender: str
+    content: bytes
+    missing: int = 0
+
+
+class Step(NamedTuple):
+    """A robot's step: its next state, and the receiver and content of each message that it sends.
+
+    `refusal`: why the robot cannot use the message, or what went wrong in the step; empty if nothing did.
+    """
+
+    state: int
+    sent: tuple[tuple[str, bytes], ...] = ()
+    refusal: str = ""
+
+
+class LocalSteps:
+    """The states of one robot by number, and its steps between them. `host` is not started yet."""
+
+    def __init__(self, host: Host) -> None:
+        self.name = host.name
+        self._first = host
+        self._numbers: dict[bytes, int] = {}
+        self._hosts: list[Host] = []
+        self._steps: dict[tuple[int, tuple[Received, ...]], Step] = {}
+        self.states: list[LocalState] = []
+
+    def start(self) -> Step:
+        """Return the first step."""
+        host = deepcopy(self._first)
+        return self._guarded(Step(-1), lambda: self._stepped(host, host.start()))
+
+    def packet(self, state: int, packet: tuple[Received, ...]) -> Step:
+        """Return the step from `state` on a packet."""
+        known = self._steps.get((state, packet))
+        if known is None:
+            known = self._steps[state, packet] = self._computed(state, packet)
+        return known
+
+    def go_on(self, state: int) -> Step | None:
+        """Return the step in which the robot continues without the messages that it waits for; None if it does not."""
+        host = deepcopy(self._hosts[state])
+        sent = host.go_on()
+        return None if sent is None else self._stepped(host, sent)
+
+    def _computed(self, state: int, packet: Sequence[Received]) -> Step:
+        if self.states[state].verdict is not None:  # the search is over, and the robot will hear it
+            return Step(state)
+        host = deepcopy(self._hosts[state])
+        host.clock = 0
+
+        def handle() -> Step:
+            for sender, content, missing in packet:
+                for _ in range(missing):
+                    host.protocol.miss(sender)
+                host.receive(Envelope(sender, self.name, content, 0))
+            return self._stepped(host, host.settle())
+
+        return self._guarded(Step(state), handle)
+
+    def _guarded(self, before: Step, compute: Callable[[], Step]) -> Step:
+        try:
+            return computed_by(time.monotonic() + LONGEST_STEP_S, compute)
+        except TimeLimitError:
+            return before._replace(refusal=f"{self.name} does not end its step within {LONGEST_STEP_S:g} seconds")
+        except BadMessageError as refused:
+            return before._replace(refusal=str(refused))
+        except Exception as error:  # noqa: BLE001 - any error of a protocol is a fault that is reported
+            return before._replace(refusal=f"{self.name} has failed: {type(error).__name__}: {error}")
+
+    def _stepped(self, host: Host, sent: Sequence[Envelope]) -> Step:
+        key = state_key(host.protocol)
+        number = self._numbers.setdefault(key, len(self._hosts))
+        if number == len(self._hosts):
+            self._hosts.append(host)
+            protocol = host.protocol
+            self.states.append(LocalState(protocol.verdict, protocol.assignment, protocol.findings))
+        return Step(number, tuple([(envelope.receiver, envelope.content) for envelope in sent]))

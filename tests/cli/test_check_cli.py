@@ -1,0 +1,59 @@
+"""`robochoc check`: the table, JSON, the journal of a fault, and the exit statuses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import write_team
+from robochoc.generators.random_csp import random_csp
+from tests.support.compiled import plain_python_only
+from tests.support.program import ROOT, robochoc_within
+
+pytestmark = plain_python_only
+SOME = ("--teams", 4, "--values", 2)
+
+
+def test_the_table_and_json_have_the_same_numbers() -> None:
+    table, rows = robochoc_within("check", "abt", *SOME), robochoc_within("check", "abt", *SOME, "--json")
+    assert (table.returncode, rows.returncode) == (0, 0)
+    found = [json.loads(line) for line in rows.stdout.splitlines()]
+    shown = [line.split() for line in table.stdout.splitlines()[1:]]
+    assert [[row["team"], *(str(row[key]) for key in ("robots", "states", "steps", "ends"))] for row in found] == [
+        row[:-1] for row in shown
+    ]
+    assert all(row["complete"] and row["fault"] is None and row["path"] == [] for row in found)
+
+
+def test_teams_of_files_are_explored_as_far_as_the_limit_allows(tmp_path: Path) -> None:
+    write_team(random_csp(3, 2, 1, 0.3, seed=1), tmp_path / "team")
+    assert robochoc_within("check", "abt", tmp_path / "team").returncode == 0
+    partly = robochoc_within("check", "abt", tmp_path / "team", "--states", 2)
+    assert partly.returncode == 3
+    assert "explored in part" in partly.stderr
+
+
+def test_a_fault_ends_with_status_4_and_a_journal(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.exploration.judgement.TeamJudge.at_the_end", lambda *_: "it is a Sunday")
+    done = robochoc_within("check", "abt", *SOME, "--journal", tmp_path / "fault.journal")
+    assert done.returncode == 4
+    assert "steps: it is a Sunday" in done.stderr
+    assert robochoc_within("replay", tmp_path / "fault.journal").returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "error"),
+    [
+        (["abt", "--loss", 1], "abt does not tolerate lost messages"),
+        (["abt", ROOT / "instances" / "queens3d-4"], "more than 100,000: too many to try"),
+        (["nonsense"], "nonsense"),
+        (["abt", "--set", "speed=3"], "speed"),
+    ],
+)
+def test_what_cannot_be_checked_is_refused(words: list[object], error: str) -> None:
+    done = robochoc_within("check", *words)
+    assert done.returncode == 2
+    assert error in done.stderr
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,133 @@
+"""Every order of deliveries of small teams: no fault in the protocols, and each planted fault is found."""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from random import Random
+from typing import Any
+
+import pytest
+
+from robochoc.exploration import check
+from robochoc.exploration.check import CheckedTeam, CheckOptions, checked
+from robochoc.exploration.components import strong_components
+from robochoc.exploration.counterexample import write_counterexample
+from robochoc.exploration.problems import small_teams
+from robochoc.exploration.state_graph import StateGraph
+from robochoc.journal.events import Received
+from robochoc.journal.journal import read_journal
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
+from robochoc.run import Options, Runtime
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.testing import check_protocol
+from tests.support.compiled import plain_python_only
+from tests.support.examples import count
+
+pytestmark = [plain_python_only, pytest.mark.usefixtures("quick_encryption")]
+
+
+def found(name: str, teams: int, *, robots: int = 3, seed: int = 0, **options: Any) -> list[CheckedTeam]:  # noqa: ANN401 - of `CheckOptions`
+    run = Options(protocol=name, runtime=Runtime.SIMULATOR)
+    problems = itertools.islice(small_teams(protocol_named(name).traits, robots, 2, seed), teams)
+    return list(checked(problems, CheckOptions(protocol_named(name), run, **options)))
+
+
+@pytest.mark.parametrize("name", protocol_names())
+@count("teams", fast=3, slow=100)
+def test_no_order_of_deliveries_leads_to_a_fault(name: str, teams: int) -> None:
+    if protocol_named(name).traits.encrypted_tables:
+        teams = 1
+    assert not [one.in_words for one in found(name, teams, states=400) if one.exploration.fault]
+
+
+@pytest.mark.parametrize("name", ["dsa", "mgm", "regret-matching"])
+def test_any_message_may_be_lost(name: str) -> None:
+    assert not [one.in_words for one in found(name, 3, states=400, losses=1) if one.exploration.fault]
+
+
+@pytest.mark.parametrize("name", ["abt", "awc", "adopt"])
+@pytest.mark.parametrize("packets", [False, True])
+def test_the_reduced_orders_lead_to_the_same_ends(name: str, packets: bool, monkeypatch: pytest.MonkeyPatch) -> None:  # noqa: FBT001 - a parameter
+    reduced = found(name, 6, packets=packets, states=3000)
+    graph = StateGraph
+    monkeypatch.setattr(check, "StateGraph", lambda *args, **options: graph(*args, **options, reduced=False))
+    whole = found(name, 6, packets=packets, states=3000)
+    assert all(not one.exploration.fault for one in (*reduced, *whole))
+    complete = [pair for pair in zip(reduced, whole, strict=True) if pair[0].exploration.is_complete]
+    assert len(complete) > 3
+    assert all(one.exploration.states <= other.exploration.states * 1.2 for one, other in complete)
+
+
+class AnyNogood(ABT):
+    """Believes every nogood, also obsolete ones."""
+
+    def _coherent(self, nogood: Nogood) -> bool:
+        del nogood
+        return True
+
+
+class NoAnswer(ABT):
+    """Does not repeat its value for robots that have forgotten it."""
+
+    def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
+        if self._coherent(nogood):
+            super()._resolve_conflict(sender, nogood)
+
+
+class Endless(ABT):
+    """Never ends its second step."""
+
+    def receive(self, sender: str, message: Any) -> None:  # noqa: ANN401 - as its base
+        while sender and message:
+            pass
+
+
+@pytest.mark.parametrize(
+    ("mutant", "robots", "seed", "number"),
+    [(AnyNogood, 4, 2, 90), (NoAnswer, 3, 0, 56)],
+    ids=["any nogood", "no answer"],
+)
+def test_a_planted_fault_is_found_and_its_journal_shows_it(
+    mutant: type[Protocol], robots: int, seed: int, number: int, tmp_path: Path
+) -> None:
+    run = Options(protocol="abt", runtime=Runtime.SIMULATOR)
+    team = next(itertools.islice(small_teams(mutant.traits, robots, 2, seed), number, None))
+    (faulty,) = checked([team], CheckOptions(mutant, run, 2000))
+    assert faulty.exploration.fault
+    write_counterexample(tmp_path / "run.jsonl", faulty.case, faulty.exploration.path, run)
+    journal = read_journal((tmp_path / "run.jsonl").read_bytes())
+    received = [(one.receiver, one.sender) for one in journal.events if isinstance(one, Received)]
+    path = [(one.receiver, sender) for one in faulty.exploration.path for sender in one.senders]
+    assert received == path[: len(received)]
+    with pytest.raises(AssertionError, match=f"{mutant.__name__} on {team.name}, after {len(path)} steps"):
+        check_protocol(mutant, [team])
+
+
+def test_a_step_without_an_end_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.exploration.local_steps.LONGEST_STEP_S", 0.2)
+    with pytest.raises(AssertionError, match=r"does not end its step within 0\.2 seconds"):
+        check_protocol(Endless, teams=2)
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_components_are_those_by_definition(seed: int) -> None:
+    chance = Random(seed)
+    size = chance.randint(1, 7)
+    after = {node: {other for other in range(size) if chance.random() < 0.25} for node in range(size)}
+
+    def reached(node: int) -> set[int]:
+        """What can be reached from `node` by at least one edge."""
+        seen: set[int] = set()
+        left = [*after[node]]
+        while left:
+            if (one := left.pop()) not in seen:
+                seen.add(one)
+                left += after[one]
+        return seen
+
+    near = {0} | reached(0)
+    expected = {frozenset(b for b in near if a in reached(b) and b in reached(a)) for a in near if a in reached(a)}
+    assert {*map(frozenset, strong_components(0, after.__getitem__))} == expected
