@@ -86,6 +86,13 @@ class RowCosts:
         return _costs(self._constraint, terms)
 
 
+class ConstraintRows(NamedTuple):
+    """A constraint with `agents` that is evaluated for rows of values during the search."""
+
+    agents: tuple[str, ...]
+    costs: RowCosts
+
+
 def _costs(constraint: Constraint, values: Mapping[str, _Result]) -> _Result | None:
     """Return the costs for the `values` of the variables, and an upper bound on finite costs; None if unsupported."""
     definition = constraint.definition

@@ -40,7 +40,7 @@ from robochoc.solver.shared_constraint import (
 
 if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
-    from robochoc.solver.constraint_arrays import RowCosts
+    from robochoc.solver.constraint_arrays import ConstraintRows
     from robochoc.solver.cost_table import CostTable
     from robochoc.solver.exclusions import SharedTask
 
@@ -78,13 +78,6 @@ class TableScope(NamedTuple):
     agents: tuple[str, ...]
     places: tuple[tuple[int, ...], ...] | None
     max_cost: Cost
-
-
-class ConstraintRows(NamedTuple):
-    """A constraint with `agents` that is evaluated for rows of values during the search."""
-
-    agents: tuple[str, ...]
-    costs: RowCosts
 
 
 class AllowedValues(NamedTuple):
@@ -516,6 +509,7 @@ class LocalProblem:
         Raises:
             TooLargeError: if a table is too large, and the constraint cannot be evaluated in rows.
         """
+        from robochoc.solver.constraint_arrays import ConstraintRows  # noqa: PLC0415 - as above
         from robochoc.solver.cost_table import cost_table  # noqa: PLC0415 - as above
 
         found: list[CostTable | ConstraintRows] = []

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from robochoc.protocols.message import Value
 from robochoc.protocols.optimization.run_lengths import Columns, RunLengths
 from robochoc.protocols.order import PriorityOrder
-from robochoc.solver.constraint_arrays import RowCosts
+from robochoc.solver.constraint_arrays import ConstraintRows, RowCosts
 from robochoc.solver.cost_table import CostTable
-from robochoc.solver.local_problem import ConstraintRows, LocalProblem
+from robochoc.solver.local_problem import LocalProblem
 
 Domain = tuple[Value, ...]
 Rows = NDArray[np.integer[Any]]
