@@ -55,7 +55,7 @@ def test_a_stage_restarts_from_the_best_assignment_until_its_time_is_over() -> N
     events: list[AnyEvent] = []
     team = coloured(12)
     stages = (Stage("dsa", 1.0, {"cycles": "3"}, 0.8),)
-    outcome = solve(team, replace(IN_TURN, protocol="dsa", stages=stages, deadline=1.0), observer=events.append)
+    outcome = solve(team, replace(IN_TURN, protocol="dsa", stages=stages, deadline=2.0), observer=events.append)
     began = [event for event in events if isinstance(event, Began)]
     (stage,) = outcome.stages
     assert (stage.protocol, stage.searches, stage.cost) == ("dsa", len(began), outcome.cost)
@@ -69,7 +69,7 @@ def test_a_stage_restarts_from_the_best_assignment_until_its_time_is_over() -> N
 
 def test_the_answer_is_never_worse_than_that_of_any_stage() -> None:
     stages = (Stage("maxsum", 0.3, {"cycles": "50"}), *(Stage("dsa", 0.6, {"cycles": "5"}, 0.9), Stage("mgm2", 1.0)))
-    outcome = solve(coloured(), replace(IN_TURN, protocol="mgm2", stages=stages, deadline=1.0))
+    outcome = solve(coloured(20), replace(IN_TURN, protocol="mgm2", stages=stages, deadline=2.0))
     costs = [stage.cost for stage in outcome.stages if stage.cost is not None]
     assert costs == sorted(costs, reverse=True)
     assert outcome.cost == costs[-1]
