@@ -9,7 +9,7 @@ from typing import Any
 
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.change import team_after_events
-from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Outcome, PseudoTreeNode
+from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Outcome, PseudoTreeNode, Violations
 from robochoc.model.problem import Team
 
 _NAME = re.compile(r"[A-Za-z0-9_.]+")
@@ -81,11 +81,19 @@ def _answer(answer: Answer, names: Mapping[str, str]) -> dict[str, Any]:
         "optima": optima and optima._replace(assignments=tuple(_by(one, names) for one in optima.assignments)),
         "improvements": _improvements(answer.improvements, names),
         "dropped_constraints": _dropped(answer.dropped_constraints, names),
+        "violations": answer.violations and _violations(answer.violations, names),
     }
 
 
 def _dropped(found: Iterable[DroppedConstraint], names: Mapping[str, str]) -> tuple[DroppedConstraint, ...]:
     return tuple(replace(one, robots=_all(one.robots, names)) for one in found)
+
+
+def _violations(found: Violations, names: Mapping[str, str]) -> Violations:
+    first = (
+        replace(one, robot=names.get(one.robot, one.robot), variables=_all(one.variables, names)) for one in found.first
+    )
+    return replace(found, first=tuple(first))
 
 
 def _improvements(found: Iterable[Improvement], names: Mapping[str, str]) -> tuple[Improvement, ...]:

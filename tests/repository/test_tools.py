@@ -17,6 +17,7 @@ ONLY_STARTED_BY_OTHERS = {
     Path("benchmarks/pydcop_once.py"),  # its words are those of pyDCOP
     Path("tests/support/debian_ros.py"),
     Path("tests/support/faulty_protocols.py"),
+    Path("tests/support/toulbar2_once.py"),
     Path("tests/support/without_posix.py"),  # it runs before anything else is imported
 }
 NEED_OTHER_LIBRARIES = {Path(f"benchmarks/{peer}_once.py") for peer in ("mujoco", "raven", "rotorpy")}

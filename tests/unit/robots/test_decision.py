@@ -92,7 +92,8 @@ def test_it_can_be_cancelled() -> None:
     outcome = DecideService([queens3d(4)], followed, ENDLESS).decide({})
     canceller.join()
     assert answers == [{"success": True, "message": "the decision of queens3d-4 is cancelled"}]
-    assert (outcome["success"], outcome["message"]) == (False, "unknown, 1 epoch: somebody has asked to stop")
+    assert not outcome["success"]
+    assert outcome["message"].startswith("unknown, 1 epoch: somebody has asked to stop")
     assert not stop_requested()
     assert followed.cancel({}) == {"success": False, "message": "no team is deciding"}
     assert DecideService([pair(values=3)], followed, SIMULATED).decide({})["success"], "the next one decides"

@@ -73,6 +73,8 @@ class Recording(RandomChannels):
 
 AFTER_CHANGES = {"Check", "Reuse"}
 """Types of dynamic protocols that are sent only once a problem has changed."""
+FROM_SEVERAL_VARIABLES = {"SplitDimensions"}
+"""Types that only robots with several variables send."""
 
 
 def a_team(protocol: type[Protocol], chance: Random) -> Team:
@@ -99,10 +101,10 @@ def messages_of_random_runs_are_the_same_again(protocol: str) -> None:
     offered = protocol_named(protocol)
     talk = conversation(protocol)
     kinds = {kind.__name__: kind for kind in types_of(offered)}
-    expected = {*kinds} - (AFTER_CHANGES if offered.traits.dynamic else set())
+    expected = {*kinds} - FROM_SEVERAL_VARIABLES - (AFTER_CHANGES if offered.traits.dynamic else set())
     seen: set[str] = set()
     for seed in range(60):
-        if seed >= 2 and seen == expected:
+        if seed >= 2 and seen - FROM_SEVERAL_VARIABLES == expected:
             break
         chance = Random(seed)
         schedule = Recording(seed)
@@ -116,7 +118,7 @@ def messages_of_random_runs_are_the_same_again(protocol: str) -> None:
                 assert acl.language == "json"
                 assert acl.performative is kinds[kind].act.performative
                 assert_others_read(acl)
-    assert seen == expected
+    assert seen - FROM_SEVERAL_VARIABLES == expected
 
 
 # Any that could be
