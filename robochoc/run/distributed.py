@@ -175,7 +175,8 @@ class Deployment(ABC):
             return f"{answer.witness} {GAVE_UP}"
         if answer.metrics.lost_messages and not phase.traits.bears_loss:
             return why_spoiled(phase, answer.metrics)
-        nearest = f"the best assignment violates {answer.violations}" if answer.violations else ""
+        far = answer.violations is not None and not stop_requested()
+        nearest = f"the best assignment violates {answer.violations}" if far else ""
         if answer.ended:
             names = f"{phase.name}, then {answer.repair}," if answer.repair else phase.name
             return "; ".join(filter(None, [f"{names} {FOUND_NOTHING}", nearest]))
