@@ -170,7 +170,7 @@ _SECTIONS: Sections = {
     type=WholeNumber(0),
     default=0,
     metavar="[=N]",
-    help="Restart up to N lost robots (1 without a number). Implies --on-loss withdraw.",
+    help="Restart up to N lost robots; implies withdraw.",
 )
 @cluster_option
 @kill_option
@@ -183,7 +183,7 @@ _SECTIONS: Sections = {
     type=click.Choice(["auto", "ace", "ortools", "toulbar2", "cosoco"], case_sensitive=False),
     default="auto",
     metavar="NAME",
-    help="--protocol central: auto (default), ace, ortools, toulbar2, cosoco.",
+    help="central: auto (default), ace, ortools, toulbar2, cosoco.",
 )
 @click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum by a central solver.")
 @local_options

@@ -22,7 +22,7 @@ journal_option = click.option(
     "--journal",
     type=OutputFile(),
     metavar="FILE",
-    help="Write all messages and decisions to a file during the run ('robochoc journal', 'replay', 'sniff').",
+    help="Record the run ('robochoc journal', 'replay', 'sniff').",
 )
 
 bounds_option = click.option(

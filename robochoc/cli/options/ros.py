@@ -112,8 +112,8 @@ ros_options = _all_of(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish waypoints: echo (print), mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
-            ", mavlink:FILE, crazyflie:FILE, others. Repeatable."
+            "Publish waypoints, repeatable: echo, mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, mavlink:FILE,"
+            " crazyflie:FILE, rosbridge://HOST:PORT, ..."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
@@ -177,7 +177,7 @@ situation_options = _all_of(
         "--patience",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="Time after which a silent robot counts as lost.  [default: no limit; 10 on a network]",
+        help="Silence after which a robot is lost.  [network: 10]",
     ),
     click.option(
         "--report-timeout",

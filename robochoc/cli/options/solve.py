@@ -64,10 +64,7 @@ withdraw_option = click.option(
     "--withdraw",
     type=WithdrawalName(),
     metavar="[=KIND]",
-    help=(
-        "If the team has no solution, withdraw robots. minimum (default): least total weight, proven; maximal: no"
-        " withdrawn robot can be added again, found fast."
-    ),
+    help=("If there is no solution, withdraw robots. minimum (default): least weight, proven; maximal: fast."),
 )
 deadline_option = click.option(
     "--deadline",
@@ -102,9 +99,7 @@ start_option = click.option(
     metavar="FILE",
     help="Begin from the assignment in a JSON result or a journal.",
 )
-cold_option = click.option(
-    "--cold", is_flag=True, help="After a change of the problem, do not begin from the last assignment."
-)
+cold_option = click.option("--cold", is_flag=True, help="After a change, do not begin from the last answer.")
 cluster_option = click.option(
     "--cluster",
     metavar="ADDRESS",
