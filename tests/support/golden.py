@@ -94,7 +94,12 @@ def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
     known = protocol_named(protocol).settings
     settings = {name: "3" for name in ("cycles", "samples") if hasattr(known, name)}
     options = Options(
-        protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
+        protocol=protocol,
+        runtime=Runtime.SIMULATOR,
+        schedule=schedule,
+        withdraw=withdraw,
+        settings=settings,
+        repair=False,  # the journals are of the protocols alone
     )
     recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
     solve(team, options, observer=lambda event: None if isinstance(event, Given) else recorder(event))
