@@ -282,7 +282,7 @@ def test_files_help_where_the_journal_does_not_say_what_robots_were_given() -> N
 
 def test_settings_and_orders_that_only_the_command_line_knows() -> None:
     team = queens3d(2)
-    options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}, seed=4)
+    options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}, seed=4, repair=False)
     journal = without_given(recorded(team, options))
     assert not replay(journal, ReplayOptions(team=team)).identical
     assert identical(replay(journal, ReplayOptions(team=team, settings={"cycles": "3"})))
