@@ -7,7 +7,7 @@ solution. Each protocol runs once with seed 1 in the simulator.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable, Sequence
 from itertools import combinations, pairwise
 from random import Random
@@ -154,10 +154,13 @@ def row(protocol: str, optima: Sequence[float]) -> str:
 
 def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("protocols", nargs="*", metavar="PROTOCOL", default=PROTOCOLS)
+    protocols: Sequence[str] = parser.parse_args().protocols
     optima = [float(problem(number).solve(protocol="central").cost or 0) for number in range(PROBLEMS)]
     print("| protocol | problems | violated | violated after the repair | above the optimum | with repairs |")
     print("| --- | ---: | ---: | ---: | ---: | ---: |")
-    for protocol in sys.argv[1:] or PROTOCOLS:
+    for protocol in protocols:
         print(row(protocol, optima), flush=True)
 
 

@@ -99,7 +99,7 @@ def check_protocol(  # noqa: PLR0913 - options, by name
 
     Args:
         protocol: The class of the protocol.
-        problems: The teams. None: random teams of the kinds that `protocol.traits` accept.
+        problems: The teams (`Model.team`). None: random teams of the kinds that `protocol.traits` accept.
         teams: The number of random teams.
         robots: The maximum number of robots in a random team.
         values: The maximum number of values of a robot in a random team.
@@ -114,7 +114,9 @@ def check_protocol(  # noqa: PLR0913 - options, by name
 
     Raises:
         AssertionError: if something does not hold. Its message contains the deliveries that lead there.
-        UnsupportedError: if the protocol does not accept one of `problems`.
+        TypeError: if `protocol` is not a class of protocols.
+        UnsupportedError: if the protocol does not accept one of `problems`, or does not tolerate lost messages.
+        ValueError: if a number is too small, or no team was checked.
 
     Example:
         >>> from robochoc.protocols.satisfaction.abt import ABT
@@ -122,6 +124,14 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         >>> check_protocol(ABT, teams=5)
         196
     """
+    given: object = protocol
+    if not (isinstance(given, type) and issubclass(given, Protocol)):
+        raise TypeError(f"protocol={protocol!r} is not allowed; expected a class of protocols")
+    for name, number, least in (
+        ("teams", teams, 1), ("robots", robots, 1), ("values", values, 1), ("states", states, 1), ("losses", losses, 0)
+    ):  # fmt: skip
+        if number < least:
+            raise ValueError(f"{name} is {number}; it must be {least} or more")
     run = Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR, seed=seed, settings=dict(settings or {}))
     options = CheckOptions(protocol, run, states, packets=packets, losses=losses)
     if problems is None:
@@ -131,4 +141,6 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         total += one.exploration.states
         if one.exploration.fault:
             raise AssertionError(f"{protocol.__name__} on {one.team.name}, {one.in_words}\n{one.steps_in_words}")
+    if not total:
+        raise ValueError("no team was checked")
     return total

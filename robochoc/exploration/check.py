@@ -107,7 +107,7 @@ class CheckedTeam(NamedTuple):
         """The result as a sentence."""
         found = self.exploration
         if found.fault:
-            return f"after {counted(len(found.path), 'step')}: {found.fault}"
+            return f"after {counted(len(found.path), 'step')}: {found.fault}" if found.path else found.fault
         if not found.is_complete:
             return "no fault so far; not all states were explored"
         return "no fault in any order of deliveries"
@@ -137,13 +137,15 @@ class CheckedTeam(NamedTuple):
 def checked(teams: Iterable[Team], options: CheckOptions, deadline: float | None = None) -> Iterator[CheckedTeam]:
     """Yield each of `teams` with what was explored, up to the `deadline` on the monotonic clock.
 
-    Teams with a robot that has no value are skipped: there is no search.
+    Teams with a robot that has no value are skipped: there is no search. After the deadline, nothing is explored.
 
     Raises:
-        UnsupportedError: if the protocol does not accept a team.
+        UnsupportedError: if the protocol does not accept a team, or does not tolerate lost messages.
     """
+    if options.losses and not options.protocol.traits.bears_loss:
+        raise UnsupportedError(f"{options.run.protocol} does not tolerate lost messages; lose none")
     for team in teams:
-        if deadline is not None and time.monotonic() > deadline:
+        if stop_requested():
             return
         with suppress(NoLocalSolutionError):
             case = case_of(team, options.protocol, options.run)

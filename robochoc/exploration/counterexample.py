@@ -7,12 +7,12 @@ from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from robochoc.communication.host import BadMessageError
 from robochoc.communication.session import Epoch
 from robochoc.communication.simulator.losses import Losses
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.exploration.check import Case
+from robochoc.exploration.local_steps import LONGEST_STEP_S
 from robochoc.exploration.state_graph import Delivery
 from robochoc.journal.recorder import recorded
 from robochoc.protocols.message import Envelope
@@ -80,7 +80,7 @@ def write_counterexample(file: Path, case: Case, path: Sequence[Delivery], optio
         simulation = Simulation(
             compiled, phase.protocol, Scripted(path), observer=recorder, parameters=phase.parameters, losses=losses
         )
-        with suppress(BadMessageError):  # this may be the fault
-            simulation.search()
+        with suppress(Exception):  # it may be the fault
+            simulation.search(LONGEST_STEP_S)
     for failure in recorder.failures:
         raise failure

@@ -158,7 +158,8 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     replayed = last.answer
     if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # a journal does not contain limits
         return
-    if recorded.improvements:
+    began = last.run.began
+    if recorded.improvements or (began is not None and began.continues is True):  # an earlier search may have found it
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))

@@ -25,6 +25,7 @@ from robochoc.run.options import Options, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_protocols, protocol_named
 from robochoc.solver.compile import CompileError, CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
+from robochoc.solver.encoding import is_soft, max_cost
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
@@ -118,7 +119,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
         if against != LOSSY.otherwise:  # without losses the rule is not worth reporting
             rejected.setdefault(rule.protocol, []).append(against)
     for name in _others(tolerating_loss=facts.loss > 0):
-        if accepts(name, team, options):
+        if accepts(name, team, options) and not _ignores_costs(name, facts, options):
             return _choice(facts, _chosen(facts, options, name, ACCEPTS, ORDERS.get(name)), rejected)
     usual = (
         DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL
@@ -174,6 +175,13 @@ def refusal(name: str, team: Team, options: Options) -> str:
     except (UnknownProtocolError, UnsupportedError) as refused:
         return str(refused)
     return ""
+
+
+def _ignores_costs(name: str, facts: Facts, options: Options) -> bool:
+    """Return whether a protocol would ignore costs where `--withdraw minimum` asks for a minimum."""
+    if options.withdraw != Withdrawal.MINIMUM or protocol_named(name).traits.costs:
+        return False
+    return any(is_soft(one) and max_cost(one) > 0 for one in facts.team.constraints())
 
 
 def _choice(facts: Facts, chosen: Options, rejected: Mapping[str, list[str]]) -> ProtocolChoice:

@@ -99,6 +99,7 @@ def _applies(options: Options, facts: Facts) -> bool:
         and limits == (None,) * len(limits)
         and options.answer == AnswerRule.BEST
         and options.runtime != Runtime.NETWORK
+        and not options.settings  # they are of the chosen protocol
     )
 
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.model.cost_units import Cost
-from robochoc.model.outcome import Metrics, Outcome, SearchStage, Verdict
+from robochoc.model.outcome import Metrics, Outcome, SearchStage, Verdict, Violations
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import PhaseAnswer, Search, evaluate_search, why_spoiled
@@ -134,7 +134,7 @@ class Deployment(ABC):
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.in_user_units, deadline))
         if self._found_nothing(phase, search, answer):
             nearest = search.nearest()
-            if nearest is not None:
+            if nearest is not None and nearest.violations.number:
                 answer = replace(answer, violations=nearest.violations, nearest=nearest.assignment)
         if answer.verdict in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
             return answer.confirmed_as(self.confirm(phase, answer))
@@ -196,9 +196,8 @@ class Deployment(ABC):
                 return f"the limit of cycles was reached (--cycles {options.cycles})"
         if options.deadline is not None:
             improve = "" if options.improve is None else f", --improve {options.improve:g}"
-            return (
-                f"by the deadline (--deadline {options.deadline:g}{improve}) nothing had satisfied all hard constraints"
-            )
+            by = f"by the deadline (--deadline {options.deadline:g}{improve})"
+            return f"{by} the robots knew no assignment that satisfies all hard constraints"
         return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
     def outcome(self, header: Outcome, answer: PhaseAnswer) -> Outcome:
@@ -275,6 +274,8 @@ def _solve_in_stages(deployment: Deployment, options: Options) -> tuple[PhaseAns
         phase = first_phase(case, protocol_named(stage.protocol), deployment.withdrawal_cost)
         phase = replace(phase, reserved_s=_reserved_s(options, stage.until), kept=stage.kept)
         phase = deployment.started(phase) if answer is None else deployment.begun_from(phase, answer)
+        if answer is not None and not answer.assignment and deployment.left_s() != 0:
+            phase = replace(phase, reserved_s=0.0)  # the stages before have found nothing in their time
         if answer is not None and deployment.search_s(phase) == 0:
             continue
         began = time.monotonic()
@@ -303,6 +304,8 @@ def _improved(deployment: Deployment, before: PhaseAnswer, found: PhaseAnswer) -
     if found.verdict == Verdict.NO_SOLUTION:
         return answer
     answer = replace(answer, reason=found.reason)
+    if before.violations and not found.assignment and not _is_nearer(found, before.violations):
+        answer = replace(answer, violations=before.violations, reason=before.reason)
     if before.assignment and not found.assignment:
         answer = replace(answer, verdict=before.verdict, violations=None, **before.assignment_parts())
     if found.verdict == Verdict.OPTIMAL:
@@ -313,3 +316,8 @@ def _improved(deployment: Deployment, before: PhaseAnswer, found: PhaseAnswer) -
     if bound is not None and answer.cost == bound and not answer.withdrawn and answer.verified:
         return replace(answer, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
     return replace(answer, bound=bound)
+
+
+def _is_nearer(found: PhaseAnswer, before: Violations) -> bool:
+    """Return whether the best assignment of `found` violates fewer hard constraints than one `before`."""
+    return found.violations is not None and found.violations.number < before.number

@@ -34,7 +34,7 @@ from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, Scenar
 from robochoc.run.stages import Restarts
 from robochoc.run.starts import Start, start_in
 from robochoc.solver.agent_problem import RunParameters, StartValues
-from robochoc.solver.compile import NoLocalSolutionError
+from robochoc.solver.compile import NoLocalSolutionError, TeamCompileTimeoutError
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.stopping import stop_requested
 from robochoc.verification.objective import withdrawal_cost
@@ -226,7 +226,10 @@ class ThisMachine(Deployment):
         restarts.add(result)
         while result.verdict == Verdict.SOLUTION and not (result.lost or stop_requested()) and self.search_s(phase):
             epoch = Epoch(self._searched, parameters=restarts.next_parameters)
-            session.change(epoch)
+            try:
+                session.change(epoch)
+            except TeamCompileTimeoutError:  # the searches so far count
+                break
             self._start_events.report(phase.protocol, EpochStart(epoch), session, continues=True)
             result = session.search(self.search_s(phase), self.options.messages)
             restarts.add(result)

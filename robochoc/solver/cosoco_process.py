@@ -78,14 +78,17 @@ def _left_s(deadline: float | None) -> float | None:
 
 
 def _parsed(output: str) -> tuple[str, list[str] | None]:
-    """Return the verdict and the values in the output. `UNKNOWN`, None: there are none."""
+    """Return the verdict and the values in the output. `UNKNOWN`, None: there are none.
+
+    If cosoco finds a contradiction while it reads the problem, it says so, but goes on without the contradiction.
+    """
     verdict, values = "UNKNOWN", None
     for line in output.splitlines():
-        if line.startswith("s "):
+        if line.startswith("s ") and verdict != "UNSATISFIABLE":
             verdict = line[2:].strip()
         elif line.startswith("v "):
             values = line[2:].split()
-    return verdict, values
+    return verdict, None if verdict == "UNSATISFIABLE" else values
 
 
 def _document(task: NetworkTask) -> Iterator[str]:

@@ -69,10 +69,20 @@ def _watch(
     """Raise `TimeLimitError` in a thread from the deadline on, until `running` is released."""
     while not running.acquire(timeout=min(max(AGAIN_S, deadline - time.monotonic()), _LONGEST_WAIT_S)):
         with raising:
-            if running.locked() and not are_delayed(thread) and time.monotonic() >= deadline:
+            if running.locked() and not are_delayed(thread) and not _imports(thread) and time.monotonic() >= deadline:
                 _ignore_where_dropped()
                 raised.append(deadline)
                 _raise_in(thread, TimeLimitError)
+
+
+def _imports(thread: int) -> bool:
+    """Return whether the computation in a thread is importing: an interrupted import leaves half a module behind."""
+    frame = sys._current_frames().get(thread)  # noqa: SLF001 - documented
+    while frame is not None and frame.f_code is not computed_by.__code__:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _ignore_where_dropped() -> None:

@@ -83,6 +83,7 @@ def check(  # noqa: PLR0913 - options, by name
     robochoc check dsa --set cycles=3 --loss 1  any message may be lost
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.exploration.check import CheckOptions, checked
+    from robochoc.run.defaults import AUTO, CENTRAL
     from robochoc.run.options import Options, Runtime
     from robochoc.run.registry import protocol_named
 
@@ -90,22 +91,22 @@ def check(  # noqa: PLR0913 - options, by name
         run = Options(
             protocol=protocol, runtime=Runtime.SIMULATOR, settings=protocol_settings(settings_given), seed=seed
         )
-    began = time.monotonic()
+    deadline = None if timeout is None else time.monotonic() + timeout
+    if protocol in {AUTO, CENTRAL}:
+        raise Failure(USAGE, f"{protocol} is not a protocol of robots; name one ('robochoc protocols')")
     with errors_as_failures(protocol):
         options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss)
         problems = _teams(folders, (teams, robots, values, seed), options)
-        found = list(_shown(checked(problems, options, None if timeout is None else began + timeout), as_json=as_json))
-    _end(found, journal, options)
+        found = list(_shown(checked(problems, options, deadline), as_json=as_json))
+    _end(found, journal, options, is_late=deadline is not None and time.monotonic() > deadline)
 
 
 def _teams(folders: tuple[Path, ...], sizes: tuple[int, int, int, int], options: CheckOptions) -> Iterator[Team]:
-    """Return the teams to check. Raises `Failure` if the protocol cannot be checked with the options."""
+    """Return the teams to check."""
     from robochoc.exploration.problems import small_teams
     from robochoc.formats import read_team
 
     traits = options.protocol.traits
-    if options.losses and not traits.bears_loss:
-        raise Failure(USAGE, f"{options.run.protocol} does not tolerate lost messages; remove --loss")
     if folders:
         return map(read_team, folders)
     count, robots, values, seed = sizes
@@ -130,23 +131,26 @@ def _shown(found: Iterator[CheckedTeam], *, as_json: bool) -> Iterator[CheckedTe
         print_table(headings, rows, right=headings[1:-1])
 
 
-def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions) -> None:
+def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions, *, is_late: bool) -> None:
     """Report what was found. Raises `Failure` if there is a fault, or if not everything was explored."""
     from robochoc.exploration.counterexample import write_counterexample
     from robochoc.system.plain_text import counted
+    from robochoc.system.stopping import stop_requested
 
     states = counted(sum(one.exploration.states for one in found), "state")
     faulty = [one for one in found if one.exploration.fault]
     if faulty:
         first = faulty[0]
-        if journal is not None:
+        if journal is not None and first.exploration.is_cyclic:
+            click.echo(f"{journal}: not written: no single run shows the fault", err=True)
+        elif journal is not None:
             with errors_as_failures(journal):
                 write_counterexample(journal, first.case, first.exploration.path, options.run)
             click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
         raise Failure(LOST, "\n".join(f"{one.team.name}: {one.in_words}" for one in faulty))
     partly = sum(not one.exploration.is_complete for one in found)
-    if partly:
-        raise Failure(
-            LIMIT, f"{states}, no fault so far; {counted(partly, 'team')} explored in part: increase --states"
-        )
+    if partly or stop_requested():
+        hint = "stopped" if stop_requested() else f"increase {'--timeout' if is_late else '--states'}"
+        rest = f"{counted(partly, 'team')} explored in part or not at all"
+        raise Failure(LIMIT, f"{states}, no fault so far; {rest}: {hint}")
     click.echo(f"{states}, no fault in any order of deliveries", err=True)

@@ -22,6 +22,7 @@ from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.errors import UnsupportedError
 from robochoc.testing import check_protocol
 from tests.support.compiled import plain_python_only
 from tests.support.examples import count
@@ -131,3 +132,36 @@ def test_components_are_those_by_definition(seed: int) -> None:
     near = {0} | reached(0)
     expected = {frozenset(b for b in near if a in reached(b) and b in reached(a)) for a in near if a in reached(a)}
     assert {*map(frozenset, strong_components(0, after.__getitem__))} == expected
+
+
+class BadStart(ABT):
+    """Fails at its start."""
+
+    def start(self) -> None:
+        raise ValueError("at the start")
+
+
+def test_a_fault_at_the_start_has_a_journal_too(tmp_path: Path) -> None:
+    run = Options(protocol="abt", runtime=Runtime.SIMULATOR)
+    (faulty,) = checked([next(small_teams(ABT.traits, 3, 2, 0))], CheckOptions(BadStart, run))
+    assert faulty.exploration.fault.endswith("has failed: ValueError: at the start")
+    write_counterexample(tmp_path / "run.jsonl", faulty.case, faulty.exploration.path, run)
+
+
+@pytest.mark.parametrize("wrong", [{"teams": 0}, {"robots": 0}, {"states": 0}, {"losses": -1}, {"problems": []}])
+def test_a_check_of_nothing_is_an_error(wrong: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match=r"it must be|no team was checked"):
+        check_protocol(ABT, **wrong)
+
+
+def test_a_check_is_refused_where_it_would_be_of_something_else() -> None:
+    with pytest.raises(UnsupportedError, match="does not tolerate lost messages"):
+        check_protocol(ABT, losses=1)
+    with pytest.raises(TypeError, match="expected a class of protocols"):
+        check_protocol("abt")  # type: ignore[arg-type]
+
+
+def test_after_the_deadline_nothing_counts_as_explored() -> None:
+    run = Options(protocol="abt", runtime=Runtime.SIMULATOR)
+    late = [*checked(itertools.islice(small_teams(ABT.traits, 3, 2, 0), 3), CheckOptions(ABT, run), deadline=0)]
+    assert [one.exploration.is_complete for one in late] == [False] * 3

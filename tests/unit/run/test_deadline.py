@@ -66,7 +66,9 @@ def test_without_a_solution_by_then_nothing_is_said() -> None:
     team = random_csp(40, 10, 0.5, 0.35, seed=1)
     outcome = solve(team, Options(protocol="sbt", runtime=Runtime.SIMULATOR, deadline=BY_S))
     assert (outcome.verdict, outcome.assignment, outcome.deadline) == (Verdict.UNKNOWN, {}, None)
-    assert outcome.reason == "by the deadline (--deadline 0.4) nothing had satisfied all hard constraints"
+    assert outcome.reason == (
+        "by the deadline (--deadline 0.4) the robots knew no assignment that satisfies all hard constraints"
+    )
 
 
 @pytest.mark.usefixtures("a_second_a_look")

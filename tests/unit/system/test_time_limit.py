@@ -8,6 +8,8 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
+from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -103,6 +105,23 @@ def test_nothing_is_raised_where_signals_are_held() -> None:
     with pytest.raises(TimeLimitError):
         computed_by(time.monotonic() + SOON_S, compute)
     assert done
+
+
+def test_an_import_is_never_interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interrupted import would leave half a module behind."""
+    (tmp_path / "slowly_imported.py").write_text(
+        "import time\nfor _ in range(50):\n    time.sleep(0.01)\nwhole = True\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(TimeLimitError):
+        computed_by(time.monotonic() + 0.1, _import_and_wait)
+    assert sys.modules["slowly_imported"].whole
+
+
+def _import_and_wait() -> None:
+    import_module("slowly_imported")
+    while True:
+        pass
 
 
 def test_nothing_is_raised_after_the_computation() -> None:

@@ -9,7 +9,7 @@ import pytest
 from graphs import colouring, soluble
 from robochoc_breakout import Breakout, Improve, Ok
 
-from robochoc import Verdict
+from robochoc import Verdict, testing
 from robochoc.model.problem import Team
 from robochoc.protocols import Message
 from robochoc.testing import Concurrent, RandomChannels, Schedule, Simulation, deliver, protocol_objects, violations
@@ -170,3 +170,7 @@ def _satisfied(left: int, right: int) -> Sequence[tuple[str, Message]]:
 
 def _schedule(seed: int) -> Schedule:
     return RandomChannels(seed) if seed % 2 else Concurrent(seed, 10 * seed)
+
+
+def test_no_order_of_messages_leads_to_a_fault() -> None:
+    testing.check_protocol(Breakout, states=3000)
