@@ -1,4 +1,4 @@
-"""How often incomplete protocols end with a violated hard constraint, without and with a repair.
+"""Counts violated hard constraints at the end of incomplete protocols, without and with a repair.
 
 `python benchmarks/repairs.py [PROTOCOL...]` prints a table for 100 small problems of five families with hard and soft
 constraints: slots and tasks (as for robots that share docks), meetings, colourings, tasks, and capacities. All have a

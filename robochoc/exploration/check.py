@@ -29,7 +29,7 @@ from robochoc.verification.objective import withdrawal_cost
 
 
 class CheckOptions(NamedTuple):
-    """How to check.
+    """The options of a check.
 
     Attributes:
         protocol: The class of the protocol.

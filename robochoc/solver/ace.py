@@ -52,7 +52,7 @@ from robochoc.solver.enumeration import (
 )
 from robochoc.solver.errors import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.solver.linear import Operand, conjuncts, renamed
-from robochoc.solver.process_socket import start_by_port
+from robochoc.solver.process_socket import end_process, start_by_port
 from robochoc.solver.propagation import propagate
 from robochoc.solver.xcsp3_formula import in_xcsp3
 from robochoc.system.lazy_dataclass import dataclass
@@ -322,10 +322,7 @@ class AceProcess:
     def close(self) -> None:
         """End the process and remove its files."""
         if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-            if self._process.stdin is not None:
-                self._process.stdin.close()
+            end_process(self._process)
             self._process = None
         if self._socket is not None:
             self._socket.close()

@@ -28,7 +28,7 @@ from robochoc.solver.network_task import (
     TaskJunction,
     TaskTable,
 )
-from robochoc.solver.process_socket import start_by_port
+from robochoc.solver.process_socket import end_process, start_by_port
 from robochoc.system.posix import IS_POSIX
 from robochoc.system.signals import signals_delayed
 from robochoc.system.time_limit import computed_by
@@ -144,10 +144,7 @@ class ExternalProcess:
             if IS_POSIX and self.program.ends_group:
                 with suppress(ProcessLookupError):
                     os.killpg(self._process.pid, signal.SIGKILL)
-            self._process.kill()
-            self._process.wait()
-            if self._process.stdin is not None:
-                self._process.stdin.close()
+            end_process(self._process)
             self._process = None
         if self._socket is not None:
             self._socket.close()

@@ -81,3 +81,11 @@ def _sent(connection: socket.socket) -> bytes:
     except OSError:
         return b""
     return received
+
+
+def end_process(process: subprocess.Popen[bytes]) -> None:
+    """Kill a process, wait for its end, and close its input."""
+    process.kill()
+    process.wait()
+    if process.stdin is not None:
+        process.stdin.close()

@@ -120,7 +120,7 @@ def test_components_are_those_by_definition(seed: int) -> None:
     after = {node: {other for other in range(size) if chance.random() < 0.25} for node in range(size)}
 
     def reached(node: int) -> set[int]:
-        """What can be reached from `node` by at least one edge."""
+        """Return the nodes that can be reached from `node` by at least one edge."""
         seen: set[int] = set()
         left = [*after[node]]
         while left:

@@ -25,6 +25,7 @@ from robochoc.modelling.model import Model
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
 from robochoc.run.choice import ACCEPTS, choose, choose_for_private_team
 from robochoc.run.facts import Facts, TreeTables
+from robochoc.run.options import Preprocess
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.errors import UnsupportedError
 from tests.support.brute_force import solutions
@@ -365,3 +366,12 @@ def test_the_facts_name_the_objective_of_the_files(maximise: bool, fact: str) ->
     one = model.robot("r").variable("x", range(3))
     (model.maximize if maximise else model.minimize)(one)
     assert fact in choose(model.team, Options(protocol="auto", runtime=Runtime.SIMULATOR)).facts
+
+
+def test_no_protocol_that_ignores_costs_is_chosen_for_a_minimum() -> None:
+    """All protocols that minimise refuse --preprocess here, so the run is refused."""
+    options = Options(protocol="auto", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM, preprocess=Preprocess.AC)
+    team = random_csp(12, 4, 0.4, 0.0, 3, max_cost=9)
+    assert protocol_named(choose(team, options).options.protocol).traits.costs
+    with pytest.raises(UnsupportedError, match="values that are possible if other robots withdraw"):
+        solve(team, options)

@@ -55,7 +55,7 @@ def test_a_stage_restarts_from_the_best_assignment_until_its_time_is_over() -> N
     events: list[AnyEvent] = []
     team = coloured(12)
     stages = (Stage("dsa", 1.0, {"cycles": "3"}, 0.8),)
-    outcome = solve(team, replace(IN_TURN, protocol="dsa", stages=stages, deadline=2.0), observer=events.append)
+    outcome = solve(team, replace(IN_TURN, protocol="dsa", stages=stages, deadline=8.0), observer=events.append)
     began = [event for event in events if isinstance(event, Began)]
     (stage,) = outcome.stages
     assert (stage.protocol, stage.searches, stage.cost) == ("dsa", len(began), outcome.cost)
@@ -122,7 +122,7 @@ def test_processes_search_in_turn() -> None:
 def test_a_journal_of_stages_is_replayed() -> None:
     team = coloured()
     stages = (Stage("dsa", 0.5, {"cycles": "5"}, 0.9), Stage("mgm2", 1.0, {"cycles": "5"}, 0.9))
-    options = replace(IN_TURN, protocol="mgm2", stages=stages, deadline=0.6)
+    options = replace(IN_TURN, protocol="mgm2", stages=stages, deadline=4.0)
     recorder = JournalRecorder(journal_header(team, options), objective_to_record(team, options))
     recorder.outcome = solve(team, options, observer=recorder)
     journal = read_journal(recorder.content())
@@ -132,6 +132,12 @@ def test_a_journal_of_stages_is_replayed() -> None:
 
 
 # The choice
+
+
+def test_settings_of_the_user_are_not_overridden_by_stages() -> None:
+    options = Options(runtime=Runtime.SIMULATOR, deadline=5.0, settings={"cycles": "5"})
+    chosen = choose(coloured(), options).options
+    assert (chosen.stages, chosen.settings) == ((), {"cycles": "5"})
 
 
 def test_auto_chooses_stages_only_for_a_deadline_and_costs() -> None:

@@ -25,6 +25,7 @@ from robochoc.run.options import CentralSolverName
 from robochoc.solver import external_process, racing
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import ENUMERATION, CentralAnswer, CentralSolver
+from robochoc.solver.cosoco_process import _parsed as parsed
 from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
 from robochoc.solver.external_process import ExternalProcess
 from robochoc.solver.external_programs import ACE_NETWORK, COSOCO, CP_SAT, PROGRAMS, TOULBAR2, ExternalProgram
@@ -388,3 +389,9 @@ def test_nothing_is_left_in_the_folder_for_temporary_files(
     assert only(any_program).solve(random_csp(6, 4, 0.6, 0, 1, max_cost=9)).verdict is Verdict.OPTIMAL
     # ACE ends soon after the process that has started it, and removes its folder.
     wait_until(lambda: not any(tmp_path.iterdir()), lambda: f"{[*tmp_path.iterdir()]} are left")
+
+
+def test_a_contradiction_that_cosoco_finds_while_reading_is_the_verdict() -> None:
+    """It goes on without the contradiction, and prints a second verdict with values."""
+    assert parsed("s UNSATISFIABLE\ns SATISFIABLE\nv 5 0\n") == ("UNSATISFIABLE", None)
+    assert parsed("s SATISFIABLE\nv 5 0\n") == ("SATISFIABLE", ["5", "0"])
