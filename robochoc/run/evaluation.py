@@ -236,6 +236,8 @@ def check_with_files(
     proven = is_proven(phase, result)
     if proven:
         assignment = merged_values(result.assignments)
+        if start is not None and not final and phase.traits.costs and phase.traits.complete:
+            assignment = _start_or_cheaper(phase, result, compiled, start)
     else:
         seen = decided.cheapest() if decided is not None and not final else None
         best = best_known(compiled, result, phase.parameters.withdrawal_cost, start, seen, final=final)
@@ -257,6 +259,22 @@ def check_with_files(
         optima=listed,
         dropped_constraints=dropped,
     )
+
+
+def _start_or_cheaper(
+    phase: RunPhase, result: SearchResult, compiled: CompiledTeam, start: Mapping[str, Mapping[str, int]]
+) -> dict[str, int]:
+    """Return the start assignment, or the assignment that the robots claim to be optimal if it costs less.
+
+    Raises:
+        RefutedError: when the start assignment costs less.
+    """
+    best = best_known(compiled, result, phase.parameters.withdrawal_cost, final=True)
+    if best is None or phase.start_cost is None or best.cost < phase.start_cost:
+        return merged_values(result.assignments)
+    if best.cost > phase.start_cost:
+        raise RefutedError(f"{phase.name} claims an optimal assignment, but the start assignment costs less")
+    return merged_values(start)
 
 
 @collection_paused()

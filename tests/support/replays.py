@@ -87,8 +87,8 @@ def header_of(team: Team, options: Options) -> Header:
 
 
 def identical(replayed: ReplayResult) -> bool:
-    """Return whether everything was replayed, and identically."""
-    return replayed.identical and not (replayed.stopped or replayed.unfinished)
+    """Return whether everything was replayed, and identically, or nothing had to be: no robot took a step."""
+    return (replayed.identical or replayed.decided_before) and not (replayed.stopped or replayed.unfinished)
 
 
 def in_text(journal: Journal) -> Journal:
