@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
@@ -17,6 +16,7 @@ from robochoc.experiments.store import Store
 from robochoc.experiments.study import Study
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.experiments.workers import LocalWorkers
+from robochoc.system.posix import usable_processors
 
 WRITE_S = 0.2
 """The interval between two writes of rows, in seconds. A killed study loses at most this time."""
@@ -107,7 +107,7 @@ def _run_all(
         bundles = [[*bundle] for _, bundle in itertools.groupby(tasks, key=_problem)]
         memory_mb = bundles[0][0].limits.memory_mb
         if timed or workers is None:
-            hands: Workers = LocalWorkers(1 if timed else jobs or _processors(), memory_mb)
+            hands: Workers = LocalWorkers(1 if timed else jobs or usable_processors(), memory_mb)
         else:
             hands = workers(memory_mb)
         with hands:
@@ -121,10 +121,6 @@ def _is_timed(task: Task) -> bool:
 
 def _problem(task: Task) -> str:
     return task.problem.identity
-
-
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class _Clock:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
@@ -23,6 +23,7 @@ from robochoc.solver.compile import NoLocalSolutionError
 from robochoc.solver.compiled_team import CompiledTeam, ensure_compiled
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.compiled_core import PURE, kind_of_core
+from robochoc.system.parallel_map import ParallelMap
 from robochoc.system.plain_text import counted
 from robochoc.system.stopping import stop_requested
 from robochoc.verification.objective import withdrawal_cost
@@ -134,23 +135,49 @@ class CheckedTeam(NamedTuple):
         }
 
 
-def checked(teams: Iterable[Team], options: CheckOptions, deadline: float | None = None) -> Iterator[CheckedTeam]:
+def checked(
+    teams: Iterable[Team],
+    options: CheckOptions,
+    deadline: float | None = None,
+    *,
+    jobs: int = 1,
+    show: Callable[[int, int], None] | None = None,
+) -> Generator[CheckedTeam, None, None]:
     """Yield each of `teams` with what was explored, up to the `deadline` on the monotonic clock.
 
     Teams with a robot that has no value are skipped: there is no search. After the deadline, nothing is explored.
 
+    Args:
+        teams: The teams.
+        options: How to check.
+        deadline: The end of the time, on the monotonic clock. None: no limit.
+        jobs: The number of teams that are explored at the same time, each in its own process. Results and their order
+            do not depend on it.
+        show: Called from time to time with the number of explored teams, and of the states so far.
+
     Raises:
         UnsupportedError: if the protocol does not accept a team, or does not tolerate lost messages.
+        ChildDiedError: if a process was killed.
     """
     if options.losses and not options.protocol.traits.bears_loss:
         raise UnsupportedError(f"{options.run.protocol} does not tolerate lost messages; lose none")
+
+    def explored(item: tuple[Team, Case], report: Callable[[int], None]) -> Exploration:
+        def is_over(states: int) -> bool:
+            report(states)
+            return stop_requested() or (deadline is not None and time.monotonic() > deadline)
+
+        return explore(item[1], options, is_over)
+
+    with ParallelMap(explored, jobs, show) as processes:
+        for (team, case), exploration in processes.results(_cases(teams, options)):
+            yield CheckedTeam(team, case, exploration)
+
+
+def _cases(teams: Iterable[Team], options: CheckOptions) -> Iterator[tuple[Team, Case]]:
+    """Yield each of `teams` with its case, unless a robot has no value."""
     for team in teams:
         if stop_requested():
             return
         with suppress(NoLocalSolutionError):
-            case = case_of(team, options.protocol, options.run)
-            yield CheckedTeam(team, case, explore(case, options, lambda _: _is_past(deadline)))
-
-
-def _is_past(deadline: float | None) -> bool:
-    return stop_requested() or (deadline is not None and time.monotonic() > deadline)
+            yield team, case_of(team, options.protocol, options.run)

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import json
+import signal
 from pathlib import Path
 
 import pytest
 
 from robochoc.formats import write_team
 from robochoc.generators.random_csp import random_csp
+from robochoc.system.stopping import STOP
 from tests.support.compiled import plain_python_only
+from tests.support.faults import PROGRAM, running
+from tests.support.limits import wait_until
 from tests.support.program import ROOT, robochoc_within
 
 pytestmark = plain_python_only
@@ -25,6 +29,35 @@ def test_the_table_and_json_have_the_same_numbers() -> None:
         row[:-1] for row in shown
     ]
     assert all(row["complete"] and row["fault"] is None and row["path"] == [] for row in found)
+
+
+def test_the_number_of_processes_does_not_change_the_results() -> None:
+    one, two = (robochoc_within("check", "adopt", *SOME, "--states", 300, "--json", "--jobs", jobs) for jobs in (1, 2))
+    assert one.stdout == two.stdout
+    assert (one.returncode, two.returncode) == (3, 3)
+
+
+@pytest.mark.more
+@pytest.mark.parametrize(
+    ("signum", "status"), [(STOP, 3), (signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)]
+)
+def test_a_signal_leaves_no_process(tmp_path: Path, signum: signal.Signals, status: int) -> None:
+    words = ["check", "abt", "--robots", "5", "--values", "4", "--states", "100000000", "--jobs", "2"]
+    with running([PROGRAM, *words], tmp_path) as run:
+        wait_until(lambda: len(run.processes()) == 3, "the processes never start")
+        run.strike(signum)
+        run.end()
+        assert run.status() == status, run.errors()
+        assert run.left_behind() == []
+
+
+def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.exploration.state_graph._OFTEN", 1)
+    monkeypatch.setattr("robochoc.cli.reports.progress.REFRESH_S", 0)
+    monkeypatch.setenv("TERM", "xterm")
+    words = ("check", "abt", *SOME)
+    assert "abt: 2 of 4 teams, " in robochoc_within(*words, terminal=True).stderr
+    assert robochoc_within(*words).stderr == "194 states, no fault in any order of deliveries\n"
 
 
 def test_teams_of_files_are_explored_as_far_as_the_limit_allows(tmp_path: Path) -> None:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import itertools
 import json
+import sys
 import time
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,7 +18,7 @@ from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Callable, Iterator
 
     from robochoc.exploration.check import CheckedTeam, CheckOptions
     from robochoc.model.problem import Team
@@ -48,6 +50,10 @@ MOST_ROBOTS, MOST_VALUES = 6, 6
 @click.option("--packets", is_flag=True, help="Deliver also several waiting messages at once, as runtimes do.")
 @click.option("--loss", type=WholeNumber(0), default=0, metavar="N", help="Lose up to N messages, any of them.")
 @settings_option
+@click.option(
+    "--jobs", type=WholeNumber(1, 1024), metavar="N",
+    help="Number of teams explored at the same time.  [default: one per processor]",
+)  # fmt: skip
 @click.option("--timeout", type=Number(0, min_open=True), metavar="SECONDS", help="Time limit of the command.")
 @click.option("--journal", type=OutputFile(), metavar="FILE", help="Write the run that leads to the first fault.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
@@ -64,6 +70,7 @@ def check(  # noqa: PLR0913 - options, by name
     packets: bool,
     loss: int,
     settings_given: tuple[str, ...],
+    jobs: int | None,
     timeout: float | None,
     journal: Path | None,
     as_json: bool,
@@ -86,6 +93,8 @@ def check(  # noqa: PLR0913 - options, by name
     from robochoc.run.defaults import AUTO, CENTRAL
     from robochoc.run.options import Options, Runtime
     from robochoc.run.registry import protocol_named
+    from robochoc.system.posix import usable_processors
+    from robochoc.system.stopping import stop_handled
 
     with errors_as_failures(protocol):
         run = Options(
@@ -94,11 +103,28 @@ def check(  # noqa: PLR0913 - options, by name
     deadline = None if timeout is None else time.monotonic() + timeout
     if protocol in {AUTO, CENTRAL}:
         raise Failure(USAGE, f"{protocol} is not a protocol of robots; name one ('robochoc protocols')")
-    with errors_as_failures(protocol):
-        options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss)
-        problems = _teams(folders, (teams, robots, values, seed), options)
-        found = list(_shown(checked(problems, options, deadline), as_json=as_json))
-    _end(found, journal, options, is_late=deadline is not None and time.monotonic() > deadline)
+    with stop_handled():
+        with errors_as_failures(protocol), _progress_of(protocol, len(folders) or teams, as_json=as_json) as show:
+            options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss)
+            problems = _teams(folders, (teams, robots, values, seed), options)
+            results = checked(problems, options, deadline, jobs=jobs or usable_processors(), show=show)
+            with closing(results):
+                found = list(_printed(results) if as_json else results)
+        if not as_json:
+            _print_table(found)
+        _end(found, journal, options, is_late=deadline is not None and time.monotonic() > deadline)
+
+
+@contextmanager
+def _progress_of(protocol: str, count: int, *, as_json: bool) -> Iterator[Callable[[int, int], None] | None]:
+    """Provide a function that shows the progress on a terminal, or None elsewhere."""
+    from robochoc.cli.reports.progress import stages
+
+    if as_json and sys.stdout.isatty():  # both would be written to the same line
+        yield None
+        return
+    with stages(protocol) as show:
+        yield show and (lambda teams, states: show(f"{teams:,} of {count:,} teams, {states:,} states"))
 
 
 def _teams(folders: tuple[Path, ...], sizes: tuple[int, int, int, int], options: CheckOptions) -> Iterator[Team]:
@@ -113,22 +139,24 @@ def _teams(folders: tuple[Path, ...], sizes: tuple[int, int, int, int], options:
     return itertools.islice(small_teams(traits, robots, values, seed), count)
 
 
-def _shown(found: Iterator[CheckedTeam], *, as_json: bool) -> Iterator[CheckedTeam]:
-    """Yield `found`, and print each of them as JSON, or all of them as a table."""
+def _printed(found: Iterator[CheckedTeam]) -> Iterator[CheckedTeam]:
+    """Yield `found`, and print each of them as JSON."""
+    for one in found:
+        click.echo(json.dumps(one.as_dict()))
+        yield one
+
+
+def _print_table(found: list[CheckedTeam]) -> None:
     from robochoc.cli.reports.table import print_table
 
-    rows = []
     headings = ("team", "robots", "states", "steps", "ends", "explored")
+    rows = []
     for one in found:
         explored = one.exploration
-        if as_json:
-            click.echo(json.dumps(one.as_dict()))
         numbers = [len(one.team.robots), explored.states, explored.steps, explored.ends]
         whole = "fault" if explored.fault else "all" if explored.is_complete else "in part"
         rows.append([one.team.name, *(f"{number:,}" for number in numbers), whole])
-        yield one
-    if not as_json:
-        print_table(headings, rows, right=headings[1:-1])
+    print_table(headings, rows, right=headings[1:-1])
 
 
 def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions, *, is_late: bool) -> None:

@@ -76,12 +76,13 @@ def _status(error: Exception) -> int | None:
     from robochoc.solver.compile import CompileError, CompileTimeoutError
     from robochoc.solver.compiled_domain import TooManySolutionsError
     from robochoc.solver.errors import SolverLostError, SolverMissingError, UnsupportedError
+    from robochoc.system.parallel_map import ChildDiedError
     from robochoc.verification.checker import RefutedError
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
         INVALID: (InvalidInputError,),
         USAGE: (UnknownProtocolError, UnsupportedError, SolverMissingError),
         LIMIT: (TooManySolutionsError, CompileTimeoutError),
-        LOST: (RobotsLostError, ClusterLostError, CompileError, SolverLostError, RefutedError),
+        LOST: (RobotsLostError, ClusterLostError, CompileError, SolverLostError, RefutedError, ChildDiedError),
     }
     return next((status for status, kinds in statuses.items() if isinstance(error, kinds)), None)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from robochoc.communication.arrays.array_types import Integers
 from robochoc.communication.arrays.compiled import start_of
 from robochoc.communication.arrays.layout import ArrayLayout, RobotGroup
+from robochoc.system.posix import usable_processors
 
 LARGEST_VALUE_SIZE = 2
 """The largest size in bytes of values for which there are compiled functions."""
@@ -29,11 +29,6 @@ def _structure(fields: str) -> type[ctypes.Structure]:
 _Block = _structure("arity starts bases others strides rows")
 _Group = _structure("first size blocks_count blocks fixed charges")
 _Team = _structure("bits states steps starts degrees robots neighbours")
-
-
-def usable_processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 class CycleAccount:
