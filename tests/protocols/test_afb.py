@@ -224,7 +224,7 @@ def test_every_cpa_tells_b() -> None:
     """The first robot does not take it that there is no solution while the news of one is under way."""
     team = team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): 3})])
     robot = agent(team, "RA")
-    assert replies(robot, ("RB", back((1, 1), bound=3))) == [("RB", Terminate())]
+    assert replies(robot, ("RB", back((1, 1), bound=3))) == [("RB", Terminate(3))]
     assert robot.verdict is None
     replies(robot, ("RB", solution(3, 1, 1)))
     assert value(robot) == (1,)
@@ -233,7 +233,7 @@ def test_every_cpa_tells_b() -> None:
 def test_the_first_robot_ends_the_search_when_it_has_no_value_left_without_solution_if_nobody_has_told_b() -> None:
     robot = agent(chain(), "RA", ("RD", solution(5, 1, 2, 2, 1)), ("RB", back((1, 1), bound=5)))
     said = replies(robot, ("RB", back((2, 2), bound=5)))
-    assert said == [(name, Terminate()) for name in ("RB", "RC", "RD")]
+    assert said == [(name, Terminate(5)) for name in ("RB", "RC", "RD")]
     assert value(robot) == (1,)
     robot = agent(team_of(dict.fromkeys("AB", (1,)), [priced("AB", {(1, 1): INFINITE})]), "RA")
     assert replies(robot, ("RB", back((1, 1)))) == []
@@ -243,19 +243,26 @@ def test_the_first_robot_ends_the_search_when_it_has_no_value_left_without_solut
 def test_whoever_knows_that_nothing_is_better_with_any_beginning_ends_the_search() -> None:
     robot = agent(chain(), "RC", ("RD", solution(1, 1, 2, 2, 1)))
     said = replies(robot, ("RB", cpa((1, 1), (2, 1), least=[1, 1, 1])))
-    assert said == [("RA", Terminate()), ("RB", Terminate()), ("RD", Terminate())]
+    assert said == [(name, Terminate(1)) for name in ("RA", "RB", "RD")]
 
 
 def test_who_is_told_the_end_takes_its_value_in_the_best_solution_and_is_silent() -> None:
     """The news of the solution may come after the end."""
     robot = agent(chain(), "RB", ("RA", cpa((1, 1), least=[0, 0])), ("RD", solution(5, 1, 2, 2, 1)))
-    assert replies(robot, ("RA", Terminate()), ("RA", cpa((2, 2), least=[0, 0])), ("RC", back((1, 1), (1, 1)))) == []
+    assert replies(robot, ("RA", Terminate(5)), ("RA", cpa((2, 2), least=[0, 0])), ("RC", back((1, 1), (1, 1)))) == []
     assert value(robot) == (2,)
     robot = agent(chain(), "RB")
-    assert replies(robot, ("RA", Terminate())) == []
+    assert replies(robot, ("RA", Terminate(5))) == []
     assert robot.value is None
     assert replies(robot, ("RD", solution(5, 1, 2, 2, 1))) == []
     assert value(robot) == (2,)
+
+
+def test_the_bound_of_all_solutions_is_right_even_if_the_best_solution_arrives_after_the_end() -> None:
+    robot = agent(chain(), "RA", ("RD", solution(5, 1, 2, 2, 1)), ("RC", Terminate(1)))
+    assert robot.findings.bound == 1
+    replies(robot, ("RD", solution(1, 1, 2, 1, 2)))
+    assert robot.findings == Findings(best=Incumbent(1, {"RA": (1,), "RB": (2,), "RC": (1,), "RD": (2,)}), bound=1)
 
 
 def test_a_robot_alone_solves_its_problem_in_silence_and_one_with_an_empty_domain_says_so_at_once() -> None:

@@ -151,7 +151,7 @@ REAL = {
     ("afb", "NewSolution"): (
         "RX04 says: the best solution so far costs 25: X00 = -3, X01 = -1, X02 = 1, X03 = 3 and X04 = -2"
     ),
-    ("afb", "Terminate"): "RX00 says: the search is over: no solution is better than the best one so far",
+    ("afb", "Terminate"): "RX00 says: the search is over: no solution costs less than 25",
     ("syncbb", "Path"): (
         "RX01 says: so far X00 = -3 and X01 = -1, which costs 13; the best solution so far costs 26; it is RX02's turn"
     ),

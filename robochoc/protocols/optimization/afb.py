@@ -41,7 +41,8 @@ Choices that the paper leaves open, and differences:
 - A robot also checks its bound when B has changed, and when the CPA arrives.
 - Every CPA carries B, so that no robot concludes that there is no solution while the message about a solution is in
   transit.
-- A robot that finds that no prefix allows a better solution ends the search (`Terminate`).
+- A robot that finds that no prefix allows a better solution ends the search (`Terminate`), and sends B with it: the
+  message about the best solution may arrive later, and the first robot reports B as a lower bound of all solutions.
 - A robot with an empty domain reports it at the start.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -198,12 +199,14 @@ class NewSolution(Message, frozen=True):
 
 
 class Terminate(Message, frozen=True):
-    """The end of the search: no solution is better than the best one found (`TERMINATE`)."""
+    """The end of the search: no solution costs less than `bound`, the cost of the best one found (`TERMINATE`)."""
+
+    bound: Cost
 
     act = acts.TERMINATE
 
     def in_words(self, _: Wording) -> str:
-        return "the search is over: no solution is better than the best one so far"
+        return f"the search is over: no solution costs less than {cost_text(self.bound)}"
 
     def proves(self, reception: Reception) -> Sequence[Proof]:
         # The last robot learns that its last solution is final.
@@ -282,7 +285,8 @@ class AFB(Protocol):
                 self.estimates.save(sender, CPAEstimates(stamp, estimates))
             case NewSolution() as solution:
                 self._receive_new_solution(solution)
-            case Terminate():
+            case Terminate(bound):
+                self.bound = min(self.bound, bound)  # the best solution may arrive later
                 self._stop()
             case never:
                 assert_never(never)
@@ -427,7 +431,7 @@ class AFB(Protocol):
             self._stop()
             for robot in self.order.names:
                 if robot != self.problem.agent:
-                    self.send(robot, Terminate())
+                    self.send(robot, Terminate(self.bound))
 
     # The other robots, and the end
 
