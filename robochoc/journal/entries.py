@@ -41,6 +41,8 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     """The channel model, if any. With one, the times of the search's events are in simulated seconds."""
     message_loss: float | msgspec.UnsetType = msgspec.UNSET
     """The probability that a message is lost, if messages could be lost. Lost messages have no `Received`."""
+    answer: str | msgspec.UnsetType = msgspec.UNSET
+    """The rule for the answer without a proof: `final` for the last values. It is omitted for the best ones."""
     version: int = VERSION
 
 

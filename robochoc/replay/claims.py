@@ -7,7 +7,8 @@ the search (`--improve`) may be older: it is checked against the constraints, an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 
@@ -16,7 +17,7 @@ from msgspec import UNSET
 
 from robochoc.communication.search_result import SearchResult
 from robochoc.journal.entries import STAMPED_LATE
-from robochoc.journal.events import AnyEvent, Lost, Received, Sent
+from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Answer, Metrics, Outcome, Verdict
@@ -25,7 +26,7 @@ from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.defaults import CENTRAL
-from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search
+from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search, is_proven
 from robochoc.run.improvement import Rank
 from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_by_class
@@ -52,16 +53,22 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """A replayed run of `team` with its answer; the answer is None if the journal does not contain enough data."""
+    """A replayed run of `team` with its answer; the answer is None if the journal does not contain enough data.
+
+    `any_time`: the answer may be any assignment that the robots had, because nothing is proven.
+    """
 
     run: RecordedRun
     team: Team
-    answer: PhaseAnswer | None
+    answer: PhaseAnswer | None = None
+    any_time: bool = False
 
 
-def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
+def with_answer(run: RecordedRun, robots: RebuiltRobots, journal: Journal) -> ReplayedRun:
     """Return a replayed run with its answer."""
-    return ReplayedRun(run, robots.compiled.team, _answer(run, robots, outcome) if outcome else None)
+    replayed = ReplayedRun(run, robots.compiled.team)
+    final = journal.header.answer == "final"
+    return replayed if journal.outcome is None else _answered(replayed, robots, journal.outcome, final=final)
 
 
 def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_complete: bool) -> Iterator[Contradiction]:
@@ -159,7 +166,8 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # a journal does not contain limits
         return
     began = last.run.began
-    if recorded.improvements or (began is not None and began.continues is True):  # an earlier search may have found it
+    earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
+    if earlier or (last.any_time and _was_decided(recorded.assignment, last)):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
@@ -196,11 +204,27 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseAnswer | None:
-    """Return the answer of `run`, computed as by an orchestrator; None if the journal does not suffice."""
+def _was_decided(assignment: Mapping[str, int], replayed: ReplayedRun) -> bool:
+    """Return whether each robot with values in `assignment` has decided on them at any time of the run."""
+    decided: dict[str, list[Mapping[str, int]]] = {}
+    for event in replayed.run.events:
+        if isinstance(event, Decided):
+            decided.setdefault(event.robot, []).append(event.assignment)
+    owners = {replayed.team.owner.get(name, "") for name in assignment}
+    return bool(owners) and all(
+        any(one.items() <= assignment.items() for one in decided.get(name, ())) for name in owners
+    )
+
+
+def _answered(replayed: ReplayedRun, robots: RebuiltRobots, outcome: Outcome, *, final: bool) -> ReplayedRun:
+    """Return `replayed` with its answer, computed as by an orchestrator, if the journal suffices.
+
+    `final`: without a proof, the last values are the answer.
+    """
+    run = replayed.run
     given = run.given
     if given is None or given.why or len(robots.hosts) < len(robots.compiled.team.robots):
-        return None
+        return replayed
     protocols = {name: host.protocol for name, host in robots.hosts.items()}
     result = SearchResult.of(
         _verdict(run.events, {str(one.verdict) for one in protocols.values() if one.verdict is not None}),
@@ -215,11 +239,12 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> PhaseA
     phase = RunPhase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     if run.began is not None and run.began.start is not UNSET:
         phase = phase.beginning_with(start_in(team, run.began.start, given.aside))
-    check = partial(check_with_files, phase, result, team, robots.compiled)
+    check = partial(check_with_files, phase, result, team, robots.compiled, final=final)
     try:
-        return evaluate_search(phase, Search(result, check), team.kind, partial(user_cost, team), ANY_DEADLINE)
+        answer = evaluate_search(phase, Search(result, check), team.kind, partial(user_cost, team), ANY_DEADLINE)
     except (RefutedError, TooManySolutionsError):
-        return PhaseAnswer(Verdict.UNKNOWN)
+        answer = PhaseAnswer(Verdict.UNKNOWN)
+    return replace(replayed, answer=answer, any_time=not (final or is_proven(phase, result)))
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:

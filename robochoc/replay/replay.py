@@ -142,7 +142,7 @@ class _JournalReplay:
             difference = self._play(RunReplay(run, robots, self._journal.header))
             if difference:
                 return difference
-            self._played.append(with_answer(run, robots, self._journal.outcome))
+            self._played.append(with_answer(run, robots, self._journal))
         return None
 
     def _play(self, replay: RunReplay) -> StepDifference | None:

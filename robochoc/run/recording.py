@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.model.costs import normalized
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.options import Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import AnswerRule, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.verification.objective import Objective, withdrawal_cost
 
 if TYPE_CHECKING:
@@ -38,5 +38,6 @@ def journal_header(team: Team, options: Options) -> Header:
         order=options.order or UNSET,
         channel=options.channel.name if options.channel else UNSET,
         message_loss=options.loss or UNSET,
+        answer=UNSET if options.answer == AnswerRule.BEST else options.answer,
         version=BOUNDED if options.bounds else VERSION,
     )

@@ -9,12 +9,13 @@ from random import Random
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Given
-from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
+from robochoc.journal.journal import Journal, JournalRecorder, read_journal
 from robochoc.model.absence import may_count_when_absent
 from robochoc.model.orders import Order
 from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.replay import ReplayResult
 from robochoc.run import Options, Withdrawal, solve
+from robochoc.run.recording import journal_header
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from tests.support.allocation_problems import random_allocation_team, simple_allocation_team
@@ -77,13 +78,9 @@ def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
 
 def recorded(team: Team, options: Options, solver: AceProcess | None = None) -> Journal:
     """The journal of a run, as it is read."""
-    recorder = JournalRecorder(header_of(team, options))
+    recorder = JournalRecorder(journal_header(team, options))
     recorder.outcome = solve(team, options, observer=recorder, solver=solver)
     return read_journal(recorder.content())
-
-
-def header_of(team: Team, options: Options) -> Header:
-    return Header(team=team.name, protocol=options.protocol, runtime=options.runtime, seed=options.seed)
 
 
 def identical(replayed: ReplayResult) -> bool:
@@ -109,7 +106,7 @@ def with_events(journal: Journal, events: Sequence[AnyEvent]) -> Journal:
 def with_events_as_observed(team: Team, options: Options) -> tuple[Journal, list[AnyEvent]]:
     """The journal of a run, and its events as they were told: in the order in which a journal has them."""
     told: list[AnyEvent] = []
-    recorder = JournalRecorder(header_of(team, options))
+    recorder = JournalRecorder(journal_header(team, options))
 
     def observe(event: AnyEvent) -> None:
         told.append(event)

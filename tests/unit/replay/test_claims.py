@@ -11,14 +11,15 @@ import pytest
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
+from robochoc.journal.events import Decided
 from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict
 from robochoc.replay import replay
-from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
 from tests.support.compiled import plain_python_only
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
-from tests.support.replays import recorded
+from tests.support.replays import identical, recorded
 
 ALL_FLY = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 
@@ -152,3 +153,38 @@ def test_processes_that_a_deadline_ends_may_have_told_less_than_they_did_and_not
         claimed = replace(outcome, metrics=replace(metrics, messages=more))
         found = replay(replace(journal, header=header, outcome=claimed))
         assert [one.what for one in found.contradictions] == told
+
+
+def test_final_answers_are_not_compared_with_the_best_ones() -> None:
+    """Found by `make simulate`, seed 0."""
+    compared = 0
+    for seed in range(20):
+        team = random_csp(5, 3, 0.7, 0.1, seed=seed, max_cost=9)
+        options = Options(protocol="regret-matching", runtime=Runtime.SIMULATOR, settings={"cycles": "3"}, seed=seed)
+        final, best = (recorded(team, replace(options, answer=rule)) for rule in (AnswerRule.FINAL, AnswerRule.BEST))
+        assert (final.header.answer, best.header.answer) == ("final", msgspec.UNSET)
+        for journal in (final, best):
+            assert identical(replay(journal)), (seed, replay(journal))
+        assert final.outcome is not None
+        assert best.outcome is not None
+        compared += final.outcome.cost != best.outcome.cost
+    assert compared > 3
+
+
+def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> None:
+    """Found by `make simulate`, seed 215: the last values violate a constraint, earlier ones did not."""
+    options = Options(protocol="async-maxsum", runtime=Runtime.SIMULATOR, cache=False)
+    earlier = 0
+    for number in range(25):
+        team = random_csp(5, 3, 0.7, 0.25, seed=number, max_cost=9)
+        journal = recorded(team, replace(options, repair=False))
+        found = replay(journal)
+        assert identical(found), (number, found)
+        outcome = journal.outcome
+        assert outcome is not None
+        last = {event.robot: event.assignment for event in journal.events if isinstance(event, Decided)}
+        if outcome.assignment and outcome.assignment != {k: v for one in last.values() for k, v in one.items()}:
+            earlier += 1
+            forged = replace(journal, outcome=replace(outcome, cost=float(str(outcome.cost)) - 1))
+            assert [one.what for one in replay(forged).contradictions] == ["the outcome's cost"]
+    assert earlier

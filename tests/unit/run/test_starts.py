@@ -23,6 +23,7 @@ from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Search, evaluate_search
 from robochoc.run.known_costs import KnownCosts
 from robochoc.run.phases import RunPhase
+from robochoc.run.recording import journal_header
 from robochoc.run.registry import protocol_named
 from robochoc.run.starts import Start, start_in, start_of_outcome
 from robochoc.run.this_machine import ThisMachine
@@ -34,7 +35,6 @@ from tests.support.brute_force import solutions
 from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import random_team
 from tests.support.program import robochoc_within
-from tests.support.replays import header_of
 from tests.support.small_teams import pair
 
 SIMULATED = Options(protocol="syncbb", runtime=Runtime.SIMULATOR)
@@ -274,7 +274,7 @@ def test_robots_without_costs_keep_a_solution(protocol: str) -> None:
 
 def test_a_journal_records_the_start_as_the_first_improvement() -> None:
     team = with_costs(pair(values=2))
-    recorder = JournalRecorder(header_of(team, SIMULATED), lambda: Objective(team))
+    recorder = JournalRecorder(journal_header(team, SIMULATED), lambda: Objective(team))
     recorder(Began(t=0, protocol="SyncBB", minimises=True, start={"A": 1, "B": 2}, upper_bound=4))
     recorder.outcome = solve(team, SIMULATED)
     found = [event for event in read_journal(recorder.content()).events if isinstance(event, Improved)]
