@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs docs-version test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom release audit nox test-newest clean
+.PHONY: demo demo-11 docs docs-version test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz simulate mutate lint type format bench journals lock sbom release audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -132,6 +132,10 @@ docs-version: $(DOCS)  ## this version of the site, 1.0 of 1.0.0, into the branc
 SECONDS ?= 600
 fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
 	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED) $(if $(ENGINE),--engine $(ENGINE))
+
+# One seed decides a run. Findings are minimised and kept in out/simulate; each file contains the command that repeats it.
+simulate: $(READY)  ## whole runs with faults in virtual time: make simulate SECONDS=600 SEED=1 [COUNT=1]
+	$(BIN)/python -m tests.simulation --seconds $(SECONDS) --seed $(SEED) --jobs $(JOBS) $(if $(filter command%,$(origin COUNT)),--count $(COUNT))
 
 # The first run records which tests reach which function. Survivors are shown; all results: out/mutation/results.jsonl
 COUNT ?= 100

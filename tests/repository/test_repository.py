@@ -13,7 +13,7 @@ from pathlib import Path
 from tests.support.program import ROOT
 
 SOURCES = sorted((ROOT / "robochoc").rglob("*.py"))
-SHARED = ("support", "fuzz", "mutation")
+SHARED = ("support", "fuzz", "mutation", "simulation")
 """Packages of `tests` that others import."""
 
 

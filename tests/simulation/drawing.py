@@ -1,0 +1,211 @@
+"""A seed becomes a plan: problem, protocol, options and faults, as far as they can be combined."""
+
+from __future__ import annotations
+
+import math
+import typing
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from random import Random
+
+import msgspec
+
+from robochoc.communication.kill_schedule import Kill
+from robochoc.communication.simulator.channel import CHANNELS, ChannelModel
+from robochoc.communication.simulator.loss_models import Bursts
+from robochoc.model.costs import normalized
+from robochoc.model.problem import Team
+from robochoc.protocols.traits import Traits
+from robochoc.run import Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.compatibility.option_rules import refuse_options
+from robochoc.run.compatibility.team_rules import refuse_unfit
+from robochoc.run.defaults import AUTO
+from robochoc.run.options import AnswerRule, OnLoss, Preprocess
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.errors import UnsupportedError
+from tests.simulation.plan import Fault, FaultKind, Plan
+from tests.support.asymmetric_problems import random_asymmetric_team
+from tests.support.cost_problems import random_cost_team
+from tests.support.encrypted_problems import affordable
+from tests.support.loose_problems import any_order, loose_team
+from tests.support.random_changes import random_changing_team
+
+MOST_ASSIGNMENTS = 2_000
+"""Assignments that brute force tries for one team."""
+MOST_MESSAGES = 2_000
+"""Messages after which an incomplete protocol without an end of its own is stopped."""
+PROTOCOLS = tuple(name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc."))
+HOUR_S, DAY_S = 3_600.0, 86_400.0
+
+
+def drawn_plan(seed: int) -> Plan:
+    """Return the plan that `seed` decides."""
+    chance = Random(f"simulation {seed}")
+    protocol = AUTO if chance.random() < 0.05 else chance.choice(PROTOCOLS)
+    like = chance.choice(("abt", "syncbb")) if protocol == AUTO else protocol
+    traits = protocol_named(like).traits
+    team = _team(like, traits, chance)
+    runtime = Runtime.SIMULATOR
+    options = _options(team, protocol, traits, runtime, chance)
+    scale_s = chance.choice((0.01, 1.0, 60.0, HOUR_S))
+    return Plan(
+        seed,
+        _named_files(team),
+        options,
+        tuple(_faults(scale_s, chance)),
+        tick_s=10 ** chance.uniform(-4, 1.5),
+        delay_s=scale_s * chance.random(),
+    )
+
+
+# The problem
+
+
+def _team(protocol: str, traits: Traits, chance: Random) -> Team:
+    while True:
+        team = affordable(protocol, lambda: _maker(protocol, traits, chance)(chance))
+        if math.prod(len(variable.domain) for variable in team.variables.values()) <= MOST_ASSIGNMENTS:
+            return team
+
+
+def _maker(protocol: str, traits: Traits, chance: Random) -> Callable[[Random], Team]:
+    """Return a function that draws a team of a kind that the protocol can solve, without a central solver."""
+    makers: list[Callable[[Random], Team]] = [lambda chance: loose_team(protocol, chance)]
+    if traits.costs:
+        makers += [lambda chance: loose_team(protocol, chance, costs=True)] * 2
+    if traits.costs and traits.n_ary and not traits.allocates:
+        makers.append(random_cost_team)
+    if traits.n_ary and not traits.allocates:
+        makers += [lambda chance: random_changing_team(chance, chance.randint(1, 4))] * (3 if traits.dynamic else 1)
+    if traits.asymmetric:
+        makers += [lambda chance: random_asymmetric_team(chance, simple=True)] * 3
+    return chance.choice(makers)
+
+
+def _named_files(team: Team) -> Team:
+    """Return `team`, whose robots' files are called as the robots are: a robot that returns is read again."""
+    return replace(team, robots=tuple(replace(robot, file=robot.name) for robot in team.robots))
+
+
+# The options
+
+
+def _options(team: Team, protocol: str, traits: Traits, runtime: Runtime, chance: Random) -> Options:
+    """Return options at random, of which each can be combined with those before it and with the team."""
+    options = Options(
+        protocol=protocol,
+        runtime=runtime,
+        seed=chance.getrandbits(32),
+        cache=False,
+        order=any_order(team, chance),
+        settings=_settings(protocol, chance),
+        messages=None if traits.complete or chance.random() < 0.3 else MOST_MESSAGES,
+    )
+    wanted = [change for share, change in _wanted(team, runtime, chance) if chance.random() < share]
+    chance.shuffle(wanted)
+    for change in wanted:
+        changed = replace(options, **change)
+        if not _is_refused(team, changed):
+            options = changed
+    return options
+
+
+def _wanted(team: Team, runtime: Runtime, chance: Random) -> Iterator[tuple[float, dict[str, typing.Any]]]:
+    """Yield options with values at random, and how often each is used."""
+    span_s = 10 ** chance.uniform(-1, 5)
+    yield 0.1, {"deadline": span_s}
+    yield 0.1, {"deadline": span_s, "improve": span_s * chance.choice((0.1, 1, 10))}
+    yield 0.03, {"timeout": span_s}
+    yield 0.1, {"answer": AnswerRule.FINAL}
+    yield 0.1, {"repair": False}
+    yield 0.3, {"withdraw": Withdrawal.MINIMUM}
+    yield 0.2, {"withdraw": Withdrawal.MAXIMAL}
+    yield 0.2, {"count": True}
+    yield 0.07, {"messages": chance.choice((0, 1, 10, 50, 300))}
+    yield 0.2, {"preprocess": Preprocess.AC}
+    yield 0.3, {"start": _start(team, chance)}
+    yield 0.2, {"cold": True}
+    yield 0.2, {"bounds": True}
+    yield 0.15, {"message_loss": chance.choice((0.01, 0.1, 0.5))}
+    if runtime == Runtime.SIMULATOR:
+        yield 0.3, {"schedule": chance.choice([*ScheduleName])}
+        yield 0.2, {"schedule": ScheduleName.RANDOM}
+        yield 0.2, {"delay": chance.choice((3, 20, 200))}
+        yield 0.4, {"channel": _channel(chance)}
+        yield 0.03, {"ncccs": chance.choice((0, 10, 100))}
+        yield 0.05, {"schedule": ScheduleName.CYCLES, "cycles": chance.choice((1, 5, 30))}
+    else:
+        yield 0.2, {"on_loss": OnLoss.FAIL}
+        yield 0.5, {"on_loss": OnLoss.WITHDRAW}
+        yield 0.3, {"spares": chance.randint(1, 3)}
+        yield 0.3, {"patience": 10 ** chance.uniform(-1, 4)}
+        kills = [Kill(chance.choice(team.order), 10 ** chance.uniform(-3, 2)) for _ in range(chance.randint(1, 2))]
+        yield 0.3, {"kill": tuple(kills)}
+
+
+def _is_refused(team: Team, options: Options) -> bool:
+    try:
+        refuse_options(options)
+        if options.protocol != AUTO:
+            refuse_unfit(normalized(team), options, protocol_named(options.protocol).traits)
+    except UnsupportedError:
+        return True
+    return False
+
+
+def _start(team: Team, chance: Random) -> dict[str, int | None]:
+    share = chance.choice((0.5, 1.0))
+    return {
+        name: chance.choice([*one.domain, *[None] * (chance.random() < 0.1)])
+        for name, one in team.variables.items()
+        if one.domain and chance.random() < share
+    }
+
+
+def _channel(chance: Random) -> ChannelModel:
+    """Return a model: one that is shipped, or one with latencies up to hours and with lost messages."""
+    if chance.random() < 0.3:
+        return chance.choice([*CHANNELS.values()])
+    latency_ms = 10 ** chance.uniform(0, 4.5)
+    return ChannelModel(
+        name="drawn",
+        latency_ms=latency_ms,
+        minimum_ms=latency_ms * chance.random(),
+        sigma=chance.choice((0, 1, 2)),
+        loss=chance.choice((0, 0.1, 0.5)),
+        shared=chance.random() < 0.5,
+        message_loss=0.1 if chance.random() < 0.1 else 0,
+        bursts=Bursts(begin=0.05, end=0.3, loss=0.9) if chance.random() < 0.15 else None,
+        check_ns=chance.choice((1_000, 10**6)),
+    )
+
+
+def _settings(protocol: str, chance: Random) -> dict[str, str]:
+    """Return settings of the protocol: few cycles, and any of the variants that it has."""
+    if protocol == AUTO:
+        return {}
+    kind = type(protocol_named(protocol).settings)
+    found = {}
+    for field in msgspec.structs.fields(kind):
+        if field.name == "cycles":
+            found["cycles"] = str(chance.choice((3, 8, 20)))
+        elif typing.get_origin(field.type) is typing.Literal and chance.random() < 0.3:
+            found[field.name] = str(chance.choice(typing.get_args(field.type)))
+    if protocol in {"adopt-k", "rmb-dpop", "mb-dpop", "hs-cai"} and chance.random() < 0.3:
+        found["k"] = str(chance.randint(1, 3))
+    return found
+
+
+# The faults
+
+
+def _faults(scale_s: float, chance: Random) -> Iterator[Fault]:
+    """Yield faults that can happen in every runtime."""
+
+    def moment() -> float:
+        return scale_s * 10 ** chance.uniform(-2, 2)
+
+    if chance.random() < 0.2:
+        yield Fault(FaultKind.CLOCK, at_s=moment(), for_s=chance.choice((1.0, HOUR_S, DAY_S)))
+    if chance.random() < 0.2:
+        yield Fault(FaultKind.DISK, size=chance.choice((0, 1, 200, 2_000, 20_000)))

@@ -1,0 +1,111 @@
+"""The simulator of `make simulate`: a few seeds, and a planted fault that it finds and makes small."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from robochoc.protocols.message import Message
+from robochoc.protocols.satisfaction.abt import ABT
+from tests.simulation.__main__ import main
+from tests.simulation.clock import HangError, VirtualClock
+from tests.simulation.drawing import drawn_plan
+from tests.simulation.invariants import Finding
+from tests.simulation.minimising import minimised, repeated
+from tests.simulation.plan import FIXED, Plan, changed_options
+from tests.simulation.playing import FullDisk, examine
+from tests.support.compiled import plain_python_only
+
+SEEDS = 30
+
+
+def test_no_seed_has_a_finding() -> None:
+    reports = {seed: examine(drawn_plan(seed)) for seed in range(SEEDS)}
+    assert {seed: report.findings for seed, report in reports.items() if report.findings} == {}
+    assert sum(bool(report.refused) for report in reports.values()) < SEEDS // 5
+    assert {"solution", "optimal", "no-solution", "unknown"} <= {report.verdict for report in reports.values()}
+
+
+def test_the_same_seed_gives_the_same_plan_and_run() -> None:
+    for seed in range(3):
+        assert drawn_plan(seed) == drawn_plan(seed)
+        one, other = examine(drawn_plan(seed)), examine(drawn_plan(seed))
+        assert one == other
+    assert drawn_plan(0) != drawn_plan(1)
+
+
+@pytest.fixture
+def deaf(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
+    """Let the robots of ABT ignore the third message that each of them receives."""
+    received, right = Counter[int](), ABT.receive
+
+    def receive(protocol: ABT, sender: str, message: Message) -> None:
+        received[id(protocol)] += 1
+        if received[id(protocol)] != 3:
+            right(protocol, sender, message)
+
+    def start(protocol: ABT) -> None:
+        received[id(protocol)] = 0
+        right_start(protocol)
+
+    right_start = ABT.start
+    monkeypatch.setattr(ABT, "receive", receive)
+    monkeypatch.setattr(ABT, "start", start)
+    return monkeypatch
+
+
+@plain_python_only
+def test_a_planted_fault_is_found_and_made_small(
+    deaf: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plans = (plan for plan in map(drawn_plan, itertools.count()) if plan.options.protocol == "abt" and plan.faults)
+    plan, finding = next((plan, found) for plan in plans for found in examine(plan).findings)
+    deaf.setattr(sys, "argv", ["simulate", "--seed", str(plan.seed), "--count", "1", "--out", str(tmp_path)])
+    assert main() == 1
+    (file,) = tmp_path.glob("*.json")
+    assert "findings: " in capsys.readouterr().out
+    content = json.loads(file.read_bytes())
+    assert content["finding"] == finding.kind
+    smaller = repeated(plan, content["reductions"])
+    assert smaller.faults == ()
+    assert smaller.options.order is None
+    sizes = [[len(one.domain) for one in each.team.variables.values()] for each in (smaller, plan)]
+    assert sum(sizes[0]) < sum(sizes[1])
+    deaf.setattr(sys, "argv", ["simulate", "--repeat", str(file)])
+    assert main() == 1
+    assert finding.kind in capsys.readouterr().out
+    deaf.undo()
+    deaf.setattr(sys, "argv", ["simulate", "--repeat", str(file)])
+    assert main() == 0
+
+
+def test_minimisation_keeps_the_kind_of_a_finding_and_ends() -> None:
+    plan = next(plan for plan in map(drawn_plan, itertools.count()) if len(plan.team.robots) > 3 and plan.faults)
+
+    def find(plan: Plan) -> list[Finding]:
+        return [Finding("large" if len(plan.team.robots) > 2 else "small", "")]
+
+    smaller = minimised(plan, "large", find)
+    assert len(smaller.team.robots) == 3
+    assert (smaller.faults, changed_options(smaller.options).keys() - FIXED) == ((), set())
+    assert minimised(plan, "large", find, most=0) is plan
+
+
+def test_the_clock_jumps_and_detects_runs_without_an_end() -> None:
+    clock = VirtualClock(1.0, ((2.0, 10.0),))
+    assert [clock.monotonic() for _ in range(4)] == [1.0, 12.0, 13.0, 14.0]
+    with pytest.raises(HangError):
+        clock.advance_to(1e10)
+
+
+def test_a_full_disk_keeps_the_beginning_of_a_journal() -> None:
+    disk = FullDisk(5)
+    disk.write(b"abc")
+    with pytest.raises(OSError, match="space"):
+        disk.write(b"defg")
+    assert disk.content == b"abcde"
