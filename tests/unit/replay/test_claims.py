@@ -185,6 +185,6 @@ def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> 
         last = {event.robot: event.assignment for event in journal.events if isinstance(event, Decided)}
         if outcome.assignment and outcome.assignment != {k: v for one in last.values() for k, v in one.items()}:
             earlier += 1
-            forged = replace(journal, outcome=replace(outcome, cost=float(str(outcome.cost)) - 1))
+            forged = replace(journal, outcome=replace(outcome, cost=(outcome.cost or 0) - 1))
             assert [one.what for one in replay(forged).contradictions] == ["the outcome's cost"]
     assert earlier
