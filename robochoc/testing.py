@@ -20,6 +20,7 @@ from typing import TypeVar
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.exploration.changes import FaultPlan
 from robochoc.exploration.check import CheckOptions, checked
 from robochoc.exploration.problems import small_teams
 from robochoc.model.problem import Team
@@ -90,6 +91,9 @@ def check_protocol(  # noqa: PLR0913 - options, by name
     states: int = 20_000,
     packets: bool = False,
     losses: int = 0,
+    crashes: int = 0,
+    rejoins: int = 0,
+    events: int = 0,
     settings: Mapping[str, str] | None = None,
 ) -> int:
     """Check a protocol in every order in which messages can arrive on small teams: `robochoc check` in one line.
@@ -107,6 +111,9 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         states: The maximum number of states explored per team.
         packets: True to deliver also several waiting messages at once.
         losses: The maximum number of messages that are lost.
+        crashes: The maximum number of robots that crash.
+        rejoins: The maximum number of robots that crash and are restarted.
+        events: The maximum number of events that change the problem: those of a team's scenario, or random ones.
         settings: The settings of the protocol, as for `--set`.
 
     Returns:
@@ -115,7 +122,8 @@ def check_protocol(  # noqa: PLR0913 - options, by name
     Raises:
         AssertionError: if something does not hold. Its message contains the deliveries that lead there.
         TypeError: if `protocol` is not a class of protocols.
-        UnsupportedError: if the protocol does not accept one of `problems`, or does not tolerate lost messages.
+        UnsupportedError: if the protocol does not accept one of `problems`, or does not tolerate lost messages, crashes
+            or events.
         ValueError: if a number is too small, or no team was checked.
 
     Example:
@@ -127,13 +135,15 @@ def check_protocol(  # noqa: PLR0913 - options, by name
     given: object = protocol
     if not (isinstance(given, type) and issubclass(given, Protocol)):
         raise TypeError(f"protocol={protocol!r} is not allowed; expected a class of protocols")
+    plan = FaultPlan(crashes, rejoins, events)
     for name, number, least in (
-        ("teams", teams, 1), ("robots", robots, 1), ("values", values, 1), ("states", states, 1), ("losses", losses, 0)
+        ("teams", teams, 1), ("robots", robots, 1), ("values", values, 1), ("states", states, 1), ("losses", losses, 0),
+        *((name, number, 0) for name, number in plan._asdict().items()),
     ):  # fmt: skip
         if number < least:
             raise ValueError(f"{name} is {number}; it must be {least} or more")
     run = Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR, seed=seed, settings=dict(settings or {}))
-    options = CheckOptions(protocol, run, states, packets=packets, losses=losses)
+    options = CheckOptions(protocol, run, states, packets=packets, losses=losses, plan=plan)
     if problems is None:
         problems = itertools.islice(small_teams(protocol.traits, robots, values, seed), teams)
     total = 0

@@ -156,6 +156,11 @@ class Host:
         """The number of constraint checks so far."""
         return self.protocol.problem.checks
 
+    @property
+    def resumes(self) -> bool:
+        """True if `start` resumes a search, with knowledge from earlier epochs."""
+        return self._begun and isinstance(self.protocol, DynamicProtocol)
+
     def start(self, *, lossless: bool = True) -> list[Envelope]:
         """Start the search, or resume it after a change, and return the robot's first messages.
 

@@ -8,9 +8,7 @@ from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
-from robochoc.communication.host import Host
-from robochoc.communication.session import Epoch
-from robochoc.exploration.judgement import TeamJudge
+from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_events
 from robochoc.exploration.state_graph import Exploration, StateGraph
 from robochoc.model.costs import normalized
 from robochoc.model.problem import Team
@@ -38,6 +36,7 @@ class CheckOptions(NamedTuple):
         states: The maximum number of states per team.
         packets: True to deliver also several waiting messages at once.
         losses: The maximum number of lost messages.
+        plan: The maximum numbers of robots that crash, and of events.
     """
 
     protocol: type[Protocol]
@@ -45,6 +44,7 @@ class CheckOptions(NamedTuple):
     states: int = 100_000
     packets: bool = False
     losses: int = 0
+    plan: FaultPlan = FaultPlan()
 
 
 class Case(NamedTuple):
@@ -81,12 +81,11 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
     """
     if kind_of_core() != PURE:
         raise UnsupportedError("compiled protocols cannot be copied; set the environment variable ROBOCHOC_PURE to 1")
-    compiled, phase = case
-    parts = Epoch(compiled, parameters=phase.parameters).parts(phase.protocol)
-    hosts = {name: Host.create(phase.protocol, part) for name, part in parts.items()}
-    graph = StateGraph(hosts, TeamJudge(compiled, phase), packets=options.packets, losses=options.losses)
+    course = Course(case.compiled.team, case.phase, options.plan)
+    first = EpochStage(course, (), course.start)
+    graph = StateGraph(first, packets=options.packets, losses=options.losses)
     found = graph.explore(options.states, is_over)
-    if found.is_cyclic and phase.traits.complete and not found.fault:
+    if found.is_cyclic and case.phase.traits.complete and not found.fault:
         found.fault = ENDLESS
     return found
 
@@ -131,7 +130,7 @@ class CheckedTeam(NamedTuple):
             "complete": found.is_complete,
             "cyclic": found.is_cyclic,
             "fault": found.fault or None,
-            "path": [delivery._asdict() for delivery in found.path],
+            "path": [delivery.as_dict() for delivery in found.path],
         }
 
 
@@ -156,11 +155,10 @@ def checked(
         show: Called from time to time with the number of explored teams, and of the states so far.
 
     Raises:
-        UnsupportedError: if the protocol does not accept a team, or does not tolerate lost messages.
+        UnsupportedError: if the protocol does not accept a team, or does not tolerate lost messages, crashes or events.
         ChildDiedError: if a process was killed.
     """
-    if options.losses and not options.protocol.traits.bears_loss:
-        raise UnsupportedError(f"{options.run.protocol} does not tolerate lost messages; lose none")
+    _refuse_untolerated(options)
 
     def explored(item: tuple[Team, Case], report: Callable[[int], None]) -> Exploration:
         def is_over(states: int) -> bool:
@@ -174,10 +172,24 @@ def checked(
             yield CheckedTeam(team, case, exploration)
 
 
+def _refuse_untolerated(options: CheckOptions) -> None:
+    """Raise `UnsupportedError` for faults that the protocol does not claim to tolerate."""
+    name, traits = options.run.protocol, options.protocol.traits
+    if options.losses and not traits.bears_loss:
+        raise UnsupportedError(f"{name} does not tolerate lost messages; lose none")
+    if any(options.plan) and not traits.dynamic:
+        raise UnsupportedError(
+            f"{name} does not continue after a crash or an event, it starts again: check it without them"
+        )
+    if any(options.plan) and options.losses:
+        raise UnsupportedError("lost messages cannot be combined with crashes and events: check them one by one")
+
+
 def _cases(teams: Iterable[Team], options: CheckOptions) -> Iterator[tuple[Team, Case]]:
     """Yield each of `teams` with its case, unless a robot has no value."""
     for team in teams:
         if stop_requested():
             return
+        team = with_events(team, options.plan.events)  # noqa: PLW2901
         with suppress(NoLocalSolutionError):
             yield team, case_of(team, options.protocol, options.run)

@@ -47,14 +47,14 @@ class TeamJudge:
         self._judged: dict[tuple[int, ...], str] = {}
 
     def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
-        """See `state_graph.Judge`."""
+        """See `stage.Judge`."""
         key = (*map(id, robots), losses)
         if key not in self._judged:
             self._judged[key] = self._fault_at_the_end(robots, witness, losses)
         return self._judged[key]
 
     def on_the_way(self, robots: Sequence[LocalState]) -> str:
-        """See `state_graph.Judge`."""
+        """See `stage.Judge`."""
         if self.minimum < INFINITE and any(one.verdict == Verdict.NO_SOLUTION for one in robots):
             return NO_SOLUTION_IS_WRONG
         bound = lower_bound({str(place): one.findings for place, one in enumerate(robots)})

@@ -61,15 +61,42 @@ class LocalSteps:
     def __init__(self, host: Host) -> None:
         self.name = host.name
         self._first = host
-        self._numbers: dict[bytes, int] = {}
+        self._numbers: dict[tuple[bytes, bool | None], int] = {}
         self._hosts: list[Host] = []
         self._steps: dict[tuple[int, tuple[Received, ...]], Step] = {}
+        self._starts: dict[tuple[int, bool], Step] = {}
+        self._changed: dict[int, Step] = {}
         self.states: list[LocalState] = []
 
-    def start(self) -> Step:
-        """Return the first step."""
-        host = deepcopy(self._first)
-        return self._guarded(Step(-1), lambda: self._stepped(host, host.start()))
+    def first(self) -> Step:
+        """Return the state of a robot that has no knowledge and is not started yet."""
+        return self._waiting(self._first)
+
+    def changed(self, before: LocalSteps, state: int, change: Callable[[Host], None]) -> Step:
+        """Return the state in which the robot, which was in a state of `before`, waits for its start after `change`.
+
+        The arguments `before` and `change` are always the same.
+        """
+        known = self._changed.get(state)
+        if known is None:
+            host = deepcopy(before._hosts[state])
+
+            def adopt() -> Step:
+                change(host)
+                return self._waiting(host)
+
+            known = self._changed[state] = self._guarded(Step(-1), adopt)
+        return known
+
+    def start(self, state: int, *, lossless: bool) -> Step:
+        """Return the step in which the robot starts, or resumes. `lossless`: see `Host.start`."""
+        known = self._starts.get((state, lossless))
+        if known is None:
+            host = deepcopy(self._hosts[state])
+            known = self._starts[state, lossless] = self._guarded(
+                Step(-1), lambda: self._stepped(host, host.start(lossless=lossless))
+            )
+        return known
 
     def packet(self, state: int, packet: tuple[Received, ...]) -> Step:
         """Return the step from `state` on a packet."""
@@ -110,10 +137,19 @@ class LocalSteps:
             return before._replace(refusal=f"{self.name} has failed: {type(error).__name__}: {error}")
 
     def _stepped(self, host: Host, sent: Sequence[Envelope]) -> Step:
-        key = state_key(host.protocol)
+        number = self._number(host)
+        return Step(number, tuple([(envelope.receiver, envelope.content) for envelope in sent]))
+
+    def _waiting(self, host: Host) -> Step:
+        """Return the state of a robot that is not started: whether it starts or resumes is a part of the state."""
+        return Step(self._number(host, resumes=host.resumes))
+
+    def _number(self, host: Host, *, resumes: bool | None = None) -> int:
+        """Return the number of the state of `host`. `resumes`: see `Host.resumes`; None after the start."""
+        key = state_key(host.protocol), resumes
         number = self._numbers.setdefault(key, len(self._hosts))
         if number == len(self._hosts):
             self._hosts.append(host)
             protocol = host.protocol
             self.states.append(LocalState(protocol.verdict, protocol.assignment, protocol.findings))
-        return Step(number, tuple([(envelope.receiver, envelope.content) for envelope in sent]))
+        return number

@@ -11,11 +11,11 @@ import itertools
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-from robochoc.communication.host import Host
 from robochoc.exploration.components import strong_components
-from robochoc.exploration.local_steps import LocalState, LocalSteps, Received, Step
+from robochoc.exploration.local_steps import Received, Step
+from robochoc.exploration.stage import Change, Stage
 from robochoc.model.outcome import Verdict
 
 Channel = tuple[int, int]
@@ -35,40 +35,50 @@ class TeamState(NamedTuple):
         robots: The number of each robot's state.
         queues: The numbers of the messages on each channel, the oldest first.
         losses: The number of messages that may still be lost.
+        stage: The number of the stage.
+        lossless: None while the robots search. Before they start in this stage: True if no message of the previous
+            stage was lost.
     """
 
     robots: tuple[int, ...]
     queues: tuple[tuple[Channel, tuple[int, ...]], ...]
     losses: int = 0
+    stage: int = 0
+    lossless: bool | None = None
 
 
 class Delivery(NamedTuple):
     """A step of the team: `receiver` receives the next messages of `senders` as a packet.
 
-    `lost`: the message is lost instead. Without a receiver, the robots continue without the messages that they lack.
+    `lost`: the message is lost instead. `change`: the problem changes instead; `lossless`: when the search was known to
+    be quiescent. `starts`: the robots start on the changed problem instead. Otherwise, without a receiver, the robots
+    continue without the messages that they lack.
     """
 
     receiver: str = ""
     senders: tuple[str, ...] = ()
     lost: bool = False
+    change: Change | None = None
+    starts: bool = False
+    lossless: bool = False
 
     @property
     def in_words(self) -> str:
         """The step as a sentence."""
+        if self.change is not None:
+            end = "no message is in transit" if self.lossless else "messages in transit are dropped"
+            return f"the search ends, {end}, and the problem changes: {self.change.in_words}"
+        if self.starts:
+            return "the robots start on the changed problem"
         if not self.receiver:
             return "the robots continue without the messages that they lack"
         messages = " and ".join(f"the next message of {sender}" for sender in self.senders)
         return f"{messages} to {self.receiver} is lost" if self.lost else f"{self.receiver} receives {messages}"
 
-
-class Judge(Protocol):
-    """Judges the states of a team."""
-
-    def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
-        """Return the fault when the search is over; empty if there is none. `witness`: the robot that concluded it."""
-
-    def on_the_way(self, robots: Sequence[LocalState]) -> str:
-        """Return the fault in a state at any time; empty if there is none."""
+    def as_dict(self) -> dict[str, object]:
+        """Return the step for JSON."""
+        change = None if self.change is None else self.change.in_words
+        return {**self._replace(change=None)._asdict(), "change": change}
 
 
 @dataclass
@@ -109,42 +119,24 @@ class StateGraph:
     """The states of a team.
 
     Args:
-        hosts: The robots, by name, in priority order. They are not started.
-        judge: What must hold.
+        first: The robots, which are not started, and what must hold.
         packets: True to deliver also several waiting messages at once.
         losses: The maximum number of messages that are lost.
         reduced: False to explore also orders that lead to the same states in another sequence.
     """
 
-    def __init__(
-        self,
-        hosts: Mapping[str, Host],
-        judge: Judge,
-        *,
-        packets: bool = False,
-        losses: int = 0,
-        reduced: bool = True,
-    ) -> None:
-        self._robots = [LocalSteps(host) for host in hosts.values()]
-        self._names = [robot.name for robot in self._robots]
-        self._everybody = {*range(len(self._robots))}
-        self._places = {name: place for place, name in enumerate(self._names)}
-        self._judge = judge
+    def __init__(self, first: Stage, *, packets: bool = False, losses: int = 0, reduced: bool = True) -> None:
+        self._stages = [first]
+        self._stage_numbers = {id(first): 0}
         self._packets, self._losses = packets, losses
         self._contents: list[bytes] = []
         self._numbers: dict[bytes, int] = {}
         self._before: dict[TeamState, tuple[TeamState, Delivery] | None] = {}
-        traits = next(iter(hosts.values())).protocol.traits
-        self._ends_at_once = Verdict.SOLUTION in traits.concludes
+        self._ends_at_once = Verdict.SOLUTION in first.traits.concludes
         self._reduced = reduced and not losses and not self._ends_at_once
         self._explored_states: set[TeamState] = set()
         self._only: dict[TeamState, int] = {}
         """The receiver of the explored steps from each state; not for states from which all steps are explored."""
-        self._writers = [
-            {self._places[name] for name in (host.protocol.problem.neighbours if _is_local(host) else hosts)} - {place}
-            for place, host in enumerate(hosts.values())
-        ]
-        """The robots that may send a message to each robot."""
 
     def explore(self, most: int, is_over: Callable[[int], bool] = lambda _: False) -> Exploration:
         """Explore up to `most` states, or up to the first fault.
@@ -154,9 +146,9 @@ class StateGraph:
             is_over: Asked from time to time, with the number of states so far, whether to stop.
         """
         found = Exploration()
-        first = self._started()
-        if isinstance(first, str):
-            found.fault = first
+        waiting_robots = TeamState(tuple(self._stages[0].first()), (), self._losses, 0, lossless=True)
+        _, first, found.fault = self._started(waiting_robots)
+        if found.fault:
             return found
         self._before = {first: None}
         waiting = deque([first])
@@ -168,7 +160,7 @@ class StateGraph:
                 found.fault = fault
                 found.path = [*self._path(state), *([delivery] if delivery else [])]
                 break
-        found.local_states = sum(len(robot.states) for robot in self._robots)
+        found.local_states = sum(len(robot.states) for stage in self._stages for robot in stage.robots)
         found.is_complete = not waiting and not found.fault
         if found.is_complete:
             found.is_cyclic = self._is_cyclic(first)
@@ -176,15 +168,19 @@ class StateGraph:
 
     def _explored(self, state: TeamState, found: Exploration, waiting: deque[TeamState]) -> tuple[str, Delivery | None]:
         """Add the states after `state` to `waiting`. Return its fault, if any, and the faulty delivery."""
-        robots = [robot.states[number] for robot, number in zip(self._robots, state.robots, strict=True)]
-        fault = self._judge.on_the_way(robots)
+        stage = self._stages[state.stage]
+        robots = [robot.states[number] for robot, number in zip(stage.robots, state.robots, strict=True)]
+        fault = stage.judge.on_the_way(robots) if self._is_judged(state) else ""
         if fault:
             return fault, None
         self._explored_states.add(state)
         moves = self._chosen(state)
         if not moves:
             found.ends += 1
-            return self._judge.at_the_end(robots, self._witness(state), self._losses - state.losses), None
+            fault = stage.judge.at_the_end(robots, self._witness(state), self._losses - state.losses)
+            if fault:
+                return fault, None
+        moves += self._changes(state, is_over=not moves)
         found.steps += len(moves)
         for delivery, after, refusal in moves:
             if refusal:
@@ -206,39 +202,75 @@ class StateGraph:
         """Return whether the robots can continue forever although each message arrives at some time.
 
         They can if there is a set of states, each reachable from each other, in which every channel that is never empty
-        delivers a message.
+        delivers a message. The problem does not change in them, because it changes a limited number of times.
         """
         for component in strong_components(first, lambda state: (move.state for move in self._again(state))):
             delivered: set[Channel] = set()
             full = set.intersection(*({channel for channel, _ in state.queues} for state in component))
             for state in component:
+                places = self._stages[state.stage].places
                 for delivery, after, _ in self._again(state):
                     if after in component:
-                        place = self._places.get(delivery.receiver, -1)
-                        delivered.update((place, self._places[sender]) for sender in delivery.senders)
+                        place = places.get(delivery.receiver, -1)
+                        delivered.update((place, places[sender]) for sender in delivery.senders)
             if full <= delivered:
                 return True
         return False
 
     def _witness(self, state: TeamState) -> int | None:
         """Return the robot that has concluded the search alone; None if there is none."""
+        robots = self._stages[state.stage].robots
         for place, number in enumerate(state.robots):
-            if self._robots[place].states[number].verdict is not None:
+            if robots[place].states[number].verdict is not None:
                 return place
         return None
 
+    def _is_over(self, state: TeamState) -> bool:
+        """Return whether a robot has concluded the search, and no other robot takes a step after that."""
+        return (self._ends_at_once or state.lossless is not None) and self._witness(state) is not None
+
+    def _is_judged(self, state: TeamState) -> bool:
+        """Return whether what the robots know is used: from their start on, or if a verdict is still valid."""
+        return state.lossless is None or self._witness(state) is not None
+
     # Steps
 
-    def _started(self) -> TeamState | str:
-        """Return the state after all robots have started, or the fault of a robot that has not."""
+    def _started(self, state: TeamState) -> _Move:
+        """Return the step in which all robots start."""
         numbers, queues = [], dict[Channel, tuple[int, ...]]()
-        for place, robot in enumerate(self._robots):
-            step = robot.start()
-            if step.refusal:
-                return step.refusal
+        delivery = Delivery(starts=True)
+        for place, (robot, number) in enumerate(zip(self._stages[state.stage].robots, state.robots, strict=True)):
+            step = robot.start(number, lossless=bool(state.lossless))
+            refusal = step.refusal or self._send(place, step, queues, state)
+            if refusal:
+                return _Move(delivery, state, refusal)
             numbers.append(step.state)
-            self._send(place, step, queues)
-        return _state(numbers, queues, self._losses)
+        return _Move(delivery, _state(numbers, queues, state._replace(lossless=None)))
+
+    def _changes(self, state: TeamState, *, is_over: bool) -> Iterator[_Move]:
+        """Yield each step in which the problem changes. `is_over`: the search is over in `state`.
+
+        Messages in transit are dropped. Nothing was lost if the search had become quiescent, and this was noticed
+        before the change. If a robot crashes, the search ends before it is noticed.
+        """
+        stage = self._stages[state.stage]
+        for change in stage.changes:
+            if state.lossless is not None:
+                known = {state.lossless}
+            elif is_over and not change.lost and not self._losses and self._witness(state) is None:
+                known = {True, False}
+            else:
+                known = {False}
+            after = stage.after(change)
+            number = self._stage_numbers.setdefault(id(after), len(self._stages))
+            if number == len(self._stages):
+                self._stages.append(after)
+            steps = after.adopted(stage, state.robots)
+            robots = tuple([step.state for step in steps])
+            refusal = next((step.refusal for step in steps if step.refusal), "")
+            for lossless in sorted(known):
+                delivery = Delivery(change=change, lossless=lossless and state.lossless is None)
+                yield _Move(delivery, TeamState(robots, (), state.losses, number, lossless), refusal)
 
     def _chosen(self, state: TeamState) -> list[_Move]:
         """Return the steps from `state` that must be explored; none if the search is over.
@@ -248,43 +280,50 @@ class StateGraph:
         for the verification of concurrent systems", LNCS 1032, 1996, Section 4). As one of them must lead to a state
         that is still to be explored, no step is put off forever.
         """
-        for receiver in self._independent(state) if self._reduced else ():
+        for receiver in self._independent(state) if self._is_reduced(state) else ():
             moves = [*self._moves(state, receiver)]
             if any(move.refusal or move.state not in self._explored_states for move in moves):
                 self._only[state] = receiver
                 return moves
         return [*self._moves(state)]
 
+    def _is_reduced(self, state: TeamState) -> bool:
+        """Return whether some steps may be left out: the problem may not change in a state that they lead to."""
+        return self._reduced and state.lossless is None and not self._stages[state.stage].changes
+
     def _again(self, state: TeamState) -> Iterator[_Move]:
-        """Return the result of `_chosen` once more; none after a conclusion, even if robots have yet to hear it."""
-        if self._witness(state) is not None:
-            return iter(())
-        return self._moves(state, self._only.get(state))
+        """Yield the steps from `state` once more. After a conclusion, none of them is a delivery."""
+        deliveries = [] if self._witness(state) is not None else [*self._moves(state, self._only.get(state))]
+        yield from deliveries
+        yield from self._changes(state, is_over=not deliveries)
 
     def _independent(self, state: TeamState) -> Iterator[int]:
         """Yield each receiver to which nobody may write before its next step, except behind waiting messages."""
+        stage = self._stages[state.stage]
         full = {channel for channel, _ in state.queues}
         receivers = dict.fromkeys(receiver for receiver, _ in full)
         for receiver in receivers:
             active, found = {*receivers} - {receiver}, set[int]()
             while active:
                 found |= active
-                active = {place for place in self._everybody - found - {receiver} if self._writers[place] & found}
-            if all((receiver, writer) in full for writer in self._writers[receiver] & found):
+                active = {place for place in stage.everybody - found - {receiver} if stage.writers[place] & found}
+            if all((receiver, writer) in full for writer in stage.writers[receiver] & found):
                 yield receiver
 
     def _moves(self, state: TeamState, only: int | None = None) -> Iterator[_Move]:
         """Yield each possible step from `state`, or to one receiver; none if the search is over."""
-        if self._ends_at_once and self._witness(state) is not None:
+        if self._is_over(state):
+            return
+        if state.lossless is not None:
+            yield self._started(state)
             return
         queues = dict(state.queues)
         receivers: dict[int, list[Channel]] = {}
         for channel, queue in state.queues:
             if queue[-1] != LOST and only in {None, channel[0]}:
                 receivers.setdefault(channel[0], []).append(channel)
-        if state.losses:
-            for channel in (channel for channels in receivers.values() for channel in channels):
-                yield self._lost(state, channel, queues)
+        for channel in itertools.chain.from_iterable(receivers.values()) if state.losses else ():
+            yield self._lost(state, channel, queues)
         for receiver, channels in receivers.items():
             for packet in self._orders(channels, queues) if self._packets else [(channel,) for channel in channels]:
                 yield self._received(state, receiver, packet, queues)
@@ -306,55 +345,61 @@ class StateGraph:
         self, state: TeamState, receiver: int, packet: Sequence[Channel], queues: Mapping[Channel, tuple[int, ...]]
     ) -> _Move:
         """Return the step in which `receiver` receives the next message of each channel in `packet`."""
+        stage = self._stages[state.stage]
         after = dict(queues)
         received = []
         for channel in packet:
             queue = after[channel]
             missing = next(place for place, number in enumerate(queue) if number != LOST)
-            received.append(Received(self._names[channel[1]], self._contents[queue[missing]], missing))
+            received.append(Received(stage.names[channel[1]], self._contents[queue[missing]], missing))
             after[channel] = queue[missing + 1 :]
-        delivery = Delivery(self._names[receiver], tuple([one.sender for one in received]))
-        step = self._robots[receiver].packet(state.robots[receiver], tuple(received))
-        if step.refusal:
-            return _Move(delivery, state, step.refusal)
-        self._send(receiver, step, after)
+        delivery = Delivery(stage.names[receiver], tuple([one.sender for one in received]))
+        step = stage.robots[receiver].packet(state.robots[receiver], tuple(received))
+        refusal = step.refusal or self._send(receiver, step, after, state)
+        if refusal:
+            return _Move(delivery, state, refusal)
         robots = (*state.robots[:receiver], step.state, *state.robots[receiver + 1 :])
-        return _Move(delivery, _state(robots, after, state.losses))
+        return _Move(delivery, _state(robots, after, state))
 
     def _lost(self, state: TeamState, channel: Channel, queues: Mapping[Channel, tuple[int, ...]]) -> _Move:
         """Return the step in which the next message of `channel` is lost."""
         queue = queues[channel]
         missing = next(place for place, number in enumerate(queue) if number != LOST)
         after = {**queues, channel: (*queue[:missing], LOST, *queue[missing + 1 :])}
-        delivery = Delivery(self._names[channel[0]], (self._names[channel[1]],), lost=True)
-        return _Move(delivery, _state(state.robots, after, state.losses - 1))
+        names = self._stages[state.stage].names
+        delivery = Delivery(names[channel[0]], (names[channel[1]],), lost=True)
+        return _Move(delivery, _state(state.robots, after, state._replace(losses=state.losses - 1)))
 
     def _went_on(self, state: TeamState, queues: dict[Channel, tuple[int, ...]]) -> Iterator[_Move]:
         """Yield the step in which all robots continue without lost messages, if any robot does."""
         numbers, went = [*state.robots], False
-        for place, robot in enumerate(self._robots):
+        for place, robot in enumerate(self._stages[state.stage].robots):
             step = robot.go_on(numbers[place])
             if step is not None:
                 went = True
                 numbers[place] = step.state
-                self._send(place, step, queues)
+                refusal = self._send(place, step, queues, state)
+                if refusal:
+                    yield _Move(Delivery(), state, refusal)
+                    return
         if went:
-            yield _Move(Delivery(), _state(numbers, queues, state.losses))
+            yield _Move(Delivery(), _state(numbers, queues, state))
 
-    def _send(self, sender: int, step: Step, queues: dict[Channel, tuple[int, ...]]) -> None:
-        """Append the messages of a step to the queues."""
+    def _send(self, sender: int, step: Step, queues: dict[Channel, tuple[int, ...]], state: TeamState) -> str:
+        """Append the messages of a step to the queues. Return why it is not possible, or an empty text."""
+        stage = self._stages[state.stage]
         for receiver, content in step.sent:
+            if receiver not in stage.places:
+                return f"{stage.names[sender]} sends a message to {receiver}, which is not in the team"
             number = self._numbers.setdefault(content, len(self._contents))
             if number == len(self._contents):
                 self._contents.append(content)
-            channel = self._places[receiver], sender
+            channel = stage.places[receiver], sender
             queues[channel] = (*queues.get(channel, ()), number)
+        return ""
 
 
-def _state(robots: Sequence[int], queues: Mapping[Channel, tuple[int, ...]], losses: int) -> TeamState:
-    return TeamState(tuple(robots), tuple(sorted([item for item in queues.items() if item[1]])), losses)
-
-
-def _is_local(host: Host) -> bool:
-    """Return whether a robot writes to its neighbours only."""
-    return not host.protocol.traits.writes_to_non_neighbours
+def _state(robots: Sequence[int], queues: Mapping[Channel, tuple[int, ...]], before: TeamState) -> TeamState:
+    """Return a state of the same stage as `before`."""
+    waiting = tuple(sorted([item for item in queues.items() if item[1]]))
+    return TeamState(tuple(robots), waiting, before.losses, before.stage)

@@ -27,6 +27,7 @@ _NOT_STATE = frozenset({"problem", "outbox", "checks_at_send"})
 def state_key(protocol: Protocol) -> bytes:
     """Return a key of the protocol object's state."""
     state = {name: part for name, part in vars(protocol).items() if name not in _NOT_STATE}
+    state["undeclared"] = protocol.problem.allows_undeclared
     return blake2b(repr(_canonical(state, (id(protocol),))).encode(), digest_size=16).digest()
 
 

@@ -313,13 +313,23 @@ class ScenarioRun:
 
     def _reread(self, name: str) -> None:
         """Replace the robot `name` by the present content of its file, as if the file had never been different."""
-        symbols = symbol_table(self.team.robots)
-        read = read_robot_again(Path(self.team[name].file), symbols, self._files.user_units)
-        robot = normalized_joining(self._files, read)
+        robot = self._read_again(name)
         if name in self._files:
             self._files = rejoin(self._files, robot)
         else:
             self._files = replace(self._files, scenario=tuple(_with_joining(e, robot) for e in self._files.scenario))
+
+    def _read_again(self, name: str) -> Robot:
+        """Return the robot in the file of the robot `name`, with normalised costs.
+
+        Raises:
+            InvalidInputError: if the file is invalid.
+            OSError: if the file cannot be read.
+            UnboundedCostError: as in `normalized_joining`.
+        """
+        symbols = symbol_table(self.team.robots)
+        read = read_robot_again(Path(self.team[name].file), symbols, self._files.user_units)
+        return normalized_joining(self._files, read)
 
 
 def _describe_loss(lost: Iterable[str], back: Collection[str]) -> str:

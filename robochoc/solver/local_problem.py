@@ -147,6 +147,7 @@ class LocalProblem:
         pkc_parents: The parents that share a partially known constraint with this robot, and so need this robot's value
             too.
         checks: The number of constraint checks so far.
+        allows_undeclared: True after `allow_undeclared`.
     """
 
     def __init__(self, part: AgentProblem) -> None:
@@ -165,6 +166,7 @@ class LocalProblem:
             aside = INFINITE if must_stay else part.parameters.withdrawal_cost * robot.weight
             self.charges = (*self.charges, aside)
         self.checks = 0
+        self.allows_undeclared = False
         self._places: dict[Value, int] | None = None
         self._rank = rank
         self._part = part
@@ -227,6 +229,7 @@ class LocalProblem:
 
     def allow_undeclared(self) -> None:
         """Evaluate constraints for undeclared values of others from now on, because domains may have changed."""
+        self.allows_undeclared = True
         for constraint in self._constraints:
             constraint.allow_undeclared()
 

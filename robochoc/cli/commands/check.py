@@ -49,6 +49,14 @@ MOST_ROBOTS, MOST_VALUES = 6, 6
 )  # fmt: skip
 @click.option("--packets", is_flag=True, help="Deliver also several waiting messages at once, as runtimes do.")
 @click.option("--loss", type=WholeNumber(0), default=0, metavar="N", help="Lose up to N messages, any of them.")
+@click.option("--crash", type=WholeNumber(0), default=0, metavar="N", help="Up to N robots crash, at any time.")
+@click.option(
+    "--rejoin", type=WholeNumber(0), default=0, metavar="N", help="Up to N robots crash at any time, and are restarted."
+)
+@click.option(
+    "--event", type=WholeNumber(0), default=0, metavar="N",
+    help="Up to N events change the problem at any time: random ones, or those of a team's scenario.",
+)  # fmt: skip
 @settings_option
 @click.option(
     "--jobs", type=WholeNumber(1, 1024), metavar="N",
@@ -69,6 +77,9 @@ def check(  # noqa: PLR0913 - options, by name
     states: int,
     packets: bool,
     loss: int,
+    crash: int,
+    rejoin: int,
+    event: int,
     settings_given: tuple[str, ...],
     jobs: int | None,
     timeout: float | None,
@@ -88,7 +99,9 @@ def check(  # noqa: PLR0913 - options, by name
     robochoc check abt                          every order, on 20 random teams of at most 3 robots
     robochoc check adopt --robots 4 --values 3  larger teams
     robochoc check dsa --set cycles=3 --loss 1  any message may be lost
+    robochoc check dynabt --crash 1 --event 1   any robot may crash, and the problem may change
     """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.exploration.changes import FaultPlan
     from robochoc.exploration.check import CheckOptions, checked
     from robochoc.run.defaults import AUTO, CENTRAL
     from robochoc.run.options import Options, Runtime
@@ -105,7 +118,8 @@ def check(  # noqa: PLR0913 - options, by name
         raise Failure(USAGE, f"{protocol} is not a protocol of robots; name one ('robochoc protocols')")
     with stop_handled():
         with errors_as_failures(protocol), _progress_of(protocol, len(folders) or teams, as_json=as_json) as show:
-            options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss)
+            plan = FaultPlan(crash, rejoin, event)
+            options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss, plan=plan)
             problems = _teams(folders, (teams, robots, values, seed), options)
             results = checked(problems, options, deadline, jobs=jobs or usable_processors(), show=show)
             with closing(results):

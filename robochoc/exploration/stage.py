@@ -1,0 +1,84 @@
+"""The robots of a team while its problem does not change, and the changes that may end this."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+from robochoc.communication.host import Host
+from robochoc.exploration.local_steps import LocalState, LocalSteps, Step
+
+
+class Judge(Protocol):
+    """Judges the states of a team."""
+
+    def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
+        """Return the fault when the search is over; empty if there is none. `witness`: the robot that concluded it."""
+
+    def on_the_way(self, robots: Sequence[LocalState]) -> str:
+        """Return the fault in a state at any time; empty if there is none."""
+
+
+class Change(NamedTuple):
+    """A change of the problem, which ends a stage and opens the next one.
+
+    Attributes:
+        in_words: The change in a few words.
+        lost: The robots that crash; empty if the next event happens.
+        back: Those of them that are restarted.
+    """
+
+    in_words: str = ""
+    lost: tuple[str, ...] = ()
+    back: tuple[str, ...] = ()
+
+
+class Stage:
+    """The robots of a team while its problem does not change: an epoch of a run.
+
+    Args:
+        hosts: The robots, by name, in priority order. They are not started.
+        judge: The judge of their states.
+
+    Attributes:
+        robots: The steps of each robot.
+        names: The names of the robots.
+        places: The place of each robot in `robots`.
+        everybody: All places.
+        writers: For each robot, the places of the robots that may send it a message.
+        traits: The traits of the protocol.
+    """
+
+    def __init__(self, hosts: Mapping[str, Host], judge: Judge) -> None:
+        self.robots = [LocalSteps(host) for host in hosts.values()]
+        self.judge = judge
+        self.names = [*hosts]
+        self.places = {name: place for place, name in enumerate(self.names)}
+        self.everybody = {*range(len(self.names))}
+        self.traits = next(iter(hosts.values())).protocol.traits
+        self.writers = [
+            {
+                self.places[name]
+                for name in (hosts if self.traits.writes_to_non_neighbours else host.protocol.problem.neighbours)
+            }
+            - {place}
+            for place, host in enumerate(hosts.values())
+        ]
+
+    @cached_property
+    def changes(self) -> Sequence[Change]:
+        """The changes that may end this stage."""
+        return ()
+
+    def after(self, change: Change) -> Stage:
+        """Return the stage after `change`, always the same object."""
+        raise NotImplementedError
+
+    def first(self) -> list[int]:
+        """Return the states of robots that have no knowledge and are not started."""
+        return [robot.first().state for robot in self.robots]
+
+    def adopted(self, before: Stage, robots: Sequence[int]) -> list[Step]:
+        """Return the state of each robot before its start in this stage, after the states `robots` of `before`."""
+        raise NotImplementedError
