@@ -1,4 +1,4 @@
-"""Crashes, returns and events at any moment: the protocols that continue have no fault, and planted faults are found."""
+"""Crashes, returns and events at any moment: no fault in protocols that continue, and planted faults are found."""
 
 from __future__ import annotations
 
