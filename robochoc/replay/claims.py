@@ -7,10 +7,11 @@ the search (`--improve`) may be older: it is checked against the constraints, an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
+from operator import attrgetter
 
 import msgspec
 from msgspec import UNSET
@@ -167,7 +168,7 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
         return
     began = last.run.began
     earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
-    if earlier or (last.any_time and _was_decided(recorded.assignment, last)):
+    if earlier or (last.any_time and _was_decided(recorded, last)):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
@@ -204,16 +205,24 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
             yield Contradiction(what=whose + name, recorded=left, replayed=right)
 
 
-def _was_decided(assignment: Mapping[str, int], replayed: ReplayedRun) -> bool:
-    """Return whether each robot with values in `assignment` has decided on them at any time of the run."""
-    decided: dict[str, list[Mapping[str, int]]] = {}
-    for event in replayed.run.events:
-        if isinstance(event, Decided):
-            decided.setdefault(event.robot, []).append(event.assignment)
-    owners = {replayed.team.owner.get(name, "") for name in assignment}
-    return bool(owners) and all(
-        any(one.items() <= assignment.items() for one in decided.get(name, ())) for name in owners
-    )
+def _was_decided(recorded: Answer, replayed: ReplayedRun) -> bool:
+    """Return whether the robots had the recorded assignment together at some time of the run."""
+    values = recorded.assignment
+    own = {
+        robot.name: {one.name: values[one.name] for one in robot.variables if one.name in values}
+        for robot in replayed.team.robots
+    }
+    decisions = [event for event in replayed.run.events if isinstance(event, Decided)]
+    for events in (decisions, sorted(decisions, key=attrgetter("t"))):  # see `DecidedValues`
+        others = {*own}
+        for event in events:
+            if event.assignment == own.get(event.robot):
+                others.discard(event.robot)
+            else:
+                others.add(event.robot)
+            if not others:
+                return True
+    return False
 
 
 def _answered(replayed: ReplayedRun, robots: RebuiltRobots, outcome: Outcome, *, final: bool) -> ReplayedRun:

@@ -16,6 +16,7 @@ from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict
 from robochoc.replay import replay
 from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
+from robochoc.verification.checker import assignment_cost
 from tests.support.compiled import plain_python_only
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
@@ -93,6 +94,31 @@ def test_a_solution_is_not_a_proof_that_there_is_none() -> None:
         "the outcome's assignment",
         "the outcome's cost",
     }
+
+
+def test_the_best_assignment_on_the_way_is_an_answer() -> None:
+    """A mixture of values that the robots never had together is found, although its cost is right."""
+    on_the_way = 0
+    for seed in range(12):
+        team = random_csp(5, 4, 0.8, 0, seed, max_cost=50)
+        journal = recorded(team, replace(ALL_FLY, protocol="dsa", settings={"cycles": "8"}, seed=seed))
+        assert replay(journal).identical, seed
+        values: dict[str, int] = {}
+        had = []
+        for event in journal.events:
+            if isinstance(event, Decided):
+                values |= event.assignment
+                had.append(dict(values))
+        outcome = journal.outcome
+        assert outcome is not None
+        assert outcome.assignment in had
+        on_the_way += outcome.cost != assignment_cost(team, values)
+        for name, value in outcome.assignment.items():
+            mixed = {**outcome.assignment, name: value % 4 + 1}
+            if mixed not in had:
+                claimed = replace(outcome, assignment=mixed, cost=assignment_cost(team, mixed))
+                assert replay(replace(journal, outcome=claimed)).contradictions, (seed, name)
+    assert on_the_way > 0
 
 
 BY_A_DEADLINE = Options(
