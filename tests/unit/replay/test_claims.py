@@ -13,6 +13,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Decided
 from robochoc.journal.journal import Journal
+from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Verdict
 from robochoc.replay import replay
 from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
@@ -112,11 +113,11 @@ def test_the_best_assignment_on_the_way_is_an_answer() -> None:
         outcome = journal.outcome
         assert outcome is not None
         assert outcome.assignment in had
-        on_the_way += outcome.cost != assignment_cost(team, values)
+        on_the_way += outcome.cost != user_cost(team, assignment_cost(team, values))
         for name, value in outcome.assignment.items():
             mixed = {**outcome.assignment, name: value % 4 + 1}
             if mixed not in had:
-                claimed = replace(outcome, assignment=mixed, cost=assignment_cost(team, mixed))
+                claimed = replace(outcome, assignment=mixed, cost=user_cost(team, assignment_cost(team, mixed)))
                 assert replay(replace(journal, outcome=claimed)).contradictions, (seed, name)
     assert on_the_way > 0
 
