@@ -120,7 +120,7 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         The number of states explored.
 
     Raises:
-        AssertionError: if something does not hold. Its message contains the deliveries that lead there.
+        AssertionError: if something does not hold. Its message explains the fault, with the deliveries that lead there.
         TypeError: if `protocol` is not a class of protocols.
         UnsupportedError: if the protocol does not accept one of `problems`, or does not tolerate lost messages, crashes
             or events.
@@ -150,7 +150,7 @@ def check_protocol(  # noqa: PLR0913 - options, by name
     for one in checked(problems, options):
         total += one.exploration.states
         if one.exploration.fault:
-            raise AssertionError(f"{protocol.__name__} on {one.team.name}, {one.in_words}\n{one.steps_in_words}")
+            raise AssertionError(f"{protocol.__name__} on {one.team.name}, {one.report}")
     if not total:
         raise ValueError("no team was checked")
     return total

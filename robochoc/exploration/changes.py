@@ -26,7 +26,6 @@ from robochoc.model.problem import AddAgent, Robot, Team
 from robochoc.model.team_edits import ChangeError
 from robochoc.run.phases import RunPhase
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
-from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled_team import CompiledTeam
 
 CRASH = "its process was killed"
@@ -151,9 +150,8 @@ class EpochStage(Stage):
 
     def __init__(self, course: Course, changes: Sequence[Change], epoch: Epoch) -> None:
         self._course, self._changes, self._epoch = course, changes, epoch
-        self._parts = epoch.parts(course.phase.protocol)
-        hosts = {name: Host.create(course.phase.protocol, part) for name, part in self._parts.items()}
-        super().__init__(hosts, TeamJudge(epoch.compiled, course.phase))
+        protocol = course.phase.protocol
+        super().__init__(epoch.parts(protocol), protocol, TeamJudge(epoch.compiled, course.phase))
         self._after: dict[Change, Stage] = {}
 
     @cached_property
@@ -192,5 +190,5 @@ class EpochStage(Stage):
 
     def _change(self, name: str, host: Host) -> None:
         """Let the robot of `host` adopt the problem of this epoch."""
-        part: AgentProblem = self._parts[name]
+        part = self.parts[name]
         host.change(part, self._epoch.invalidated, order_of(part))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
 from contextlib import suppress
@@ -9,6 +10,7 @@ from functools import partial
 from typing import NamedTuple
 
 from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_events
+from robochoc.exploration.explanation import explanation_of
 from robochoc.exploration.state_graph import Exploration, StateGraph
 from robochoc.model.costs import normalized
 from robochoc.model.problem import Team
@@ -79,15 +81,26 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
     Raises:
         UnsupportedError: with the compiled core.
     """
+    graph = graph_of(case, options)
+    found = graph.explore(options.states, is_over)
+    if found.is_cyclic and case.phase.traits.complete and not found.fault:
+        found.fault = ENDLESS
+    if found.fault:
+        found.explanation = explanation_of(found, graph)
+    return found
+
+
+def graph_of(case: Case, options: CheckOptions) -> StateGraph:
+    """Return the states of a team, none of which is explored yet.
+
+    Raises:
+        UnsupportedError: with the compiled core.
+    """
     if kind_of_core() != PURE:
         raise UnsupportedError("compiled protocols cannot be copied; set the environment variable ROBOCHOC_PURE to 1")
     course = Course(case.compiled.team, case.phase, options.plan)
     first = EpochStage(course, (), course.start)
-    graph = StateGraph(first, packets=options.packets, losses=options.losses)
-    found = graph.explore(options.states, is_over)
-    if found.is_cyclic and case.phase.traits.complete and not found.fault:
-        found.fault = ENDLESS
-    return found
+    return StateGraph(first, packets=options.packets, losses=options.losses)
 
 
 ENDLESS = (
@@ -115,7 +128,13 @@ class CheckedTeam(NamedTuple):
     @property
     def steps_in_words(self) -> str:
         """The deliveries that lead to the fault, one on each line."""
-        return "\n".join(f"{number}. {one.in_words}" for number, one in enumerate(self.exploration.path, 1))
+        return "\n".join(f"{number}. {step}" for number, step in enumerate(self.exploration.explanation.steps, 1))
+
+    @property
+    def report(self) -> str:
+        """The result of a faulty team: one line, the deliveries, and the explanation in lines of 100 characters."""
+        explanation = textwrap.fill(self.exploration.explanation.text, 100, break_on_hyphens=False)
+        return "\n".join(filter(None, [self.in_words, self.steps_in_words, explanation]))
 
     def as_dict(self) -> dict[str, object]:
         """Return the numbers and the fault, for JSON."""
@@ -130,6 +149,7 @@ class CheckedTeam(NamedTuple):
             "complete": found.is_complete,
             "cyclic": found.is_cyclic,
             "fault": found.fault or None,
+            "explanation": found.explanation.text or None,
             "path": [delivery.as_dict() for delivery in found.path],
         }
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -19,12 +19,13 @@ from robochoc.communication.search_result import SearchResult
 from robochoc.exploration.local_steps import LocalState
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Metrics, Verdict
-from robochoc.model.problem import INFINITE, Assignment, Team
+from robochoc.model.problem import INFINITE, Assignment, ProblemKind, Team
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search
 from robochoc.run.incumbent import lower_bound
 from robochoc.run.phases import RunPhase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.plain_text import listed
 from robochoc.verification.checker import RefutedError, assignment_cost, violations
 
 MOST_ASSIGNMENTS = 100_000
@@ -38,13 +39,26 @@ class TeamJudge:
     Raises `UnsupportedError` if there are too many.
 
     Attributes:
+        team: The team.
         minimum: The minimum cost of a solution (0 without costs), or `INFINITE` if there is no solution.
     """
 
     def __init__(self, compiled: CompiledTeam, phase: RunPhase) -> None:
         self._compiled, self._phase = compiled, phase
-        self.minimum = _minimum(compiled.team)
+        self.team = compiled.team
+        self.minimum, self._best = _cheapest(compiled.team)
         self._judged: dict[tuple[int, ...], str] = {}
+
+    @property
+    def right_answer(self) -> str:
+        """The answer of a correct run, as a sentence."""
+        team = self.team
+        if self._best is None:
+            return f"{team.name} has no solution."
+        values = values_text(team, self._best)
+        if team.kind == ProblemKind.DISWCSP:
+            return f"The minimum cost is {user_cost(team, self.minimum)}, for example of {values}."
+        return f"A solution is {values}."
 
     def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
         """See `stage.Judge`."""
@@ -76,6 +90,13 @@ class TeamJudge:
             return f"the verdict is optimal with the cost {answer.cost}, but the minimum cost is {self.minimum}"
         return ""
 
+    def answer_in_words(self, robots: Sequence[LocalState], witness: int | None) -> str:
+        """See `stage.Judge`."""
+        answer = self._answer(robots, witness, 0)
+        values = f": {values_text(self.team, answer.assignment)}" if answer.assignment else ""
+        is_costly = answer.cost is not None and self.team.kind == ProblemKind.DISWCSP
+        return f"{answer.verdict}{values}{f', cost {answer.cost}' if is_costly else ''}"
+
     def _answer(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> PhaseAnswer:
         """Return the answer of a run that ends in this state."""
         team = self._compiled.team
@@ -91,8 +112,17 @@ class TeamJudge:
         return evaluate_search(self._phase, Search(result, check), team.kind, partial(user_cost, team))
 
 
-def _minimum(team: Team) -> float:
-    """Return the minimum cost of a solution of `team`; `INFINITE` if there is no solution.
+def values_text(team: Team, assignment: Mapping[str, int]) -> str:
+    """Return an assignment as text: `V1 = 0 and V2 = red`."""
+    symbols = {name: one.domain.symbols for name, one in team.variables.items()}
+    return listed(
+        f"{name} = {symbols[name][value] if 0 <= value < len(symbols[name]) else value}"
+        for name, value in assignment.items()
+    )
+
+
+def _cheapest(team: Team) -> tuple[float, Assignment | None]:
+    """Return the minimum cost of a solution of `team`, and such a solution; `INFINITE` and None if there is none.
 
     Raises:
         UnsupportedError: if there are too many assignments.
@@ -103,8 +133,11 @@ def _minimum(team: Team) -> float:
         what = f"{team.name} has {number:,} assignments, more than {MOST_ASSIGNMENTS:,}"
         raise UnsupportedError(f"{what}: too many to try; use a smaller team")
     least: float = INFINITE
+    best: Assignment | None = None
     for values in itertools.product(*(team.variables[name].domain for name in names)):
         assignment: Assignment = dict(zip(names, values, strict=True))
         if not any(violations(team, assignment)):
-            least = min(least, assignment_cost(team, assignment) or 0)
-    return least
+            cost = assignment_cost(team, assignment) or 0
+            if cost < least:
+                least, best = cost, assignment
+    return least, best

@@ -62,7 +62,7 @@ class LocalSteps:
         self.name = host.name
         self._first = host
         self._numbers: dict[tuple[bytes, bool | None], int] = {}
-        self._hosts: list[Host] = []
+        self.hosts: list[Host] = []
         self._steps: dict[tuple[int, tuple[Received, ...]], Step] = {}
         self._starts: dict[tuple[int, bool], Step] = {}
         self._changed: dict[int, Step] = {}
@@ -79,7 +79,7 @@ class LocalSteps:
         """
         known = self._changed.get(state)
         if known is None:
-            host = deepcopy(before._hosts[state])
+            host = deepcopy(before.hosts[state])
 
             def adopt() -> Step:
                 change(host)
@@ -92,7 +92,7 @@ class LocalSteps:
         """Return the step in which the robot starts, or resumes. `lossless`: see `Host.start`."""
         known = self._starts.get((state, lossless))
         if known is None:
-            host = deepcopy(self._hosts[state])
+            host = deepcopy(self.hosts[state])
             known = self._starts[state, lossless] = self._guarded(
                 Step(-1), lambda: self._stepped(host, host.start(lossless=lossless))
             )
@@ -107,14 +107,20 @@ class LocalSteps:
 
     def go_on(self, state: int) -> Step | None:
         """Return the step in which the robot continues without the messages that it waits for; None if it does not."""
-        host = deepcopy(self._hosts[state])
-        sent = host.go_on()
-        return None if sent is None else self._stepped(host, sent)
+        host = deepcopy(self.hosts[state])
+        ends = Step(-1)
+
+        def go_on() -> Step:
+            sent = host.go_on()
+            return ends if sent is None else self._stepped(host, sent)
+
+        step = self._guarded(Step(state), go_on)
+        return None if step is ends else step
 
     def _computed(self, state: int, packet: Sequence[Received]) -> Step:
         if self.states[state].verdict is not None:  # the search is over, and the robot will hear it
             return Step(state)
-        host = deepcopy(self._hosts[state])
+        host = deepcopy(self.hosts[state])
         host.clock = 0
 
         def handle() -> Step:
@@ -147,9 +153,9 @@ class LocalSteps:
     def _number(self, host: Host, *, resumes: bool | None = None) -> int:
         """Return the number of the state of `host`. `resumes`: see `Host.resumes`; None after the start."""
         key = state_key(host.protocol), resumes
-        number = self._numbers.setdefault(key, len(self._hosts))
-        if number == len(self._hosts):
-            self._hosts.append(host)
+        number = self._numbers.setdefault(key, len(self.hosts))
+        if number == len(self.hosts):
+            self.hosts.append(host)
             protocol = host.protocol
             self.states.append(LocalState(protocol.verdict, protocol.assignment, protocol.findings))
         return number

@@ -58,20 +58,21 @@ def _random_team(name: str, traits: Traits, chance: Random, size: int, values: i
         scopes.append(names[:_TRIPLE])
     partial = traits.partially_known and chance.random() < _SHARE_PARTIAL
     constraints, parts = [], dict[str, list[Constraint]]()
-    for scope in scopes:
+    for number, scope in enumerate(scopes, 1):
         rows = list(itertools.product(*(range(sizes[one]) for one in scope)))
         if partial and len(scope) == 2:  # noqa: PLR2004 - a partially known constraint has two robots
             for one in scope:
-                part = _constraint(chance, scope, rows, tightness, is_soft=traits.asymmetric)
+                part = _constraint(chance, f"C{number}", scope, rows, tightness, is_soft=traits.asymmetric)
                 parts.setdefault(f"Robot{one[1:]}", []).append(part)
         else:
-            constraints.append(_constraint(chance, scope, rows, tightness, is_soft=traits.costs))
+            constraints.append(_constraint(chance, f"C{number}", scope, rows, tightness, is_soft=traits.costs))
     kind = ProblemKind.DISWCSP if traits.costs else ProblemKind.DISCSP
     return assemble(name, variables, constraints, kind=kind, extras=Extras(parts=parts))
 
 
 def _constraint(
     chance: Random,
+    name: str,
     scope: Sequence[str],
     rows: Sequence[tuple[int, ...]],
     tightness: float,
@@ -86,4 +87,4 @@ def _constraint(
         hard = tightness / 4
         costs = [INFINITE if chance.random() < hard else random_integer(chance, 0, _MOST_COST) for _ in rows]
         relation = Relation("R", len(scope), Semantics.SOFT, tuple(rows), tuple(costs), 0)
-    return Constraint("C", relation, tuple(scope), tuple(scope))
+    return Constraint(name, relation, tuple(scope), tuple(scope))

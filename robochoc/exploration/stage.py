@@ -8,10 +8,24 @@ from typing import NamedTuple, Protocol
 
 from robochoc.communication.host import Host
 from robochoc.exploration.local_steps import LocalState, LocalSteps, Step
+from robochoc.model.problem import Team
+from robochoc.protocols.protocol import Protocol as AnyProtocol
+from robochoc.solver.agent_problem import AgentProblem
 
 
 class Judge(Protocol):
     """Judges the states of a team."""
+
+    @property
+    def team(self) -> Team:
+        """The team."""
+
+    @property
+    def right_answer(self) -> str:
+        """The answer of a correct run, as a sentence."""
+
+    def answer_in_words(self, robots: Sequence[LocalState], witness: int | None) -> str:
+        """Return the answer when the search is over without a fault."""
 
     def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
         """Return the fault when the search is over; empty if there is none. `witness`: the robot that concluded it."""
@@ -38,8 +52,9 @@ class Stage:
     """The robots of a team while its problem does not change: an epoch of a run.
 
     Args:
-        hosts: The robots, by name, in priority order. They are not started.
-        judge: The judge of their states.
+        parts: Each robot's part of the problem, by name, in priority order.
+        protocol: The class of the protocol.
+        judge: The judge of the robots' states.
 
     Attributes:
         robots: The steps of each robot.
@@ -50,13 +65,15 @@ class Stage:
         traits: The traits of the protocol.
     """
 
-    def __init__(self, hosts: Mapping[str, Host], judge: Judge) -> None:
+    def __init__(self, parts: Mapping[str, AgentProblem], protocol: type[AnyProtocol], judge: Judge) -> None:
+        hosts = {name: Host.create(protocol, part) for name, part in parts.items()}
+        self.parts, self.protocol = parts, protocol
         self.robots = [LocalSteps(host) for host in hosts.values()]
         self.judge = judge
         self.names = [*hosts]
         self.places = {name: place for place, name in enumerate(self.names)}
         self.everybody = {*range(len(self.names))}
-        self.traits = next(iter(hosts.values())).protocol.traits
+        self.traits = protocol.traits
         self.writers = [
             {
                 self.places[name]

@@ -14,13 +14,14 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from robochoc.exploration.components import strong_components
-from robochoc.exploration.local_steps import Received, Step
+from robochoc.exploration.local_steps import LocalState, Received, Step
 from robochoc.exploration.stage import Change, Stage
 from robochoc.model.outcome import Verdict
 
 Channel = tuple[int, int]
 """The places of a receiver and a sender in the order of the robots."""
 
+NOT_A_NEIGHBOUR = "with which it shares no constraint; set Traits.writes_to_non_neighbours if this is intended"
 LOST = -1
 """The number of a lost message in a queue, which its receiver will notice at the next message of the channel."""
 
@@ -81,6 +82,16 @@ class Delivery(NamedTuple):
         return {**self._replace(change=None)._asdict(), "change": change}
 
 
+class Explanation(NamedTuple):
+    """A fault in words: a paragraph, and the deliveries that lead to it, with their messages."""
+
+    text: str = ""
+    steps: tuple[str, ...] = ()
+
+
+NO_EXPLANATION = Explanation()
+
+
 @dataclass
 class Exploration:
     """The result of an exploration.
@@ -95,6 +106,7 @@ class Exploration:
             arrives. None: unknown.
         fault: The fault that ended it; empty if there is none.
         path: The deliveries from the start to the fault.
+        explanation: The fault in words.
     """
 
     states: int = 0
@@ -105,9 +117,10 @@ class Exploration:
     is_cyclic: bool | None = None
     fault: str = ""
     path: Sequence[Delivery] = ()
+    explanation: Explanation = NO_EXPLANATION
 
 
-class _Move(NamedTuple):
+class Move(NamedTuple):
     """A step from a state: the delivery, the next state, and why a robot refuses the delivery (empty: none does)."""
 
     delivery: Delivery
@@ -146,8 +159,7 @@ class StateGraph:
             is_over: Asked from time to time, with the number of states so far, whether to stop.
         """
         found = Exploration()
-        waiting_robots = TeamState(tuple(self._stages[0].first()), (), self._losses, 0, lossless=True)
-        _, first, found.fault = self._started(waiting_robots)
+        _, first, found.fault = self.start()
         if found.fault:
             return found
         self._before = {first: None}
@@ -168,16 +180,14 @@ class StateGraph:
 
     def _explored(self, state: TeamState, found: Exploration, waiting: deque[TeamState]) -> tuple[str, Delivery | None]:
         """Add the states after `state` to `waiting`. Return its fault, if any, and the faulty delivery."""
-        stage = self._stages[state.stage]
-        robots = [robot.states[number] for robot, number in zip(stage.robots, state.robots, strict=True)]
-        fault = stage.judge.on_the_way(robots) if self._is_judged(state) else ""
+        fault = self.fault_on_the_way(state)
         if fault:
             return fault, None
         self._explored_states.add(state)
         moves = self._chosen(state)
         if not moves:
             found.ends += 1
-            fault = stage.judge.at_the_end(robots, self._witness(state), self._losses - state.losses)
+            fault = self.fault_at_the_end(state)
             if fault:
                 return fault, None
         moves += self._changes(state, is_over=not moves)
@@ -189,6 +199,49 @@ class StateGraph:
                 self._before[after] = state, delivery
                 waiting.append(after)
         return "", None
+
+    # What is in a state
+
+    def stage_of(self, state: TeamState) -> Stage:
+        """Return the robots, and what must hold."""
+        return self._stages[state.stage]
+
+    def robots_in(self, state: TeamState) -> list[LocalState]:
+        """Return the state of each robot."""
+        robots = self._stages[state.stage].robots
+        return [robot.states[number] for robot, number in zip(robots, state.robots, strict=True)]
+
+    def content(self, number: int) -> bytes:
+        """Return the content of a message in a queue. `number` is not `LOST`."""
+        return self._contents[number]
+
+    def fault_on_the_way(self, state: TeamState) -> str:
+        """Return the fault in a state at any time; empty if there is none."""
+        return self._stages[state.stage].judge.on_the_way(self.robots_in(state)) if self._is_judged(state) else ""
+
+    def fault_at_the_end(self, state: TeamState) -> str:
+        """Return the fault in a state in which the search is over; empty if there is none."""
+        judge = self._stages[state.stage].judge
+        return judge.at_the_end(self.robots_in(state), self.witness(state), self._losses - state.losses)
+
+    def is_end(self, state: TeamState) -> bool:
+        """Return whether the search is over: no message arrives any more."""
+        return next(self._moves(state), None) is None
+
+    def moves(self, state: TeamState) -> Iterator[Move]:
+        """Yield every possible step, also those that are not explored because they commute."""
+        deliveries = [*self._moves(state)]
+        yield from deliveries
+        yield from self._changes(state, is_over=not deliveries)
+
+    def along(self, path: Sequence[Delivery]) -> list[TeamState]:
+        """Return the states before the steps on `path`, and the state after them; none if a robot cannot start."""
+        _, state, refusal = self.start()
+        states = [] if refusal else [state]
+        for delivery in path:
+            state = next(move.state for move in self.moves(state) if move.delivery == delivery)
+            states.append(state)
+        return states
 
     def _path(self, state: TeamState) -> list[Delivery]:
         """Return the deliveries from the start to `state`."""
@@ -217,7 +270,7 @@ class StateGraph:
                 return True
         return False
 
-    def _witness(self, state: TeamState) -> int | None:
+    def witness(self, state: TeamState) -> int | None:
         """Return the robot that has concluded the search alone; None if there is none."""
         robots = self._stages[state.stage].robots
         for place, number in enumerate(state.robots):
@@ -227,15 +280,19 @@ class StateGraph:
 
     def _is_over(self, state: TeamState) -> bool:
         """Return whether a robot has concluded the search, and no other robot takes a step after that."""
-        return (self._ends_at_once or state.lossless is not None) and self._witness(state) is not None
+        return (self._ends_at_once or state.lossless is not None) and self.witness(state) is not None
 
     def _is_judged(self, state: TeamState) -> bool:
         """Return whether what the robots know is used: from their start on, or if a verdict is still valid."""
-        return state.lossless is None or self._witness(state) is not None
+        return state.lossless is None or self.witness(state) is not None
 
     # Steps
 
-    def _started(self, state: TeamState) -> _Move:
+    def start(self) -> Move:
+        """Return the step in which all robots start."""
+        return self._started(TeamState(tuple(self._stages[0].first()), (), self._losses, 0, lossless=True))
+
+    def _started(self, state: TeamState) -> Move:
         """Return the step in which all robots start."""
         numbers, queues = [], dict[Channel, tuple[int, ...]]()
         delivery = Delivery(starts=True)
@@ -243,11 +300,11 @@ class StateGraph:
             step = robot.start(number, lossless=bool(state.lossless))
             refusal = step.refusal or self._send(place, step, queues, state)
             if refusal:
-                return _Move(delivery, state, refusal)
+                return Move(delivery, state, refusal)
             numbers.append(step.state)
-        return _Move(delivery, _state(numbers, queues, state._replace(lossless=None)))
+        return Move(delivery, _state(numbers, queues, state._replace(lossless=None)))
 
-    def _changes(self, state: TeamState, *, is_over: bool) -> Iterator[_Move]:
+    def _changes(self, state: TeamState, *, is_over: bool) -> Iterator[Move]:
         """Yield each step in which the problem changes. `is_over`: the search is over in `state`.
 
         Messages in transit are dropped. Nothing was lost if the search had become quiescent, and this was noticed
@@ -257,7 +314,7 @@ class StateGraph:
         for change in stage.changes:
             if state.lossless is not None:
                 known = {state.lossless}
-            elif is_over and not change.lost and not self._losses and self._witness(state) is None:
+            elif is_over and not change.lost and not self._losses and self.witness(state) is None:
                 known = {True, False}
             else:
                 known = {False}
@@ -270,9 +327,9 @@ class StateGraph:
             refusal = next((step.refusal for step in steps if step.refusal), "")
             for lossless in sorted(known):
                 delivery = Delivery(change=change, lossless=lossless and state.lossless is None)
-                yield _Move(delivery, TeamState(robots, (), state.losses, number, lossless), refusal)
+                yield Move(delivery, TeamState(robots, (), state.losses, number, lossless), refusal)
 
-    def _chosen(self, state: TeamState) -> list[_Move]:
+    def _chosen(self, state: TeamState) -> list[Move]:
         """Return the steps from `state` that must be explored; none if the search is over.
 
         Deliveries to different robots commute. So it is enough to explore the deliveries to one robot, if every robot
@@ -291,9 +348,9 @@ class StateGraph:
         """Return whether some steps may be left out: the problem may not change in a state that they lead to."""
         return self._reduced and state.lossless is None and not self._stages[state.stage].changes
 
-    def _again(self, state: TeamState) -> Iterator[_Move]:
+    def _again(self, state: TeamState) -> Iterator[Move]:
         """Yield the steps from `state` once more. After a conclusion, none of them is a delivery."""
-        deliveries = [] if self._witness(state) is not None else [*self._moves(state, self._only.get(state))]
+        deliveries = [] if self.witness(state) is not None else [*self._moves(state, self._only.get(state))]
         yield from deliveries
         yield from self._changes(state, is_over=not deliveries)
 
@@ -310,7 +367,7 @@ class StateGraph:
             if all((receiver, writer) in full for writer in stage.writers[receiver] & found):
                 yield receiver
 
-    def _moves(self, state: TeamState, only: int | None = None) -> Iterator[_Move]:
+    def _moves(self, state: TeamState, only: int | None = None) -> Iterator[Move]:
         """Yield each possible step from `state`, or to one receiver; none if the search is over."""
         if self._is_over(state):
             return
@@ -343,7 +400,7 @@ class StateGraph:
 
     def _received(
         self, state: TeamState, receiver: int, packet: Sequence[Channel], queues: Mapping[Channel, tuple[int, ...]]
-    ) -> _Move:
+    ) -> Move:
         """Return the step in which `receiver` receives the next message of each channel in `packet`."""
         stage = self._stages[state.stage]
         after = dict(queues)
@@ -357,33 +414,36 @@ class StateGraph:
         step = stage.robots[receiver].packet(state.robots[receiver], tuple(received))
         refusal = step.refusal or self._send(receiver, step, after, state)
         if refusal:
-            return _Move(delivery, state, refusal)
+            return Move(delivery, state, refusal)
         robots = (*state.robots[:receiver], step.state, *state.robots[receiver + 1 :])
-        return _Move(delivery, _state(robots, after, state))
+        return Move(delivery, _state(robots, after, state))
 
-    def _lost(self, state: TeamState, channel: Channel, queues: Mapping[Channel, tuple[int, ...]]) -> _Move:
+    def _lost(self, state: TeamState, channel: Channel, queues: Mapping[Channel, tuple[int, ...]]) -> Move:
         """Return the step in which the next message of `channel` is lost."""
         queue = queues[channel]
         missing = next(place for place, number in enumerate(queue) if number != LOST)
         after = {**queues, channel: (*queue[:missing], LOST, *queue[missing + 1 :])}
         names = self._stages[state.stage].names
         delivery = Delivery(names[channel[0]], (names[channel[1]],), lost=True)
-        return _Move(delivery, _state(state.robots, after, state._replace(losses=state.losses - 1)))
+        return Move(delivery, _state(state.robots, after, state._replace(losses=state.losses - 1)))
 
-    def _went_on(self, state: TeamState, queues: dict[Channel, tuple[int, ...]]) -> Iterator[_Move]:
+    def _went_on(self, state: TeamState, queues: dict[Channel, tuple[int, ...]]) -> Iterator[Move]:
         """Yield the step in which all robots continue without lost messages, if any robot does."""
         numbers, went = [*state.robots], False
         for place, robot in enumerate(self._stages[state.stage].robots):
             step = robot.go_on(numbers[place])
+            if step is not None and step.refusal:
+                yield Move(Delivery(), state, step.refusal)
+                return
             if step is not None:
                 went = True
                 numbers[place] = step.state
                 refusal = self._send(place, step, queues, state)
                 if refusal:
-                    yield _Move(Delivery(), state, refusal)
+                    yield Move(Delivery(), state, refusal)
                     return
         if went:
-            yield _Move(Delivery(), _state(numbers, queues, state))
+            yield Move(Delivery(), _state(numbers, queues, state))
 
     def _send(self, sender: int, step: Step, queues: dict[Channel, tuple[int, ...]], state: TeamState) -> str:
         """Append the messages of a step to the queues. Return why it is not possible, or an empty text."""
@@ -391,6 +451,8 @@ class StateGraph:
         for receiver, content in step.sent:
             if receiver not in stage.places:
                 return f"{stage.names[sender]} sends a message to {receiver}, which is not in the team"
+            if sender not in stage.writers[stage.places[receiver]] and not stage.traits.writes_to_non_neighbours:
+                return f"{stage.names[sender]} sends a message to {receiver}, {NOT_A_NEIGHBOUR}"
             number = self._numbers.setdefault(content, len(self._contents))
             if number == len(self._contents):
                 self._contents.append(content)

@@ -12,6 +12,7 @@ import msgspec
 
 from robochoc.journal.events import AnyEvent, Began, Given, Sent, actor
 from robochoc.journal.journal import Header, Journal
+from robochoc.protocols.protocol import Protocol
 from robochoc.replay.inspection import Inspector, safely
 from robochoc.replay.reasons import Reasons
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RecordedTeams, ReplayOptions
@@ -46,6 +47,18 @@ class RobotState(msgspec.Struct, frozen=True, kw_only=True):
     nogoods: list[str] = []
     more: dict[str, str] = {}
     why: list[str] = []
+
+
+def inspected(inspector: Inspector, protocol: Protocol, step: int = 0) -> RobotState:
+    """Return the state of a robot after its step number `step`, without reasons for a change."""
+    return RobotState(
+        step=step,
+        value=dict(protocol.assignment),
+        view=safely(lambda: inspector.view(protocol), []),
+        domain=[ValueState(*pair) for pair in safely(lambda: inspector.domain(protocol), [])],
+        nogoods=safely(lambda: inspector.nogoods(protocol), []),
+        more=inspector.more(protocol),
+    )
 
 
 def states_of(
@@ -193,15 +206,8 @@ class _Player:
             inspector.record_received(sent.sender, message)
         if reasons is None:
             return None
-        return RobotState(
-            step=number,
-            value=dict(protocol.assignment),
-            view=safely(lambda: inspector.view(protocol), []),
-            domain=[ValueState(*pair) for pair in safely(lambda: inspector.domain(protocol), [])],
-            nogoods=safely(lambda: inspector.nogoods(protocol), []),
-            more=inspector.more(protocol),
-            why=safely(lambda: reasons.lines(received, step), []),
-        )
+        state = inspected(inspector, protocol, number)
+        return msgspec.structs.replace(state, why=safely(lambda: reasons.lines(received, step), []))
 
     def _last(self, step: RecordedStep, why: str) -> RobotState | None:
         """Return a last state that contains only the reason why the replay ends."""

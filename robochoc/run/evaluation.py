@@ -24,6 +24,7 @@ from robochoc.run.starts import robots_values
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
 from robochoc.system.lazy_dataclass import dataclass
+from robochoc.system.plain_text import counted
 from robochoc.verification.checker import (
     RefutedError,
     assignment_cost,
@@ -324,7 +325,8 @@ def check_assignment(
             f"{name} has withdrawn and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
         ]
     if faults:
-        raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
+        many = counted(len(faults), "objection")
+        raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({many})")
 
 
 def _verdict_of(phase: RunPhase, result: SearchResult, kind: ProblemKind, found: Answer) -> Verdict:

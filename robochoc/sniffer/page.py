@@ -42,13 +42,18 @@ def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title:
         scripts += [labels_script(), viewer_script()]  # at the end, so that the page does not wait for them
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy(scripts, connections)}">\n'
-        f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'
+        f'<link rel="icon" href="data:,">\n<style>\n{base_style()}{_asset("style.css")}</style>\n'
     )
     body = [_block(name, content) for name, content in answers.items()] + [_script(script) for script in scripts]
     before, _, after = _asset("index.html").partition(_TITLE)
     top, _, middle = after.partition("</head>")
     document = [before, f"<title>{escape(printable(title))}</title>", top, head, "</head>"]
     return "".join([*document, middle.replace("</body>", "\n".join([*body, "</body>"]))]).encode()
+
+
+def base_style() -> str:
+    """Return the style that the pages of this package share: colours, text, buttons."""
+    return _asset("base.css")
 
 
 def _script(script: str) -> str:

@@ -10,8 +10,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, overload
 
-import msgspec
-
 from robochoc.formats import InvalidInputError
 from robochoc.journal.entries import Header, JournalEntry
 from robochoc.journal.events import Began, Given, Sent
@@ -20,9 +18,9 @@ from robochoc.model.problem import Team
 from robochoc.protocols.acts import INFORM
 from robochoc.protocols.message import Message
 from robochoc.protocols.wording import Wording
+from robochoc.replay.run_names import RunNames, run_names
+from robochoc.replay.sentences import fields_in_words, sentence_of
 from robochoc.sniffer.recorded_messages import installed_protocol, message_of, types_by_name
-from robochoc.sniffer.team_names import RunNames, run_names
-from robochoc.system.plain_text import MOST_LISTED, listed, printable
 
 ValueLabel = Callable[[str, int], str]
 """Returns the name for a variable's value."""
@@ -125,11 +123,6 @@ class _ValueNames(Sequence[str]):
         return 2**62
 
 
-_MAX_CHARACTERS = 1000
-_MAX_VALUE_CHARACTERS = 60
-_encode = msgspec.json.Encoder(enc_hook=str).encode
-
-
 def sentence(kind: str, content: Mapping[str, Any], words: Wording, message_type: type[Message] | None) -> str:
     """Return a recorded message as a sentence spoken by its sender.
 
@@ -139,37 +132,7 @@ def sentence(kind: str, content: Mapping[str, Any], words: Wording, message_type
         words: The message's sender and receiver, and the names in the team.
         message_type: The message class. None: the protocol is not installed or lacks this type.
     """
-    said = _in_words(content, words, message_type) if message_type else ""
-    text = f"{words.sender} says: {said}" if said else _by_fields(kind, content, words.sender, message_type)
-    return _cut(text if text.isprintable() else printable(text), _MAX_CHARACTERS)
-
-
-def _in_words(content: Mapping[str, Any], words: Wording, message_type: type[Message]) -> str:
-    message = message_of(message_type, content)
-    if message is None:
-        return ""
-    try:
-        return message.in_words(words)
-    except Exception:  # noqa: BLE001 - fields may be altered, and the protocol another package's
-        return ""
-
-
-def _by_fields(kind: str, content: Mapping[str, Any], sender: str, message_type: type[Message] | None) -> str:
-    act = message_type.act if message_type else INFORM
-    fields = [f"{name} = {_cut(_shown(value))}" for name, value in list(content.items())[: MOST_LISTED + 2]]
-    return f"{sender} says {kind} ({act.performative}){f': {listed(fields)}' if fields else ''}"
-
-
-def _shown(value: object) -> str:
-    if isinstance(value, str):
-        return value
-    if isinstance(value, list | tuple | dict) and len(value) > MOST_LISTED:
-        return f"{len(value):,} entries"
-    try:
-        return _encode(value).decode()
-    except (TypeError, ValueError, RecursionError):
-        return type(value).__name__
-
-
-def _cut(text: str, most: int = _MAX_VALUE_CHARACTERS) -> str:
-    return text if len(text) <= most else f"{text[: most - 1]}…"
+    message = message_of(message_type, content) if message_type else None
+    if message is not None:
+        return sentence_of(message, words, content)
+    return fields_in_words(kind, content, words.sender, message_type.act if message_type else INFORM)

@@ -10,6 +10,11 @@ import pytest
 
 from robochoc.formats import write_team
 from robochoc.generators.random_csp import random_csp
+from robochoc.journal.journal import read_journal
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.nogood_messages import Nogood
+from robochoc.sniffer.page_data import PageData
+from robochoc.sniffer.trace import Trace
 from robochoc.system.stopping import STOP
 from tests.support.compiled import plain_python_only
 from tests.support.faults import PROGRAM, running
@@ -74,6 +79,36 @@ def test_a_fault_ends_with_status_4_and_a_journal(tmp_path: Path, monkeypatch: p
     assert done.returncode == 4
     assert "steps: it is a Sunday" in done.stderr
     assert robochoc_within("replay", tmp_path / "fault.journal").returncode == 0
+
+
+def test_a_protocols_fault_is_explained_and_its_journal_is_replayed_sniffed_and_measured(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    answer = vars(ABT)["_resolve_conflict"]
+
+    def without_answer(self: ABT, sender: str, nogood: Nogood) -> None:
+        if self._coherent(nogood):
+            answer(self, sender, nogood)
+
+    monkeypatch.setattr(ABT, "_resolve_conflict", without_answer)
+    journal = tmp_path / "fault.journal"
+    done = robochoc_within("check", "abt", "--teams", 18, "--journal", journal)
+    assert done.returncode == 4
+    assert "\n8. Robot2 receives from Robot3: as long as V1 = 0, V2 cannot be 1\n" in done.stderr
+    assert "Robot3 has V3 = 0. The last steps: Robot3" in " ".join(done.stderr.split())
+    row = json.loads(robochoc_within("check", "abt", "--teams", 18, "--json").stdout.splitlines()[-1])
+    assert row["explanation"].endswith("small-3-2-0-17 has no solution.")
+    assert robochoc_within("replay", journal).returncode == 0
+    assert robochoc_within("privacy", journal).returncode == 0
+    page = PageData(Trace.of(read_journal(journal.read_bytes())))
+    assert "V2 cannot be 1" in page.details(0).decode()
+
+
+def test_the_page_is_that_of_the_first_team_and_does_not_replace_the_journal(tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    assert robochoc_within("check", "abt", *SOME, "--html", page).returncode == 0
+    assert "<title>abt: small-3-2-0-0</title>" in page.read_text()
+    assert robochoc_within("check", "abt", *SOME, "--html", page, "--journal", page).returncode == 2
 
 
 @pytest.mark.parametrize(

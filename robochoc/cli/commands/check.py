@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.paths import InputPath, OutputFile
+from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.solve import protocol_settings, settings_option
 from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
@@ -64,6 +64,10 @@ MOST_ROBOTS, MOST_VALUES = 6, 6
 )  # fmt: skip
 @click.option("--timeout", type=Number(0, min_open=True), metavar="SECONDS", help="Time limit of the command.")
 @click.option("--journal", type=OutputFile(), metavar="FILE", help="Write the run that leads to the first fault.")
+@click.option(
+    "--html", type=OutputFile(), metavar="FILE",
+    help="Write a page on which you choose the next message: of the first faulty team, or of the first team.",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
 @invalid_input_fails
 def check(  # noqa: PLR0913 - options, by name
@@ -84,6 +88,7 @@ def check(  # noqa: PLR0913 - options, by name
     jobs: int | None,
     timeout: float | None,
     journal: Path | None,
+    html: Path | None,
     as_json: bool,
 ) -> None:
     """Explore every order in which messages can arrive, with the code of PROTOCOL that robots run.
@@ -113,6 +118,7 @@ def check(  # noqa: PLR0913 - options, by name
         run = Options(
             protocol=protocol, runtime=Runtime.SIMULATOR, settings=protocol_settings(settings_given), seed=seed
         )
+    refuse_same_places({"--journal": journal, "--html": html}, teams=folders)
     deadline = None if timeout is None else time.monotonic() + timeout
     if protocol in {AUTO, CENTRAL}:
         raise Failure(USAGE, f"{protocol} is not a protocol of robots; name one ('robochoc protocols')")
@@ -126,6 +132,8 @@ def check(  # noqa: PLR0913 - options, by name
                 found = list(_printed(results) if as_json else results)
         if not as_json:
             _print_table(found)
+        if html is not None and found:
+            _write_page(html, found, options)
         _end(found, journal, options, is_late=deadline is not None and time.monotonic() > deadline)
 
 
@@ -173,6 +181,17 @@ def _print_table(found: list[CheckedTeam]) -> None:
     print_table(headings, rows, right=headings[1:-1])
 
 
+def _write_page(page: Path, found: list[CheckedTeam], options: CheckOptions) -> None:
+    """Write the page of the first faulty team, or of the first team."""
+    from robochoc.sniffer.orders_page import orders_page
+    from robochoc.system.files import write_atomically
+
+    team = next((one for one in found if one.exploration.fault), found[0])
+    with errors_as_failures(page):
+        write_atomically(page, orders_page(team, options))
+    click.echo(f"{page}: written; open it in a browser", err=True)
+
+
 def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions, *, is_late: bool) -> None:
     """Report what was found. Raises `Failure` if there is a fault, or if not everything was explored."""
     from robochoc.exploration.counterexample import write_counterexample
@@ -189,7 +208,12 @@ def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions, 
             with errors_as_failures(journal):
                 write_counterexample(journal, first.case, first.exploration.path, options.run)
             click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
-        raise Failure(LOST, "\n".join(f"{one.team.name}: {one.in_words}" for one in faulty))
+        raise Failure(
+            LOST,
+            "\n".join(
+                [f"{first.team.name}: {first.report}", *(f"{one.team.name}: {one.in_words}" for one in faulty[1:])]
+            ),
+        )
     partly = sum(not one.exploration.is_complete for one in found)
     if partly or stop_requested():
         hint = "stopped" if stop_requested() else f"increase {'--timeout' if is_late else '--states'}"

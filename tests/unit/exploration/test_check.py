@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -26,6 +27,8 @@ from robochoc.solver.errors import UnsupportedError
 from robochoc.testing import check_protocol
 from tests.support.compiled import plain_python_only
 from tests.support.examples import count
+from tests.support.faulty_abt import AnyNogood, NoAnswer
+from tests.support.program import ROOT
 
 pytestmark = [plain_python_only, pytest.mark.usefixtures("quick_encryption")]
 
@@ -62,22 +65,6 @@ def test_the_reduced_orders_lead_to_the_same_ends(name: str, packets: bool, monk
     assert all(one.exploration.states <= other.exploration.states * 1.2 for one, other in complete)
 
 
-class AnyNogood(ABT):
-    """Believes every nogood, also obsolete ones."""
-
-    def _coherent(self, nogood: Nogood) -> bool:
-        del nogood
-        return True
-
-
-class NoAnswer(ABT):
-    """Does not repeat its value for robots that have forgotten it."""
-
-    def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        if self._coherent(nogood):
-            super()._resolve_conflict(sender, nogood)
-
-
 class Endless(ABT):
     """Never ends its second step."""
 
@@ -103,8 +90,44 @@ def test_a_planted_fault_is_found_and_its_journal_shows_it(
     received = [(one.receiver, one.sender) for one in journal.events if isinstance(one, Received)]
     path = [(one.receiver, sender) for one in faulty.exploration.path for sender in one.senders]
     assert received == path[: len(received)]
-    with pytest.raises(AssertionError, match=f"{mutant.__name__} on {team.name}, after {len(path)} steps"):
+    with pytest.raises(AssertionError, match=f"{mutant.__name__} on {team.name}, after {len(path)} steps") as raised:
         check_protocol(mutant, [team])
+    assert f"\n{len(path)}. Robot" in str(raised.value)
+    assert raised.match("This is the state after|A solution is|has no solution")
+
+
+def test_the_guide_shows_the_report_of_a_fault() -> None:
+    team = next(itertools.islice(small_teams(NoAnswer.traits, 3, 2, 0), 56, None))
+    (faulty,) = checked([team], CheckOptions(NoAnswer, Options(protocol="abt", runtime=Runtime.SIMULATOR)))
+    assert f"```text\n{team.name}: {faulty.report}\n```" in (ROOT / "docs" / "guides" / "check.md").read_text()
+
+
+class WritesToNobody(ABT):
+    """Sends a message to a robot that does not exist."""
+
+    def start(self) -> None:
+        super().start()
+        self.send("Nobody", Nogood({}, (0,)))
+
+
+class WritesToAll(ABT):
+    """Writes to robots with which it shares no constraint, and does not declare it."""
+
+    traits = replace(ABT.traits, writes_to_non_neighbours=False)
+
+    def start(self) -> None:
+        super().start()
+        for name in self.order.names:
+            self.send(name, Nogood({}, (0,)))
+
+
+@pytest.mark.parametrize(
+    ("mutant", "fault"),
+    [(WritesToNobody, "Nobody, which is not in the team"), (WritesToAll, "shares no constraint; set Traits")],
+)
+def test_a_message_to_a_wrong_receiver_is_a_fault(mutant: type[Protocol], fault: str) -> None:
+    with pytest.raises(AssertionError, match=f"Robot1 sends a message to .*{fault}"):
+        check_protocol(mutant, teams=1)
 
 
 def test_a_step_without_an_end_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
