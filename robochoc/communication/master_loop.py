@@ -93,7 +93,8 @@ class MasterLoop(ABC):
             now = time.monotonic()
             if is_past(deadline):
                 return
-            waits = (TICK_S, None if deadline is None else deadline - now, self._kills.wait_s(now))
+            kill_s = self._kills.wait_s(now) if self.state.searching else None  # only then robots are killed
+            waits = (TICK_S, None if deadline is None else deadline - now, kill_s)
             watch = self.watch if self.state.searching else None
             soon = TICK_S if watch is None else watch.wait_s(now)
             self._serve(min(soon, *(wait for wait in waits if wait is not None)), deadline)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 from random import Random
 
 import pytest
 
 from robochoc.communication.kill_schedule import Kill, KillSchedule
+from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.search_result import RobotsLostError
+from robochoc.communication.search_state import SearchState
 from robochoc.formats import read_team, write_team
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
@@ -95,3 +98,40 @@ def test_the_others_continue_and_it_may_come_back(spares: int, with_files: Team)
     assert outcome.verdict is Verdict.SOLUTION
     assert outcome.epochs[0].lost == ("RA",)
     assert [len(epoch.robots) for epoch in outcome.epochs] == [2, 1 + spares]
+
+
+class _Waits(MasterLoop):
+    """A master that notes how long it waits for messages, and ends after three waits."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.state = SearchState(0, ("R",))
+        self.waits: list[float] = []
+
+    def _serve(self, patience_s: float, deadline: float | None) -> None:  # noqa: ARG002 - it waits for nothing
+        self.waits.append(patience_s)
+
+    def _check_robots(self, now: float) -> None:
+        """All robots are there."""
+
+    def _order_start(self) -> None:
+        """No robot is there to start."""
+
+    def _send_all(self, message: object) -> None:
+        """No robot is there to listen."""
+
+    def wait(self) -> list[float]:
+        self._serve_until(lambda: len(self.waits) == 3, None)
+        return self.waits
+
+
+def test_a_master_does_not_poll_because_of_a_kill_that_is_overdue_between_searches() -> None:
+    """Found by `make simulate`: it used the processor until slow robots were ready for the next epoch."""
+    master, killed = _Waits(), list[str]()
+    kills = KillSchedule([Kill("R", 0.0)])
+    kills.start(time.monotonic())
+    master.schedule_kills(kills, killed.append)
+    assert master.wait() == [TICK_S] * 3
+    master.waits, master.state.searching = [], True
+    assert master.wait()[0] == 0
+    assert killed == ["R"]
