@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from random import Random
@@ -69,4 +70,5 @@ def virtual_time(clock: VirtualClock, seed: int) -> Iterator[None]:
         for name, function in replaced:
             patches.enter_context(patch(name, function))
         patches.enter_context(patch.object(RerootingProtocol, "group", ToyGroup))
+        patches.enter_context(patch.object(logging.getLogger("robochoc"), "disabled", new=True))
         yield

@@ -45,17 +45,13 @@ def drawn_plan(seed: int) -> Plan:
     like = chance.choice(("abt", "syncbb")) if protocol == AUTO else protocol
     traits = protocol_named(like).traits
     team = _team(like, traits, chance)
-    runtime = Runtime.SIMULATOR
+    runtime = chance.choice((Runtime.SIMULATOR, Runtime.PROCESSES))
     options = _options(team, protocol, traits, runtime, chance)
-    scale_s = chance.choice((0.01, 1.0, 60.0, HOUR_S))
-    return Plan(
-        seed,
-        _named_files(team),
-        options,
-        tuple(_faults(scale_s, chance)),
-        tick_s=10 ** chance.uniform(-4, 1.5),
-        delay_s=scale_s * chance.random(),
-    )
+    if runtime == Runtime.SIMULATOR:
+        return Plan(seed, team, options, tuple(_faults(HOUR_S, chance)), tick_s=10 ** chance.uniform(-4, 1.5))
+    scale_s = chance.choice((0.01, 0.1, 1.0, 10.0))
+    faults = (*_faults(scale_s, chance), *_faults_of_robots(team, scale_s, chance))
+    return Plan(seed, _named_files(team), options, faults, tick_s=1e-6, delay_s=scale_s * chance.random())
 
 
 # The problem
@@ -201,11 +197,23 @@ def _settings(protocol: str, chance: Random) -> dict[str, str]:
 
 def _faults(scale_s: float, chance: Random) -> Iterator[Fault]:
     """Yield faults that can happen in every runtime."""
-
-    def moment() -> float:
-        return scale_s * 10 ** chance.uniform(-2, 2)
-
     if chance.random() < 0.2:
-        yield Fault(FaultKind.CLOCK, at_s=moment(), for_s=chance.choice((1.0, HOUR_S, DAY_S)))
+        yield Fault(FaultKind.CLOCK, at_s=_moment(scale_s, chance), for_s=chance.choice((1.0, HOUR_S, DAY_S)))
     if chance.random() < 0.2:
         yield Fault(FaultKind.DISK, size=chance.choice((0, 1, 200, 2_000, 20_000)))
+
+
+def _faults_of_robots(team: Team, scale_s: float, chance: Random) -> Iterator[Fault]:
+    """Yield faults of robots that run as processes."""
+    names = team.order
+    span_s = scale_s * 10 ** chance.uniform(-1, 1.5)
+    shares = {FaultKind.CRASH: 0.2, FaultKind.STOP: 0.2, FaultKind.SLOW: 0.2, FaultKind.PARTITION: 0.2}
+    for kind, share in shares.items():
+        while chance.random() < share:
+            yield Fault(kind, chance.choice(names), _moment(scale_s, chance), span_s)
+    if chance.random() < 0.05:
+        yield Fault(FaultKind.GARBLE, chance.choice(names), size=chance.randint(1, 20))
+
+
+def _moment(scale_s: float, chance: Random) -> float:
+    return scale_s * 10 ** chance.uniform(-2, 2)

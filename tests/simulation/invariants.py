@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -28,25 +28,26 @@ class Finding(NamedTuple):
 
 def violated(plan: Plan, outcome: Outcome) -> Iterator[Finding]:
     """Yield the properties that `outcome` does not have."""
-    protocol = protocol_named(outcome.protocol)
-    limited = is_limited(plan.options) or (plan.options.loss > 0)
-    if not outcome.epochs:
-        now = without_robots(team_after_events(plan.team, 0), outcome.lost)
-        yield from _Judge(now, plan.options, protocol.traits, limited=limited).faults(outcome)
-        return
-    last = outcome.epochs[-1]
-    if (outcome.verdict, outcome.assignment) != (last.verdict, last.assignment) and outcome.verdict != Verdict.UNKNOWN:
-        yield Finding("sum", f"the answer {outcome.verdict} is not that of the last epoch, {last.verdict}")
+    traits = protocol_named(outcome.protocol).traits
+    limited = is_limited(plan.options) or plan.options.loss > 0
     events = 0
     for number, epoch in enumerate(outcome.epochs):
-        now = team_after_events(plan.team, events)
-        now = without_robots(now, [name for name in now.order if name not in epoch.robots])
+        now = _with_robots(team_after_events(plan.team, events), epoch.robots)
         if set(now.order) != set(epoch.robots):
             yield Finding("epoch", f"epoch {number} has the robots {epoch.robots}, expected {now.order}")
         interrupted = limited or bool(epoch.lost) or number < len(plan.team.scenario)
-        for found in _Judge(now, plan.options, protocol.traits, limited=interrupted).faults(epoch):
+        for found in _Judge(now, plan.options, traits, limited=interrupted).faults(epoch):
             yield Finding(found.kind, f"epoch {number}: {found.detail}")
         events += not epoch.lost
+    last = team_after_events(plan.team, max(0, events - 1))
+    present = outcome.epochs[-1].robots if outcome.epochs else last.order
+    now = _with_robots(last, [name for name in present if name not in outcome.lost])
+    yield from _Judge(now, plan.options, traits, limited=limited).faults(outcome)
+
+
+def _with_robots(team: Team, names: Collection[str]) -> Team:
+    """Return `team` without the robots that are not in `names`."""
+    return without_robots(team, [name for name in team.order if name not in names])
 
 
 def is_limited(options: Options) -> bool:

@@ -21,7 +21,7 @@ from tests.simulation.plan import FIXED, Plan, changed_options
 from tests.simulation.playing import FullDisk, examine
 from tests.support.compiled import plain_python_only
 
-SEEDS = 30
+SEEDS = 16
 
 
 def test_no_seed_has_a_finding() -> None:

@@ -98,15 +98,18 @@ class QueueRobot(RobotLoop):
     def run(self) -> None:
         """Handle events until the parent closes the pipe or is gone."""
         while self._running:
-            actions = self._watch.wait(self._patience_s if self.is_restless else None)
-            if not actions:
-                self.report_idle()
-                self._patience_s = min(2 * self._patience_s, MOST_IDLE_S)
-                continue
-            packet: list[Envelope] = []
-            for act in actions:
-                act(packet)
-            self.receive(packet)
+            self.turn(self._watch.wait(self._patience_s if self.is_restless else None))
+
+    def turn(self, actions: Sequence[Action]) -> None:
+        """Handle the events that were waiting; without any, report that the robot is idle."""
+        if not actions:
+            self.report_idle()
+            self._patience_s = min(2 * self._patience_s, MOST_IDLE_S)
+            return
+        packet: list[Envelope] = []
+        for act in actions:
+            act(packet)
+        self.receive(packet)
 
     # Messages
 

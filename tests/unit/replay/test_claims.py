@@ -183,7 +183,7 @@ def test_processes_that_a_deadline_ends_may_have_told_less_than_they_did_and_not
 
 
 def test_final_answers_are_not_compared_with_the_best_ones() -> None:
-    """Found by `make simulate`, seed 0."""
+    """Found by `make simulate`."""
     compared = 0
     for seed in range(20):
         team = random_csp(5, 3, 0.7, 0.1, seed=seed, max_cost=9)
@@ -199,7 +199,7 @@ def test_final_answers_are_not_compared_with_the_best_ones() -> None:
 
 
 def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> None:
-    """Found by `make simulate`, seed 215: the last values violate a constraint, earlier ones did not."""
+    """Found by `make simulate`: the last values violate a constraint, earlier ones did not."""
     options = Options(protocol="async-maxsum", runtime=Runtime.SIMULATOR, cache=False)
     earlier = 0
     for number in range(25):
