@@ -11,7 +11,9 @@ from typing import NamedTuple
 
 from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_events
 from robochoc.exploration.explanation import explanation_of
+from robochoc.exploration.random_runs import play_random_runs
 from robochoc.exploration.state_graph import Exploration, StateGraph
+from robochoc.generators.draws import seeded
 from robochoc.model.costs import normalized
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
@@ -85,6 +87,8 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
     found = graph.explore(options.states, is_over)
     if found.is_cyclic and case.phase.traits.complete and not found.fault:
         found.fault = ENDLESS
+    if not (found.is_complete or found.fault):
+        play_random_runs(graph, found, seeded(options.run.seed), options.states, is_over)
     if found.fault:
         found.explanation = explanation_of(found, graph)
     return found
@@ -122,7 +126,8 @@ class CheckedTeam(NamedTuple):
         if found.fault:
             return f"after {counted(len(found.path), 'step')}: {found.fault}" if found.path else found.fault
         if not found.is_complete:
-            return "no fault so far; not all states were explored"
+            runs = f", nor in {counted(found.random_runs, 'random run')}" if found.random_runs else ""
+            return f"no fault so far{runs}; not all states were explored"
         return "no fault in any order of deliveries"
 
     @property
@@ -148,6 +153,7 @@ class CheckedTeam(NamedTuple):
             "local_states": found.local_states,
             "complete": found.is_complete,
             "cyclic": found.is_cyclic,
+            "random_runs": found.random_runs,
             "fault": found.fault or None,
             "explanation": found.explanation.text or None,
             "path": [delivery.as_dict() for delivery in found.path],

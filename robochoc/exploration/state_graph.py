@@ -104,6 +104,7 @@ class Exploration:
         is_complete: True if nothing is left to explore.
         is_cyclic: True if there is an order of deliveries in which the robots continue forever although each message
             arrives. None: unknown.
+        random_runs: The number of runs in random orders, played because something is left to explore.
         fault: The fault that ended it; empty if there is none.
         path: The deliveries from the start to the fault.
         explanation: The fault in words.
@@ -115,6 +116,7 @@ class Exploration:
     local_states: int = 0
     is_complete: bool = False
     is_cyclic: bool | None = None
+    random_runs: int = 0
     fault: str = ""
     path: Sequence[Delivery] = ()
     explanation: Explanation = NO_EXPLANATION

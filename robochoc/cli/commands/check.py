@@ -93,9 +93,9 @@ def check(  # noqa: PLR0913 - options, by name
 ) -> None:
     """Explore every order in which messages can arrive, with the code of PROTOCOL that robots run.
 
-    Each state of a team, and each order of deliveries, is visited once, up to --states. In each of them must hold:
-    verdicts are right, bounds too, no robot refuses a message, and a complete protocol ends with an answer. The teams
-    are small and random, or those in TEAM.
+    Each state of a team, and each order of deliveries, is visited once, up to --states; a team with more states is also
+    played in random orders. In each state must hold: verdicts are right, bounds too, no robot refuses a message, and a
+    complete protocol ends with an answer. The teams are small and random, or those in TEAM.
 
     The table has the number of states, of steps between them, of states in which the search is over, and whether all
     states were explored. Exit status: 0 without a fault if all were, 3 if not; 4 with a fault.

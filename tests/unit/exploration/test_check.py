@@ -18,6 +18,8 @@ from robochoc.exploration.problems import small_teams
 from robochoc.exploration.state_graph import StateGraph
 from robochoc.journal.events import Received
 from robochoc.journal.journal import read_journal
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization.adopt import ADOPT
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
@@ -188,3 +190,22 @@ def test_after_the_deadline_nothing_counts_as_explored() -> None:
     run = Options(protocol="abt", runtime=Runtime.SIMULATOR)
     late = [*checked(itertools.islice(small_teams(ABT.traits, 3, 2, 0), 3), CheckOptions(ABT, run), deadline=0)]
     assert [one.exploration.is_complete for one in late] == [False] * 3
+
+
+class EarlyEnd(ADOPT):
+    """Ends the search as soon as the threshold is its lower bound."""
+
+    def act(self) -> None:
+        self.ub = self.lb if self.ub < INFINITE else self.ub
+        super().act()
+
+
+def test_random_runs_reach_the_ends_that_the_search_does_not_reach() -> None:
+    team = next(itertools.islice(small_teams(ADOPT.traits, 3, 2, 0), 2, None))
+    run = Options(protocol="adopt", runtime=Runtime.SIMULATOR)
+    (partly,) = checked([team], CheckOptions(ADOPT, run, 400))
+    assert partly.exploration.random_runs > 0
+    assert "nor in" in partly.in_words
+    (faulty,) = checked([team], CheckOptions(EarlyEnd, run, 400))
+    assert faulty.exploration.states == partly.exploration.states
+    assert faulty.exploration.fault.startswith("the verdict is optimal")
