@@ -183,7 +183,7 @@ class EpochStage(Stage):
         for robot in self.robots:
             place = before.places.get(robot.name)
             if place is None or robot.name in self._epoch.restarted:
-                steps.append(robot.first())
+                steps.append(robot.first)
             else:
                 steps.append(robot.changed(before.robots[place], robots[place], partial(self._change, robot.name)))
         return steps

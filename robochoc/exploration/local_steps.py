@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from copy import deepcopy
+from functools import cached_property
 from typing import NamedTuple
 
 from robochoc.communication.host import BadMessageError, Host
@@ -68,8 +69,9 @@ class LocalSteps:
         self._changed: dict[int, Step] = {}
         self.states: list[LocalState] = []
 
+    @cached_property
     def first(self) -> Step:
-        """Return the state of a robot that has no knowledge and is not started yet."""
+        """The state of a robot that has no knowledge and is not started yet."""
         return self._waiting(self._first)
 
     def changed(self, before: LocalSteps, state: int, change: Callable[[Host], None]) -> Step:
@@ -118,8 +120,6 @@ class LocalSteps:
         return None if step is ends else step
 
     def _computed(self, state: int, packet: Sequence[Received]) -> Step:
-        if self.states[state].verdict is not None:  # the search is over, and the robot will hear it
-            return Step(state)
         host = deepcopy(self.hosts[state])
         host.clock = 0
 

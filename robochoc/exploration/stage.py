@@ -94,7 +94,7 @@ class Stage:
 
     def first(self) -> list[int]:
         """Return the states of robots that have no knowledge and are not started."""
-        return [robot.first().state for robot in self.robots]
+        return [robot.first.state for robot in self.robots]
 
     def adopted(self, before: Stage, robots: Sequence[int]) -> list[Step]:
         """Return the state of each robot before its start in this stage, after the states `robots` of `before`."""

@@ -187,7 +187,7 @@ class StateGraph:
             return fault, None
         self._explored_states.add(state)
         moves = self._chosen(state)
-        if not moves:
+        if not moves or self._is_over(state):
             found.ends += 1
             fault = self.fault_at_the_end(state)
             if fault:
@@ -228,7 +228,7 @@ class StateGraph:
 
     def is_end(self, state: TeamState) -> bool:
         """Return whether the search is over: no message arrives any more."""
-        return next(self._moves(state), None) is None
+        return self._is_over(state) or next(self._moves(state), None) is None
 
     def moves(self, state: TeamState) -> Iterator[Move]:
         """Yield every possible step, also those that are not explored because they commute."""
@@ -281,8 +281,12 @@ class StateGraph:
         return None
 
     def _is_over(self, state: TeamState) -> bool:
-        """Return whether a robot has concluded the search, and no other robot takes a step after that."""
+        """Return whether a robot has concluded the search, so that the values of all robots count at once."""
         return (self._ends_at_once or state.lossless is not None) and self.witness(state) is not None
+
+    def _goes_on(self, state: TeamState) -> bool:
+        """Return whether the robots that have started continue until they hear of a conclusion: a change may follow."""
+        return state.lossless is None and bool(self._stages[state.stage].changes)
 
     def _is_judged(self, state: TeamState) -> bool:
         """Return whether what the robots know is used: from their start on, or if a verdict is still valid."""
@@ -371,7 +375,7 @@ class StateGraph:
 
     def _moves(self, state: TeamState, only: int | None = None) -> Iterator[Move]:
         """Yield each possible step from `state`, or to one receiver; none if the search is over."""
-        if self._is_over(state):
+        if self._is_over(state) and not self._goes_on(state):
             return
         if state.lossless is not None:
             yield self._started(state)

@@ -21,9 +21,11 @@ from robochoc.journal.events import AnyEvent, Began, Lost, Received
 from robochoc.journal.journal import read_journal
 from robochoc.model.problem import Team
 from robochoc.protocols.inference.s_dpop import SDPOP
+from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.dynabt import DynABT
+from robochoc.protocols.traits import ENDS_WITH_EITHER
 from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.errors import UnsupportedError
@@ -169,6 +171,33 @@ def test_the_events_are_those_of_the_scenario() -> None:
     assert check_protocol(DynABT, [team]) < check_protocol(DynABT, [team], events=1)
     assert check_protocol(DynABT, [team], events=1) < check_protocol(DynABT, [team], events=3)
     assert check_protocol(DynABT, [team], events=3) == check_protocol(DynABT, [team], events=4)
+
+
+class EndsAtOnce(DynABT):
+    """May also conclude a solution: then the values of all robots count at once."""
+
+    traits = replace(DynABT.traits, concludes=ENDS_WITH_EITHER)
+
+
+def test_robots_continue_after_a_conclusion_until_the_problem_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    teams = first_teams(DynABT, 1, 56)
+    states = check_protocol(EndsAtOnce, teams, events=1, states=2000)
+    monkeypatch.setattr("robochoc.exploration.state_graph.StateGraph._goes_on", lambda *_: False)
+    assert check_protocol(EndsAtOnce, teams, events=1, states=2000) < states
+
+
+class FailsAfterConclusion(DynABT):
+    """Cannot use messages that arrive after its conclusion."""
+
+    def receive(self, sender: str, message: Message) -> None:
+        if self.verdict is not None:
+            raise ValueError("it is over")
+        super().receive(sender, message)
+
+
+def test_a_robot_that_has_concluded_the_search_still_receives_messages() -> None:
+    with pytest.raises(AssertionError, match="it is over"):
+        check_protocol(FailsAfterConclusion, teams=60)
 
 
 @pytest.mark.parametrize(
