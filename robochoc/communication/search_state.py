@@ -178,8 +178,11 @@ class SearchState:
         return tuple(sorted(self._present - self._reports.keys()))
 
     def result(self, wall_s: float) -> SearchResult:
-        """Return the result of the search, which lasted `wall_s` seconds."""
-        settled = self.verdict is not None and not self.lost
+        """Return the result of the search, which lasted `wall_s` seconds.
+
+        A verdict counts only if no robot is lost and all have reported: their values and lost messages belong to it.
+        """
+        settled = self.verdict is not None and not self.lost and not self.pending_reports
         result = SearchResult.of(
             self.verdict if self.verdict is not None and settled else Verdict.UNKNOWN,
             self.witness if settled else None,

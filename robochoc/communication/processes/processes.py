@@ -124,7 +124,7 @@ class ProcessesRun(Session, MasterLoop):
             self._search_until(deadline)
             if self.state.ordered:
                 self._lossless = self.state.counters.quiescent and not self.state.broken_off and not self._drops
-            return self._finish(began, late=is_past(deadline) or self.is_to_stop)
+            return self._finish(began, late=is_past(self._limit) or self.is_to_stop)
         except RobotsLostError as lost:
             for name, why in lost.robots.items():
                 self._observe(Lost(t=self._now(), robot=name, why=why))
@@ -299,7 +299,7 @@ class ProcessesRun(Session, MasterLoop):
         self._send_all(Pause())
         self._await_reports(late=late)
         silent = self._silent()
-        if silent and not late and not (self.state.verdict is None and is_past(self._deadline)):
+        if silent and not late and not is_past(self._limit):
             if not self._survive:
                 raise RobotsLostError(dict.fromkeys(silent, "it did not report at the end"))
             for name in silent:
@@ -313,16 +313,16 @@ class ProcessesRun(Session, MasterLoop):
         `BUSY_REPORTS_S`. The wait for a stopped robot ends after the patience. Robots are checked twice, since a robot
         that has just reported does not compute either.
         """
-        began = time.monotonic()
+        began, limit = time.monotonic(), self._limit
         before, idle = len(self._silent()), False
         while True:
             now = time.monotonic()
             until = now + (LATE_REPORTS_S if late or idle else REPORTS_S)
-            if self._deadline is not None:
-                until = min(until, max(self._deadline, now + LATE_REPORTS_S))
+            if limit is not None:
+                until = min(until, max(limit, now + LATE_REPORTS_S))
             self._serve_until(lambda: not self._silent(), until)
             silent = [self._pool.robots[name] for name in self._silent()]
-            if late or is_past(self._deadline):
+            if late or is_past(limit):
                 return
             if len(silent) < before or any(robot.status is ProcessStatus.STOPPED for robot in silent):
                 before, idle = len(silent), False
@@ -331,6 +331,11 @@ class ProcessesRun(Session, MasterLoop):
             was_idle, idle = idle, not any(robot.is_computing for robot in silent)
             if enough or (was_idle and idle):
                 return
+
+    @property
+    def _limit(self) -> float | None:
+        """The deadline of a search without a verdict. After a verdict in time, the reports may arrive later."""
+        return None if self.state.verdict is not None else self._deadline
 
     def _silent(self) -> list[str]:
         """Return the robots that have a process and have not reported."""
