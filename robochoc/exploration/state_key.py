@@ -28,7 +28,12 @@ def state_key(protocol: Protocol) -> bytes:
     """Return a key of the protocol object's state."""
     state = {name: part for name, part in vars(protocol).items() if name not in _NOT_STATE}
     state["undeclared"] = protocol.problem.allows_undeclared
-    return blake2b(repr(_canonical(state, (id(protocol),))).encode(), digest_size=16).digest()
+    return content_key(state, (id(protocol),))
+
+
+def content_key(content: object, path: tuple[int, ...] = ()) -> bytes:
+    """Return a key of anything that copies can be made of. `path`: the `id`s of the objects that contain it."""
+    return blake2b(repr(_canonical(content, path)).encode(), digest_size=16).digest()
 
 
 def _canonical(thing: object, path: tuple[int, ...]) -> object:

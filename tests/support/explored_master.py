@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import pickle
 from collections.abc import Callable, Iterator, Sequence
-from types import SimpleNamespace, TracebackType
+from types import TracebackType
 from typing import Any, ClassVar, NamedTuple, cast
 
 import msgspec
@@ -19,7 +19,7 @@ from robochoc.communication.control import FromParent, FromRobot, QueueFrom, Que
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_process import RobotStart
-from robochoc.exploration.state_key import state_key
+from robochoc.exploration.state_key import content_key
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
 
@@ -313,9 +313,7 @@ def _master_state(script: Script, where: object, result: object) -> tuple[Master
     state, robots = run.state, cast("dict[str, _Link]", run._pool.robots)
     links = frozenset(link.id for link in robots.values() if not link.ended)
     content = {name: part for name, part in vars(state).items() if name != "_traits"}
-    everything = SimpleNamespace(
-        where=where, run=_plain(vars(run)), links=sorted(links), now=script.now, result=repr(result), **content
-    )
+    everything = (where, _plain(vars(run)), sorted(links), script.now, repr(result), content)
     view = MasterView(
         state.epoch,
         links,
@@ -327,4 +325,4 @@ def _master_state(script: Script, where: object, result: object) -> tuple[Master
         where == "ended",
         result,
     )
-    return view, state_key(cast("Protocol", everything))
+    return view, content_key(everything)

@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from copy import deepcopy
-from types import SimpleNamespace
 from typing import Any, ClassVar, NamedTuple, cast
 from unittest import mock
 
@@ -22,10 +21,9 @@ from robochoc.communication.host import Host
 from robochoc.communication.processes import processes, robot_process
 from robochoc.communication.processes.queues import Stamped
 from robochoc.communication.processes.robot_process import QueueRobot
-from robochoc.exploration.state_key import state_key
+from robochoc.exploration.state_key import content_key, state_key
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.message import Envelope
-from robochoc.protocols.protocol import Protocol
 from tests.support.explored_master import Output, Pool, Run, Step, start_of
 
 _PARENT = msgspec.msgpack.Decoder(FromParent)
@@ -209,7 +207,7 @@ def _robot_key(robot: QueueRobot) -> bytes:
     host = robot._host
     assert host is not None
     state = {name: part for name, part in vars(robot).items() if name not in _NOT_STATE}
-    return state_key(cast("Protocol", SimpleNamespace(protocol=host.protocol, begun=host._begun, **state)))
+    return content_key((state_key(host.protocol), host._begun, state))
 
 
 def _robot_view(robot: QueueRobot) -> RobotView:
