@@ -12,7 +12,8 @@ from typing import NamedTuple
 from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_events
 from robochoc.exploration.explanation import explanation_of
 from robochoc.exploration.random_runs import play_random_runs
-from robochoc.exploration.state_graph import Exploration, StateGraph
+from robochoc.exploration.state_graph import StateGraph
+from robochoc.exploration.team_state import Exploration
 from robochoc.generators.draws import seeded
 from robochoc.model.costs import normalized
 from robochoc.model.problem import Team

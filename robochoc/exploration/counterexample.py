@@ -20,7 +20,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.exploration.changes import CRASH, Course
 from robochoc.exploration.check import Case
 from robochoc.exploration.local_steps import LONGEST_STEP_S
-from robochoc.exploration.state_graph import Delivery
+from robochoc.exploration.team_state import Delivery
 from robochoc.journal.events import Lost, Observer
 from robochoc.journal.recorder import recorded
 from robochoc.protocols.message import Envelope

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from robochoc.exploration.judgement import values_text
-from robochoc.exploration.state_graph import Explanation, Exploration, StateGraph, TeamState
+from robochoc.exploration.state_graph import StateGraph
 from robochoc.exploration.state_texts import StateTexts
+from robochoc.exploration.team_state import Explanation, Exploration, TeamState
 from robochoc.system.plain_text import counted
 
 LAST_STEPS = 3

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from random import Random
 
-from robochoc.exploration.state_graph import Delivery, Exploration, StateGraph
+from robochoc.exploration.state_graph import StateGraph
+from robochoc.exploration.team_state import Delivery, Exploration
 from robochoc.generators.draws import random_integer
 
 

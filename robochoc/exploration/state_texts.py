@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from robochoc.communication.host import message_decoder
 from robochoc.exploration.stage import Stage
-from robochoc.exploration.state_graph import LOST, Delivery, StateGraph, TeamState
+from robochoc.exploration.state_graph import StateGraph
+from robochoc.exploration.team_state import LOST, Delivery, TeamState
 from robochoc.replay.inspection import safely
 from robochoc.replay.run_names import run_names
 from robochoc.replay.sentences import sentence_of
@@ -26,7 +27,7 @@ class StateTexts:
     def step(self, before: TeamState, delivery: Delivery) -> str:
         """Return a step from the state `before` in words, with its messages."""
         if not delivery.receiver:
-            return delivery.in_words
+            return f"{delivery.in_words[:1].upper()}{delivery.in_words[1:]}"
         places = self._graph.stage_of(before).places
         receiver = places[delivery.receiver]
         waiting = {

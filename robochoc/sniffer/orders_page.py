@@ -16,8 +16,8 @@ import msgspec
 
 from robochoc.exploration.check import CheckedTeam, CheckOptions, graph_of
 from robochoc.exploration.judgement import values_text
-from robochoc.exploration.state_graph import LOST, Delivery, TeamState
 from robochoc.exploration.state_texts import StateTexts
+from robochoc.exploration.team_state import LOST, Delivery, TeamState
 from robochoc.replay.inspection import Inspector
 from robochoc.replay.robot_states import inspected
 from robochoc.sniffer.page import base_style

@@ -114,7 +114,7 @@ def test_lost_messages_and_packets_are_steps_too() -> None:
     data, *_ = page_of(small_team(1, DSA), DSA, losses=1, packets=True, most=200)
     steps = [step for state in data["states"] for step in state["steps"]]
     assert {step["lost"] for step in steps} == {False, True}
-    assert "the robots continue without the messages that they lack" in {step["text"] for step in steps}
+    assert "The robots continue without the messages that they lack" in {step["text"] for step in steps}
 
 
 def test_crashes_and_events_are_steps_and_later_states_have_the_remaining_robots() -> None:
