@@ -22,7 +22,7 @@ from report import Row, table
 from robochoc.exploration.check import CheckOptions, case_of, explore
 from robochoc.exploration.judgement import TeamJudge
 from robochoc.exploration.problems import small_teams
-from robochoc.model.problem import INFINITE, Team
+from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.system.parallel_map import ParallelMap

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import signal
+import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
@@ -192,5 +193,6 @@ def _apply(
     try:
         content: tuple[list[Result], Exception | None] = [function(item, connection.send)], None
     except Exception as error:  # noqa: BLE001 - it is raised in the parent
+        error.add_note(f"In a process of its own:\n{traceback.format_exc()}")
         content = [], error
     connection.send(content)
