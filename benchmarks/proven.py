@@ -132,7 +132,7 @@ def _write_page(rows: Sequence[Found]) -> None:
 
 def _table(found: dict[str, list[Found]]) -> list[Row]:
     head = ("protocol", "problems", "all explored", "solution", "no solution", "optimum", "states", "ends", "CPU s")
-    lines = [(*head, "faults")]
+    lines: list[Row] = [(*head, "faults")]
     everything = [row for rows in found.values() for row in rows]
     for name, rows in [*found.items(), ("**in all**", everything)]:
         whole = [row for row in rows if row["complete"]]

@@ -4,7 +4,8 @@ The answer at the end is evaluated as that of any run (`run/evaluation.py`), and
 
 - a solution satisfies every constraint, `optimal` has the minimum cost, and with `no-solution` there is no solution;
 - a complete protocol ends with an answer, unless a lost message explains that it has none;
-- at any time, the lower bound that the robots report is not above the minimum cost, and no known cost is below it.
+- at any time, the lower bound that the robots report is not above the minimum cost, and no known cost is below it;
+- until a message is lost, the promises of incomplete protocols hold (`promises.py`).
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ from functools import partial
 
 from robochoc.communication.search_result import SearchResult
 from robochoc.exploration.local_steps import LocalState
+from robochoc.exploration.promises import Promises
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE, Assignment, ProblemKind, Team
@@ -47,6 +49,7 @@ class TeamJudge:
         self._compiled, self._phase = compiled, phase
         self.team = compiled.team
         self.minimum, self._best = _cheapest(compiled.team)
+        self._promises = Promises(compiled, phase, self.minimum)
         self._judged: dict[tuple[int, ...], str] = {}
 
     @property
@@ -67,7 +70,7 @@ class TeamJudge:
             self._judged[key] = self._fault_at_the_end(robots, witness, losses)
         return self._judged[key]
 
-    def on_the_way(self, robots: Sequence[LocalState]) -> str:
+    def on_the_way(self, robots: Sequence[LocalState], losses: int) -> str:
         """See `stage.Judge`."""
         if self.minimum < INFINITE and any(one.verdict == Verdict.NO_SOLUTION for one in robots):
             return NO_SOLUTION_IS_WRONG
@@ -77,7 +80,7 @@ class TeamJudge:
         known = [one.findings.best.cost for one in robots if one.findings.best is not None]
         if known and min(known) < self.minimum:
             return f"a robot knows an assignment with the cost {min(known)}, but the minimum cost is {self.minimum}"
-        return ""
+        return "" if losses else self._promises.on_the_way(robots)
 
     def _fault_at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
         try:
@@ -88,7 +91,7 @@ class TeamJudge:
             return "the search is over without an answer, although the protocol is complete"
         if answer.verdict == Verdict.OPTIMAL and answer.cost != user_cost(self._compiled.team, self.minimum):
             return f"the verdict is optimal with the cost {answer.cost}, but the minimum cost is {self.minimum}"
-        return ""
+        return "" if losses or witness is not None else self._promises.at_the_end(robots)
 
     def answer_in_words(self, robots: Sequence[LocalState], witness: int | None) -> str:
         """See `stage.Judge`."""

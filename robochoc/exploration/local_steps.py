@@ -30,11 +30,13 @@ class LocalState(NamedTuple):
         verdict: The verdict that the robot concludes alone; None: the search continues.
         assignment: The values of its variables.
         findings: Its knowledge about the whole search.
+        most_above_bound: See `Protocol.most_above_bound`.
     """
 
     verdict: Verdict | None
     assignment: dict[str, int]
     findings: Findings
+    most_above_bound: float | None
 
 
 class Received(NamedTuple):
@@ -157,5 +159,7 @@ class LocalSteps:
         if number == len(self.hosts):
             self.hosts.append(host)
             protocol = host.protocol
-            self.states.append(LocalState(protocol.verdict, protocol.assignment, protocol.findings))
+            self.states.append(
+                LocalState(protocol.verdict, protocol.assignment, protocol.findings, protocol.most_above_bound)
+            )
         return number

@@ -30,8 +30,8 @@ class Judge(Protocol):
     def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
         """Return the fault when the search is over; empty if there is none. `witness`: the robot that concluded it."""
 
-    def on_the_way(self, robots: Sequence[LocalState]) -> str:
-        """Return the fault in a state at any time; empty if there is none."""
+    def on_the_way(self, robots: Sequence[LocalState], losses: int) -> str:
+        """Return the fault in a state at any time; empty if there is none. `losses`: the number of lost messages."""
 
 
 class Change(NamedTuple):

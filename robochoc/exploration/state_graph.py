@@ -111,7 +111,8 @@ class StateGraph:
 
     def fault_on_the_way(self, state: TeamState) -> str:
         """Return the fault in a state at any time; empty if there is none."""
-        return self._stages[state.stage].judge.on_the_way(self.robots_in(state)) if self._is_judged(state) else ""
+        judge = self._stages[state.stage].judge
+        return judge.on_the_way(self.robots_in(state), self._losses - state.losses) if self._is_judged(state) else ""
 
     def fault_at_the_end(self, state: TeamState) -> str:
         """Return the fault in a state in which the search is over; empty if there is none."""

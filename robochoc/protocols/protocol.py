@@ -113,6 +113,15 @@ class Protocol(ABC):
         """This robot's knowledge about the whole search, except its own value. It may be read at any time."""
         return NO_FINDINGS
 
+    @property
+    def most_above_bound(self) -> float | None:
+        """At the end of the search, the maximum by which the cost of the robots' values exceeds `findings.bound`.
+
+        If several robots report bounds, bounds and excesses are summed. None: the protocol guarantees nothing, or this
+        robot reports no bound.
+        """
+        return None
+
     # Optional: the state that a replay shows (`replay/inspection.py`). The replay finds agent views, nogood stores,
     # contexts and partial assignments by itself. None of these methods may check constraints or change the state.
 

@@ -53,6 +53,12 @@ class Traits:
         congestion: It also accepts task allocations in which several robots may do a task, at a cost for each pair.
         drops_only: The protocol accepts only constraints that are dropped when a robot is absent (`model/absence.py`).
             Its robots withdraw one after the other, so earlier decisions could break a restated constraint.
+        cost_never_rises: The cost never rises from one cycle of the search (`CycleProtocol`) to the next, if no message
+            is lost. Violated hard constraints count first.
+        optimal_groups: If no robot has changed its value in the last cycle, no group of so many robots can lower the
+            cost together: a number, or the name of the setting with the number. 0: this is not guaranteed.
+        share_of_optimum: The profit of an allocation of one task to each robot is at least this share of the maximum.
+            0: there is no guarantee.
         privacy: The information that neighbours do not receive.
         use_when: A short recommendation, for `robochoc protocols`.
     """
@@ -81,6 +87,9 @@ class Traits:
     allocates: bool = False
     congestion: bool = False
     drops_only: bool = False
+    cost_never_rises: bool = False
+    optimal_groups: int | str = 0
+    share_of_optimum: float = 0.0
     privacy: str = ""
     use_when: str = ""
 

@@ -94,6 +94,16 @@ def _costs_by_cycle(compiled: CompiledTeam, trails: Mapping[str, Trail], objecti
         yield objective.cost
 
 
+def shortfalls_by_cycle(
+    compiled: CompiledTeam, trails: Mapping[str, Trail], objective: Objective
+) -> Iterator[tuple[int, float]]:
+    """Yield the number of violated hard constraints and the cost of all others in each cycle, as `costs_by_cycle`."""
+    objective.reset()
+    for changed in _changes(compiled, trails):
+        objective.change(changed)
+        yield objective.shortfall
+
+
 def lower_bound(findings: Mapping[str, Findings]) -> float | None:
     """Return a lower bound of the cost of all assignments, or None if no robot has reported a bound."""
     bounds = [found.bound for found in findings.values() if found.bound is not None]
@@ -158,11 +168,7 @@ def _nearest_cycle(compiled: CompiledTeam, result: SearchResult, objective: Obje
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return
-    objective.reset()
-    shortfalls = []
-    for changed in _changes(compiled, trails):
-        objective.change(changed)
-        shortfalls.append(objective.shortfall)
+    shortfalls = list(shortfalls_by_cycle(compiled, trails, objective))
     if shortfalls:
         own: _Own = {}
         for changed in itertools.islice(_changes(compiled, trails), shortfalls.index(min(shortfalls)) + 1):

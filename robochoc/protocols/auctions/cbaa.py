@@ -100,6 +100,7 @@ class CBAA(Auction):
         writes_to_non_neighbours=False,
         allocates=True,
         privacy="what tasks are worth, but for bids",
+        share_of_optimum=0.5,
         use_when="tasks are to be allocated, one to a robot",
     )
 

@@ -150,6 +150,7 @@ class CBBA(Auction):
         writes_to_non_neighbours=False,
         allocates=True,
         privacy="what tasks are worth, but for bids",
+        share_of_optimum=0.5,
         use_when="tasks are to be allocated, several to a robot",
     )
 

@@ -151,6 +151,11 @@ class BoundedMaxSum(SpanningProtocol):
         """At a root, a lower bound on the cost of the robots in its tree."""
         return Findings(bound=self.optimum)
 
+    @property
+    def most_above_bound(self) -> float | None:
+        """At a root, the weight of all cuts in its tree."""
+        return None if self.optimum is None else self.cut
+
     def start(self) -> None:
         """Send the domain to the holders of this robot's functions."""
         if not self.problem.values:

@@ -380,6 +380,8 @@ class KOpt(CycleProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,
+        cost_never_rises=True,
+        optimal_groups="k",
         use_when="as MGM-2: better answers, more to compute",
     )
 

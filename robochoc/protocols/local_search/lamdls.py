@@ -93,6 +93,7 @@ class LAMDLS(CycleProtocol):
         writes_to_non_neighbours=False,
         bears_loss=True,
         privacy="constraints among others",
+        cost_never_rises=True,
         use_when="as MGM: the cost never rises; half the messages",
     )
 

@@ -121,6 +121,8 @@ class MGM(Gainers):
         writes_to_non_neighbours=False,
         arrays=True,
         bears_loss=True,
+        cost_never_rises=True,
+        optimal_groups=1,
         privacy="constraints among others",
         use_when="as DSA, and the cost never rises; ends in a local optimum",
     )

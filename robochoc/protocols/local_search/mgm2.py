@@ -208,6 +208,7 @@ class MGM2(Gainers):
         writes_to_non_neighbours=False,
         arrays=True,
         bears_loss=True,
+        cost_never_rises=True,
         privacy="constraints among others",
         use_when="as MGM: better answers, more messages",
     )
