@@ -154,7 +154,7 @@ def test_the_journal_of_a_changed_team_can_be_replayed(
 ) -> None:
     seen: list[Team] = []
 
-    def on_the_way(judge: Any, robots: Sequence[Any]) -> str:  # noqa: ANN401 - as in `TeamJudge`
+    def on_the_way(judge: Any, robots: Sequence[Any], _: int) -> str:  # noqa: ANN401 - as in `TeamJudge`
         seen.append(judge._compiled.team)  # noqa: SLF001 - the team that is judged
         return "it is a Sunday" if len(robots) > 1 and seen[-1].robots != seen[0].robots else ""
 

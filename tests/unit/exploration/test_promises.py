@@ -36,11 +36,12 @@ PROMISING = [
 ]
 
 
-def faults(protocol: type[Protocol], teams: int, *, losses: int = 0, **settings: str) -> Iterator[str]:
+def faults(
+    protocol: type[Protocol], teams: int, settings: Mapping[str, str] | None = None, losses: int = 0
+) -> Iterator[str]:
     """Yield the faults in some of `teams`."""
-    if hasattr(protocol.settings, "cycles"):
-        settings = {"cycles": "2", **settings}
-    run = Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR, settings=settings)
+    short = {"cycles": "2"} if hasattr(protocol.settings, "cycles") else {}
+    run = Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR, settings={**short, **(settings or {})})
     problems = itertools.islice(small_teams(protocol.traits, 3, 3, 5), teams)
     options = CheckOptions(protocol, run, states=500, losses=losses)
     return (one.exploration.fault for one in checked(problems, options) if one.exploration.fault)
@@ -112,7 +113,7 @@ class TooSmallGroups(KOpt):
 @pytest.mark.parametrize("mutant", [NeverMoves, TooSmallGroups])
 def test_an_end_that_is_no_local_optimum_is_found(mutant: type[Protocol]) -> None:
     settings = {"k": "1"} if mutant is TooSmallGroups else {}
-    assert any("could lower the cost" in fault for fault in faults(mutant, 30, **settings))
+    assert any("could lower the cost" in fault for fault in faults(mutant, 30, settings))
 
 
 class NoCuts(BoundedMaxSum):
