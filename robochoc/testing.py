@@ -21,13 +21,15 @@ from typing import TypeVar
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.exploration.changes import FaultPlan
-from robochoc.exploration.check import CheckOptions, checked
+from robochoc.exploration.check import CheckOptions, cases_of, checked
+from robochoc.exploration.conformance import fault_in_simulation
 from robochoc.exploration.problems import small_teams
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.options import Options, Runtime
+from robochoc.run.registry import class_fault
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.local_problem import LocalProblem
 from robochoc.verification.checker import violations
@@ -94,12 +96,14 @@ def check_protocol(  # noqa: PLR0913 - options, by name
     crashes: int = 0,
     rejoins: int = 0,
     events: int = 0,
+    runs: int = 20,
     settings: Mapping[str, str] | None = None,
 ) -> int:
-    """Check a protocol in every order in which messages can arrive on small teams: `robochoc check` in one line.
+    """Check a protocol: in every order in which messages can arrive on small teams, and at random on larger ones.
 
-    In each order must hold: verdicts and bounds are right, no robot refuses a message or fails, and a protocol that is
-    `complete` ends with an answer.
+    In each order (`robochoc check`) must hold: verdicts and bounds are right, no robot refuses a message or fails, and
+    a protocol that is `complete` ends with an answer. The same must hold in random runs in the simulator. Besides, a
+    run must be the same again with the same seed, and `in_words` of each message must not fail.
 
     Args:
         protocol: The class of the protocol.
@@ -114,6 +118,8 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         crashes: The maximum number of robots that crash.
         rejoins: The maximum number of robots that crash and are restarted.
         events: The maximum number of events that change the problem: those of a team's scenario, or random ones.
+        runs: The number of random runs: on random teams with up to two more robots and one more value, or on each of
+            `problems`.
         settings: The settings of the protocol, as for `--set`.
 
     Returns:
@@ -121,7 +127,7 @@ def check_protocol(  # noqa: PLR0913 - options, by name
 
     Raises:
         AssertionError: if something does not hold. Its message explains the fault, with the deliveries that lead there.
-        TypeError: if `protocol` is not a class of protocols.
+        TypeError: if `protocol` is not a class of protocols, or lacks a part of one.
         UnsupportedError: if the protocol does not accept one of `problems`, or does not tolerate lost messages, crashes
             or events.
         ValueError: if a number is too small, or no team was checked.
@@ -132,25 +138,37 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         >>> check_protocol(ABT, teams=5)
         196
     """
-    given: object = protocol
-    if not (isinstance(given, type) and issubclass(given, Protocol)):
-        raise TypeError(f"protocol={protocol!r} is not allowed; expected a class of protocols")
     plan = FaultPlan(crashes, rejoins, events)
-    for name, number, least in (
-        ("teams", teams, 1), ("robots", robots, 1), ("values", values, 1), ("states", states, 1), ("losses", losses, 0),
-        *((name, number, 0) for name, number in plan._asdict().items()),
-    ):  # fmt: skip
-        if number < least:
-            raise ValueError(f"{name} is {number}; it must be {least} or more")
+    least_of = {"teams": (teams, 1), "robots": (robots, 1), "values": (values, 1), "states": (states, 1)}
+    others = {"losses": losses, "runs": runs, **plan._asdict()}
+    _refuse_wrong(protocol, least_of | {name: (number, 0) for name, number in others.items()})
     run = Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR, seed=seed, settings=dict(settings or {}))
     options = CheckOptions(protocol, run, states, packets=packets, losses=losses, plan=plan)
     if problems is None:
-        problems = itertools.islice(small_teams(protocol.traits, robots, values, seed), teams)
+        explored = [*itertools.islice(small_teams(protocol.traits, robots, values, seed), teams)]
+        larger = [*itertools.islice(small_teams(protocol.traits, robots + 2, values + 1, seed), runs)]
+    else:
+        explored = [*problems]
+        larger = explored * runs
     total = 0
-    for one in checked(problems, options):
+    for one in checked(explored, options):
         total += one.exploration.states
         if one.exploration.fault:
             raise AssertionError(f"{protocol.__name__} on {one.team.name}, {one.report}")
     if not total:
         raise ValueError("no team was checked")
+    for number, (team, case) in enumerate(cases_of(larger, options)):
+        if fault := fault_in_simulation(case, seed + number):
+            raise AssertionError(f"{protocol.__name__} on {team.name}, in a random run: {fault}")
     return total
+
+
+def _refuse_wrong(protocol: object, numbers: Mapping[str, tuple[int, int]]) -> None:
+    """Raise an error for wrong arguments. `numbers` are the values and the minimum of the others, by name."""
+    if not (isinstance(protocol, type) and issubclass(protocol, Protocol)):
+        raise TypeError(f"protocol={protocol!r} is not allowed; expected a class of protocols")
+    if wrong := class_fault(protocol):
+        raise TypeError(f"{protocol.__name__} {wrong}")
+    for name, (number, least) in numbers.items():
+        if number < least:
+            raise ValueError(f"{name} is {number}; it must be {least} or more")

@@ -195,7 +195,7 @@ def checked(
         return explore(item[1], options, is_over)
 
     with ParallelMap(explored, jobs, show) as processes:
-        for (team, case), exploration in processes.results(_cases(teams, options)):
+        for (team, case), exploration in processes.results(cases_of(teams, options)):
             yield CheckedTeam(team, case, exploration)
 
 
@@ -212,7 +212,7 @@ def _refuse_untolerated(options: CheckOptions) -> None:
         raise UnsupportedError("lost messages cannot be combined with crashes and events: check them one by one")
 
 
-def _cases(teams: Iterable[Team], options: CheckOptions) -> Iterator[tuple[Team, Case]]:
+def cases_of(teams: Iterable[Team], options: CheckOptions) -> Iterator[tuple[Team, Case]]:
     """Yield each of `teams` with its case, unless a robot has no value."""
     for team in teams:
         if stop_requested():

@@ -82,6 +82,15 @@ class TeamJudge:
             return f"a robot knows an assignment with the cost {min(known)}, but the minimum cost is {self.minimum}"
         return "" if losses else self._promises.on_the_way(robots)
 
+    def fault_of_run(self, result: SearchResult, *, is_cut: bool) -> str:
+        """Return the fault of a run; empty if there is none. `is_cut`: a limit ended it, and no answer is required."""
+        names, losses = list(self.team.order), result.metrics.lost_messages
+        verdicts = dict.fromkeys(names) | ({} if result.witness is None else {result.witness: result.verdict})
+        robots = [LocalState(verdicts[name], result.assignments[name], result.findings[name], None) for name in names]
+        witness = None if result.witness is None else names.index(result.witness)
+        fault = self.on_the_way(robots, losses)
+        return fault if fault or is_cut else self._fault_at_the_end(robots, witness, losses)
+
     def _fault_at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
         try:
             answer = self._answer(robots, witness, losses)

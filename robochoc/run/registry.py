@@ -96,7 +96,7 @@ def register(name: str, protocol: type[Protocol]) -> None:
     Raises:
         OptionError: if the class cannot be used, the name is invalid, or an installed package offers the name.
     """
-    if fault := _fault(protocol):
+    if fault := class_fault(protocol):
         raise OptionTypeError(f"{getattr(protocol, '__qualname__', repr(protocol))} {fault}")
     if not _NAME.fullmatch(name):
         raise OptionError(f"{name!r} is not a valid name of a protocol; use letters, digits and hyphens")
@@ -208,11 +208,11 @@ def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str,
 
 
 def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> InstalledProtocol:
-    found = load_entry_point(entry, namesakes, _fault)
+    found = load_entry_point(entry, namesakes, class_fault)
     return InstalledProtocol(entry, cast("type[Protocol] | None", found.what), found.broken)
 
 
-def _fault(loaded: object) -> str:
+def class_fault(loaded: object) -> str:
     """Return the reason why `loaded` cannot be used as a protocol; empty if it can be used."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
         return "is not a subclass of Protocol"

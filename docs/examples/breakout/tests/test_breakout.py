@@ -7,6 +7,7 @@ from random import Random
 
 import pytest
 from graphs import colouring, soluble
+from planted_bug import Forgetful
 from robochoc_breakout import Breakout, Improve, Ok
 
 from robochoc import Verdict, testing
@@ -174,3 +175,14 @@ def _schedule(seed: int) -> Schedule:
 
 def test_no_order_of_messages_leads_to_a_fault() -> None:
     testing.check_protocol(Breakout, states=3000)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_without_delays_the_planted_bug_is_not_found(seed: int) -> None:
+    result = Simulation(soluble(10, 20, Random(seed)), Forgetful, Concurrent(seed)).search(messages=50_000)
+    assert result.verdict is Verdict.SOLUTION
+
+
+def test_the_planted_bug_is_found_in_a_rare_order() -> None:
+    with pytest.raises(AssertionError, match=r"Forgetful on .*, after 10 steps: the checker refutes the answer"):
+        testing.check_protocol(Forgetful, states=3000)
