@@ -8,6 +8,7 @@ Two objects with equal content have the same key, whether or not they are the sa
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from functools import partial
 from hashlib import blake2b
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
@@ -61,6 +62,10 @@ def _parts(thing: Any, canonical: Any) -> list[object]:  # noqa: ANN401 - anythi
         return [thing.__name__, canonical(thing.__self__)]
     if isinstance(thing, np.ndarray):
         return [thing.dtype.str, thing.shape, thing.tobytes()]
-    _, arguments, *content = thing.__reduce_ex__(5)
-    state, items, pairs = (*content, None, None, None)[:3]
-    return [canonical(arguments), canonical(state), *map(canonical, items or ()), *map(canonical, pairs or ())]
+    if is_dataclass(thing):  # without what a frozen object has computed once
+        parts = [getattr(thing, field.name) for field in fields(thing)]
+    else:
+        _, arguments, *content = thing.__reduce_ex__(5)
+        state, items, pairs = (*content, None, None, None)[:3]
+        parts = [arguments, state, *(items or ()), *(pairs or ())]
+    return [canonical(part) for part in parts]

@@ -60,7 +60,8 @@ class NogoodStore:
 
     def __getstate__(self) -> tuple[PriorityOrder, list[LeftSide | None], list[Explanation]]:
         """Return the content of the store, for copies: in a copy, left sides have other `id`s."""
-        return self._order, self._by_value, self._because
+        pairs = zip(self._by_value, self._because, strict=True)
+        return self._order, self._by_value, [NO_EXPLANATION if lhs is None else because for lhs, because in pairs]
 
     def __setstate__(self, state: tuple[PriorityOrder, list[LeftSide | None], list[Explanation]]) -> None:
         order, by_value, because = state

@@ -10,11 +10,16 @@ from typing import Any
 
 import pytest
 
-from robochoc.exploration.changes import FaultPlan
-from robochoc.exploration.check import CheckedTeam, CheckOptions, checked
+from robochoc.communication.host import Host
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.exploration.changes import Course, EpochStage, FaultPlan
+from robochoc.exploration.check import CheckedTeam, CheckOptions, case_of, checked
 from robochoc.exploration.counterexample import write_counterexample
 from robochoc.exploration.judgement import TeamJudge
 from robochoc.exploration.problems import small_teams
+from robochoc.exploration.state_graph import StateGraph
+from robochoc.exploration.state_key import state_key
 from robochoc.generators.random_csp import random_csp
 from robochoc.generators.scenario import random_scenario
 from robochoc.journal.events import AnyEvent, Began, Lost, Received
@@ -219,3 +224,32 @@ def test_lost_messages_are_not_combined_with_changes() -> None:
 
     with pytest.raises(UnsupportedError, match="cannot be combined with crashes and events"):
         check_protocol(Both, losses=1, events=1)
+
+
+@pytest.mark.parametrize("protocol", [DynABT, SDPOP])
+@pytest.mark.parametrize("after", [5, None])
+def test_the_states_of_real_runs_are_explored(protocol: type[Protocol], after: int | None) -> None:
+    compared = 0
+    for number, seed in itertools.product((1, 3, 5), (1, 3)):
+        team = random_scenario(first_teams(protocol, 1, number)[0], 1, 0.1, seed, after=after)
+        case = case_of(team, protocol, Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR))
+        course = Course(case.compiled.team, case.phase, EVENT)
+        graph = StateGraph(EpochStage(course, (), course.start), reduced=False)
+        if not graph.explore(3_000).is_complete:
+            continue
+        compared += 1
+        keys = [[[*map(_key, robot.hosts)] for robot in stage.robots] for stage in graph._stages]  # noqa: SLF001
+        explored = {
+            tuple(known[number] for known, number in zip(keys[state.stage], state.robots, strict=True))
+            for state in graph._before  # noqa: SLF001 - all explored states
+        }
+        schedule = Concurrent(seed, 20, one_by_one=True)
+        session = Simulation(course.start.compiled, protocol, schedule, parameters=case.phase.parameters)
+        for epoch in course.run([]).epochs(session, lambda _: None):
+            hosts = session._hosts.values()  # noqa: SLF001
+            assert tuple(map(_key, hosts)) in explored, (team.name, epoch.opened_by)
+    assert compared > 1
+
+
+def _key(host: Host) -> tuple[str, bytes]:
+    return host.name, state_key(host.protocol)
