@@ -43,6 +43,8 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     """The probability that a message is lost, if messages could be lost. Lost messages have no `Received`."""
     answer: str | msgspec.UnsetType = msgspec.UNSET
     """The rule for the answer without a proof: `final` for the last values. It is omitted for the best ones."""
+    improve: float | msgspec.UnsetType = msgspec.UNSET
+    """The seconds after the deadline in which answers were published: the answer may be an earlier one."""
     version: int = VERSION
 
 

@@ -56,18 +56,21 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 class ReplayedRun:
     """A replayed run of `team` with its answer; the answer is None if the journal does not contain enough data.
 
-    `any_time`: the answer may be any assignment that the robots had, because nothing is proven.
+    `any_time`: the answer may be any assignment that the robots had, because nothing is proven. `improved`: it may be
+    any assignment that was found at a snapshot, even if it was not published.
     """
 
     run: RecordedRun
     team: Team
     answer: PhaseAnswer | None = None
     any_time: bool = False
+    improved: bool = False
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, journal: Journal) -> ReplayedRun:
     """Return a replayed run with its answer."""
-    replayed = ReplayedRun(run, robots.compiled.team)
+    improved = journal.header.improve is not UNSET
+    replayed = ReplayedRun(run, robots.compiled.team, improved=improved)
     final = journal.header.answer == "final"
     return replayed if journal.outcome is None else _answered(replayed, robots, journal.outcome, final=final)
 
@@ -168,7 +171,7 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
         return
     began = last.run.began
     earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
-    if earlier or (last.any_time and _was_decided(recorded, last)):
+    if earlier or (last.improved and recorded.assignment) or (last.any_time and _was_decided(recorded, last)):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))

@@ -38,6 +38,7 @@ def journal_header(team: Team, options: Options) -> Header:
         order=options.order or UNSET,
         channel=options.channel.name if options.channel else UNSET,
         message_loss=options.loss or UNSET,
+        improve=UNSET if options.improve is None else options.improve,
         answer=UNSET if options.answer == AnswerRule.BEST else options.answer,
         version=BOUNDED if options.bounds else VERSION,
     )

@@ -215,3 +215,17 @@ def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> 
             forged = replace(journal, outcome=replace(outcome, cost=(outcome.cost or 0) - 1))
             assert [one.what for one in replay(forged).contradictions] == ["the outcome's cost"]
     assert earlier
+
+
+def test_answers_of_snapshots_before_the_deadline_are_no_contradictions() -> None:
+    """Found by `make simulate`: with `--improve`, an answer may be that of a snapshot, before the last values."""
+    options = Options(protocol="aas", runtime=Runtime.SIMULATOR, deadline=40, improve=40, cache=False)
+    others = 0
+    for seed in range(16):
+        with time_passes_at_each_look():
+            journal = recorded(random_csp(5, 3, 0.5, 0.2, seed=seed), options)
+        assert journal.header.improve == 40
+        assert identical(replay(journal)), seed
+        unmarked = replace(journal, header=msgspec.structs.replace(journal.header, improve=msgspec.UNSET))
+        others += not identical(replay(unmarked))
+    assert others
