@@ -41,37 +41,39 @@ HOUR_S, DAY_S = 3_600.0, 86_400.0
 def drawn_plan(seed: int) -> Plan:
     """Return the plan that `seed` decides."""
     chance = Random(f"simulation {seed}")
-    protocol = AUTO if chance.random() < 0.05 else chance.choice(PROTOCOLS)
+    runtime = chance.choice((Runtime.SIMULATOR, Runtime.SIMULATOR, Runtime.PROCESSES, Runtime.NETWORK))
+    protocol = AUTO if runtime != Runtime.NETWORK and chance.random() < 0.05 else chance.choice(PROTOCOLS)
     like = chance.choice(("abt", "syncbb")) if protocol == AUTO else protocol
     traits = protocol_named(like).traits
-    team = _team(like, traits, chance)
-    runtime = chance.choice((Runtime.SIMULATOR, Runtime.PROCESSES))
+    team = _team(like, traits, chance, changes=runtime != Runtime.NETWORK)
     options = _options(team, protocol, traits, runtime, chance)
     if runtime == Runtime.SIMULATOR:
         return Plan(seed, team, options, tuple(_faults(HOUR_S, chance)), tick_s=10 ** chance.uniform(-4, 1.5))
-    scale_s = chance.choice((0.01, 0.1, 1.0, 10.0))
+    scale_s = chance.choice((0.01, 0.1, 1.0, 10.0) if runtime == Runtime.PROCESSES else (0.01, 0.1, 1.0, 3.0))
     faults = (*_faults(scale_s, chance), *_faults_of_robots(team, scale_s, chance))
+    if runtime == Runtime.NETWORK:
+        faults, options = _faults_of_network(team, options, faults, chance)
     return Plan(seed, _named_files(team), options, faults, tick_s=1e-6, delay_s=scale_s * chance.random())
 
 
 # The problem
 
 
-def _team(protocol: str, traits: Traits, chance: Random) -> Team:
+def _team(protocol: str, traits: Traits, chance: Random, *, changes: bool) -> Team:
     while True:
-        team = affordable(protocol, lambda: _maker(protocol, traits, chance)(chance))
+        team = affordable(protocol, lambda: _maker(protocol, traits, chance, changes=changes)(chance))
         if math.prod(len(variable.domain) for variable in team.variables.values()) <= MOST_ASSIGNMENTS:
             return team
 
 
-def _maker(protocol: str, traits: Traits, chance: Random) -> Callable[[Random], Team]:
+def _maker(protocol: str, traits: Traits, chance: Random, *, changes: bool) -> Callable[[Random], Team]:
     """Return a function that draws a team of a kind that the protocol can solve, without a central solver."""
     makers: list[Callable[[Random], Team]] = [lambda chance: loose_team(protocol, chance)]
     if traits.costs:
         makers += [lambda chance: loose_team(protocol, chance, costs=True)] * 2
     if traits.costs and traits.n_ary and not traits.allocates:
         makers.append(random_cost_team)
-    if traits.n_ary and not traits.allocates:
+    if traits.n_ary and not traits.allocates and changes:
         makers += [lambda chance: random_changing_team(chance, chance.randint(1, 4))] * (3 if traits.dynamic else 1)
     if traits.asymmetric:
         makers += [lambda chance: random_asymmetric_team(chance, simple=True)] * 3
@@ -108,7 +110,7 @@ def _options(team: Team, protocol: str, traits: Traits, runtime: Runtime, chance
 
 def _wanted(team: Team, runtime: Runtime, chance: Random) -> Iterator[tuple[float, dict[str, typing.Any]]]:
     """Yield options with values at random, and how often each is used."""
-    span_s = 10 ** chance.uniform(-1, 5)
+    span_s = 10 ** chance.uniform(-1, 5 if runtime == Runtime.SIMULATOR else 2)
     yield 0.1, {"deadline": span_s}
     yield 0.1, {"deadline": span_s, "improve": span_s * chance.choice((0.1, 1, 10))}
     yield 0.03, {"timeout": span_s}
@@ -134,7 +136,10 @@ def _wanted(team: Team, runtime: Runtime, chance: Random) -> Iterator[tuple[floa
         yield 0.2, {"on_loss": OnLoss.FAIL}
         yield 0.5, {"on_loss": OnLoss.WITHDRAW}
         yield 0.3, {"spares": chance.randint(1, 3)}
-        yield 0.3, {"patience": 10 ** chance.uniform(-1, 4)}
+        least = 1 if runtime == Runtime.NETWORK else -1  # robots in a network need more patience than their delays
+        yield 0.3, {"patience": 10 ** chance.uniform(least, 4)}
+        if runtime == Runtime.NETWORK:
+            return
         kills = [Kill(chance.choice(team.order), 10 ** chance.uniform(-3, 2)) for _ in range(chance.randint(1, 2))]
         yield 0.3, {"kill": tuple(kills)}
 
@@ -213,6 +218,20 @@ def _faults_of_robots(team: Team, scale_s: float, chance: Random) -> Iterator[Fa
             yield Fault(kind, chance.choice(names), _moment(scale_s, chance), span_s)
     if chance.random() < 0.05:
         yield Fault(FaultKind.GARBLE, chance.choice(names), size=chance.randint(1, 20))
+
+
+def _faults_of_network(
+    team: Team, options: Options, faults: tuple[Fault, ...], chance: Random
+) -> tuple[tuple[Fault, ...], Options]:
+    """Return the faults that can happen in a network, and options that limit the time if there is a traitor."""
+    faults = tuple(fault for fault in faults if fault.kind is not FaultKind.GARBLE)
+    if chance.random() < 0.1:
+        faults = (*faults, Fault(FaultKind.LOSS, chance.choice(team.order), chance.random(), size=chance.randint(1, 5)))
+    if chance.random() < 0.2:
+        faults = (*faults, Fault(FaultKind.LIE, chance.choice(team.order), size=chance.randrange(100)))
+        if options.limit_s is None:
+            options = replace(options, timeout=100.0)
+    return faults, options
 
 
 def _moment(scale_s: float, chance: Random) -> float:

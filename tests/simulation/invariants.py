@@ -9,12 +9,12 @@ from typing import NamedTuple
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Answer, Outcome, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
-from robochoc.model.team_edits import without_robots
+from robochoc.model.team_edits import constraints_in_force, without_robots
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Withdrawal
 from robochoc.run.registry import protocol_named
 from robochoc.verification.checker import assignment_cost, needlessly_withdrawn, violations
-from tests.simulation.plan import Plan
+from tests.simulation.plan import FaultKind, Plan
 from tests.support.cost_problems import minimum_withdrawal
 from tests.support.loose_problems import minimum_cost
 
@@ -28,6 +28,10 @@ class Finding(NamedTuple):
 
 def violated(plan: Plan, outcome: Outcome) -> Iterator[Finding]:
     """Yield the properties that `outcome` does not have."""
+    for fault in plan.faults:
+        if fault.kind is FaultKind.LIE:
+            yield from _in_spite_of(fault.robot, plan.team, outcome)
+            return
     traits = protocol_named(outcome.protocol).traits
     limited = is_limited(plan.options) or plan.options.loss > 0
     events = 0
@@ -43,6 +47,20 @@ def violated(plan: Plan, outcome: Outcome) -> Iterator[Finding]:
     present = outcome.epochs[-1].robots if outcome.epochs else last.order
     now = _with_robots(last, [name for name in present if name not in outcome.lost])
     yield from _Judge(now, plan.options, traits, limited=limited).faults(outcome)
+
+
+def _in_spite_of(traitor: str, team: Team, outcome: Outcome) -> Iterator[Finding]:
+    """Yield false claims that a traitor must not be able to cause: docs/guides/security.md, "One traitor"."""
+    now = without_robots(team, outcome.lost)
+    wrong = outcome.verdict == Verdict.NO_SOLUTION and minimum_cost(now) < INFINITE
+    if (wrong or outcome.verdict == Verdict.OPTIMAL) and outcome.claimed_by is None:
+        yield Finding("claimed", f"{outcome.verdict} with a traitor, and nobody is named")
+    if not outcome.verified or outcome.verdict not in {Verdict.SOLUTION, Verdict.OPTIMAL}:
+        return
+    for constraint in constraints_in_force(now, [name for name in outcome.withdrawn if name in now]):
+        owners = {now.owner[name] for name in constraint.variables}
+        if traitor not in owners and not constraint.allows(outcome.assignment):
+            yield Finding("checked", f"{constraint.name} over {constraint.variables} counts as checked, but is broken")
 
 
 def _with_robots(team: Team, names: Collection[str]) -> Team:

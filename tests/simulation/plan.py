@@ -21,7 +21,8 @@ class FaultKind(StrEnum):
     `CLOCK`: the clock jumps by `for_s`. `DISK`: the disk of the journal is full after `size` bytes. `CRASH`: the
     robot's process ends. `STOP`: it stands still for `for_s` seconds. `SLOW`: each of its steps lasts `for_s` seconds.
     `PARTITION`: what the robot sends to others, or they to it, arrives only after `for_s` seconds. `GARBLE`: its
-    message number `size` cannot be decoded. `LIE`: it is a traitor, with the lie number `size`.
+    message number `size` cannot be decoded. `LOSS`: the network loses its next `size` frames. `LIE`: it is a traitor,
+    with the lie number `size`.
     """
 
     CLOCK = "clock"
@@ -31,6 +32,7 @@ class FaultKind(StrEnum):
     SLOW = "slow"
     PARTITION = "partition"
     GARBLE = "garble"
+    LOSS = "loss"
     LIE = "lie"
 
 

@@ -7,7 +7,7 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from types import FrameType
@@ -24,15 +24,23 @@ from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.orchestrator import prepare
 from robochoc.run.recording import journal_header, objective_to_record
 from robochoc.solver.errors import UnsupportedError
+from robochoc.verification.checker import RefutedError
 from tests.simulation.clock import HangError, VirtualClock, virtual_time
 from tests.simulation.invariants import Finding, is_limited, violated
 from tests.simulation.plan import FaultKind, Plan
+from tests.simulation.virtual_network import VirtualNetwork, solve_on_network, virtual_network
 from tests.simulation.virtual_processes import virtual_processes
 from tests.simulation.virtual_system import VirtualSystem
 from tests.support.replays import identical
 
 CPU_S = 120.0
 """CPU time after which a run counts as one that hangs without looking at the clock."""
+_DEADLY: dict[Runtime, tuple[FaultKind, ...]] = {
+    Runtime.SIMULATOR: (),
+    Runtime.PROCESSES: (FaultKind.CRASH, FaultKind.STOP, FaultKind.GARBLE),
+    Runtime.NETWORK: tuple(kind for kind in FaultKind if kind is not FaultKind.DISK),
+}
+"""Faults that may cause the loss of robots. In a network, whoever is slow may count as absent."""
 NOT_A_RUN = (UnsupportedError, InvalidInputError, ChangeError)
 """Refusals: the parts of the plan cannot be combined."""
 
@@ -107,16 +115,23 @@ def _play(plan: Plan, *, disk: FullDisk | None = None) -> _Played:
     jumps = tuple((fault.at_s, fault.for_s) for fault in plan.faults if fault.kind is FaultKind.CLOCK)
     clock, audience = VirtualClock(plan.tick_s, jumps), _Audience()
     options = plan.options
-    with _world(plan, clock):
+    with _world(plan, clock) as network:
         refuse_options(options)
-        run = prepare(plan.team, options)
-        chosen, sinks = run.choice.options, [disk.write] if disk else []
-        recorder = JournalRecorder(journal_header(run.team, chosen), objective_to_record(run.team, chosen), sinks=sinks)
         outcome, error = None, ""
+        team, chosen, run = plan.team, options, _solver_of(plan, network)
+        if network is None:
+            prepared = prepare(plan.team, options)
+            team, chosen, run = prepared.team, prepared.choice.options, prepared.solve
+        sinks = [disk.write] if disk else []
+        recorder = JournalRecorder(journal_header(team, chosen), objective_to_record(team, chosen), sinks=sinks)
         try:
-            outcome = run.solve(observer=recorder, audience=audience)
+            outcome = run(observer=recorder, audience=audience)
         except RobotsLostError as lost:
             error = str(lost)
+        except RefutedError as refuted:
+            if not plan.has(FaultKind.LIE):
+                raise
+            error = str(refuted)
         recorder.outcome = outcome
         journal = recorder.content() if disk is None else disk.content
         recorder.close()
@@ -125,15 +140,31 @@ def _play(plan: Plan, *, disk: FullDisk | None = None) -> _Played:
     return _Played(outcome, error, journal, audience.published, clock.now)
 
 
+def _solver_of(plan: Plan, network: VirtualNetwork | None) -> Callable[..., Outcome]:
+    """Return a function that solves the plan on the network."""
+
+    def run(observer: JournalRecorder, audience: _Audience) -> Outcome:
+        assert network is not None
+        return solve_on_network(plan, network, observer, audience)
+
+    return run
+
+
 @contextmanager
-def _world(plan: Plan, clock: VirtualClock) -> Iterator[None]:
-    """Let the program use the virtual time, and virtual processes if the plan has any."""
+def _world(plan: Plan, clock: VirtualClock) -> Iterator[VirtualNetwork | None]:
+    """Let the program use the virtual time, and virtual processes or a network if the plan has any."""
     with virtual_time(clock, plan.seed):
-        if plan.options.runtime == Runtime.PROCESSES:
-            with virtual_processes(plan, VirtualSystem(clock, plan.seed)):
-                yield
-        else:
-            yield
+        system = VirtualSystem(clock, plan.seed)
+        match plan.options.runtime:
+            case Runtime.PROCESSES:
+                with virtual_processes(plan, system):
+                    yield None
+            case Runtime.NETWORK:
+                network = VirtualNetwork(system, plan)
+                with virtual_network(plan, network):
+                    yield network
+            case _:
+                yield None
 
 
 def examine(plan: Plan) -> Report:
@@ -160,7 +191,7 @@ def _examine(plan: Plan, report: Report) -> None:
     report.messages = sum(metrics.messages.values())
     report.verdict = str(first.outcome.verdict) if first.outcome else "robots lost"
     if first.outcome is None:
-        if not plan.has(FaultKind.CRASH, FaultKind.STOP, FaultKind.GARBLE, FaultKind.LIE) and not plan.options.kill:
+        if not (plan.has(*_DEADLY[plan.options.runtime]) or plan.options.kill):
             report.findings.append(Finding("lost", first.error))
     else:
         report.findings += violated(plan, first.outcome)
@@ -172,6 +203,8 @@ def _of_journal(plan: Plan, played: _Played) -> Iterator[Finding]:
     """Yield whether the journal cannot be read, or is replayed differently."""
     journal = read_journal(played.journal)
     if played.outcome is None or plan.options.loss:  # journals do not record which messages were lost
+        return
+    if plan.options.runtime == Runtime.NETWORK:  # the master's journal does not contain the team
         return
     with virtual_time(VirtualClock(0.0), plan.seed):
         result = replay(journal)
