@@ -35,6 +35,8 @@ MOST_ASSIGNMENTS = 2_000
 MOST_MESSAGES = 2_000
 """Messages after which an incomplete protocol without an end of its own is stopped."""
 PROTOCOLS = tuple(name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc."))
+TRAITOR_S = 100.0
+"""The virtual seconds of a run with a traitor, who may keep it going for ever."""
 HOUR_S, DAY_S = 3_600.0, 86_400.0
 
 
@@ -230,7 +232,7 @@ def _faults_of_network(
     if chance.random() < 0.2:
         faults = (*faults, Fault(FaultKind.LIE, chance.choice(team.order), size=chance.randrange(100)))
         if options.limit_s is None:
-            options = replace(options, timeout=100.0)
+            options = replace(options, timeout=TRAITOR_S)
     return faults, options
 
 
