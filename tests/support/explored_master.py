@@ -69,16 +69,19 @@ class Output(NamedTuple):
 class MasterView(NamedTuple):
     """A state of the master, as far as properties and other steps depend on it.
 
-    `links` are the processes to which the master listens. `result`: what its program has returned, if it has ended.
+    `order` are the robots of the search, `links` the processes to which the master listens. `is_limited`: there is a
+    limit on messages. `result`: what the program has returned, if it has ended.
     """
 
     epoch: int = 0
+    order: tuple[str, ...] = ()
     links: frozenset[str] = frozenset()
     lost: tuple[str, ...] = ()
     quiescent: bool = False
     verdict: Verdict | None = None
     witness: str | None = None
     waves: int = 0
+    is_limited: bool = False
     has_ended: bool = False
     result: Any = None
 
@@ -316,12 +319,14 @@ def _master_state(script: Script, where: object, result: object) -> tuple[Master
     everything = (where, _plain(vars(run)), sorted(links), script.now, repr(result), content)
     view = MasterView(
         state.epoch,
+        state.order,
         links,
         tuple(state.lost),
         state.counters.quiescent,
         state.verdict,
         state.witness,
         state.counters._wave,
+        state.max_messages is not None,
         where == "ended",
         result,
     )

@@ -187,12 +187,13 @@ def _woken(robot: QueueRobot, wake: Wake) -> QueueRobot:
         robot.report_idle()
     packet: list[Envelope] = []
     pipe = cast("_Pipe", robot._link)
+    readers = {one.fd: (sender, one) for sender, one in cast("dict[str, Any]", robot._readers).items()}
     for queue, arrived in wake:
         if not queue:
             pipe.arrived, pipe.ended = arrived, not arrived
             robot._read_orders(packet)
             continue
-        sender, reader = next((name, one) for name, one in cast("Any", robot._readers.items()) if one.fd == queue)
+        sender, reader = readers[queue]  # an order in the same turn may have closed it
         reader.ended = not arrived
         reader.stamped += [msgspec.msgpack.decode(one.content, type=Stamped) for one in arrived]
         robot._read(sender, reader, packet)

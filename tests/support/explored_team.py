@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from random import Random
 from typing import Any, NamedTuple
 
 import msgspec
@@ -18,6 +19,8 @@ from robochoc.exploration.components import strong_components
 from tests.support.explored_master import Arrived, Ended, Input, Master, MasterView, Output, Passed, Step
 from tests.support.explored_robots import Action, Robots, RobotView, Wake, without_system
 
+_SHARE_USUAL = 0.9
+"""The share of steps of a random order in which no process is killed, and no time passes."""
 END = Output("end", "")
 """In a channel: its other end is closed."""
 
@@ -98,8 +101,7 @@ class ExploredTeam:
 
     def _explored(self, most: int) -> Found:
         found = Found()
-        step = self._master.start()
-        first = self._with(TeamState(step.state, crashes=self._crashes, passes=self._passes), "", step.outputs)
+        first = self._started()
         self._before[first] = None
         waiting = deque([first])
         while waiting and found.states < most:
@@ -128,6 +130,38 @@ class ExploredTeam:
             found.fault = "the team can continue forever"
         return found
 
+    def walk(self, chance: Random, walks: int) -> Found:
+        """Play so many random orders from the beginning to the end, or up to the first fault."""
+        found = Found()
+        with without_system():
+            while found.ends < walks and not found.fault:
+                self._walk(chance, found)
+        return found
+
+    def _walk(self, chance: Random, found: Found) -> None:
+        state, path = self._started(), list[str]()
+        while True:
+            found.states += 1
+            view = self._master.views[state.master]
+            found.fault = self._fault(state, view)
+            if view.has_ended:
+                found.ends += 1
+                found.results.add(str(getattr(view.result, "verdict", view.result)))
+            if view.has_ended or found.fault:
+                break
+            moves = [*self._moves(state, view)]
+            usual = [move for move in moves if move.state.crashes + move.state.passes == state.crashes + state.passes]
+            chosen = usual if usual and chance.random() < _SHARE_USUAL else moves
+            words, state, found.fault = chance.choice(chosen)
+            path.append(words)
+            if found.fault:
+                break
+        found.path = path
+
+    def _started(self) -> TeamState:
+        step = self._master.start()
+        return self._with(TeamState(step.state, crashes=self._crashes, passes=self._passes), "", step.outputs)
+
     def _path(self, state: TeamState) -> list[str]:
         path = []
         while (step := self._before[state]) is not None:
@@ -138,27 +172,25 @@ class ExploredTeam:
     # What must hold
 
     def _fault(self, state: TeamState, view: MasterView) -> str:
+        last = {process.rpartition(".")[0]: number for process, number in state.robots}
         if view.has_ended:
-            last = {process: max(number, _ended_state(number)) for process, number in state.robots}
-            return self._judge(view.result, {name.rpartition(".")[0]: self._robots.views[last[name]] for name in last})
-        present = [self._robots.views[number] for name, number in state.robots if name in view.links and number >= 0]
-        here = [one for one in present if one.epoch == view.epoch]
-        if view.waves > 2 + self._passes + 2 * sum(one.sent for one in here):
+            unjust = len(getattr(view.result, "lost", ())) > self._crashes - state.crashes
+            ends = {name: self._robots.views[_living(number)] for name, number in last.items()}
+            return "a robot counts as lost that was not killed" if unjust else self._judge(view.result, ends)
+        here = [self._robots.views[_living(last[name])] for name in view.order if name in last]
+        searching = [one for one in here if one.epoch == view.epoch]
+        most = 2 + self._passes + 2 * sum(one.sent for one in searching)
+        if view.waves > most and not view.is_limited:
             return f"the master has started {view.waves} waves, although nothing has changed"
-        if (
-            view.lost
-            or any(one.is_paused for one in here)
-            or any(number < 0 and name in view.links for name, number in state.robots)
-        ):
+        if any(last.get(name, -1) < 0 for name in view.order) or any(one.is_paused for one in searching):
             return ""
-        under_way = sum(one.held for one in here) + sum(
+        under_way = sum(one.held for one in searching) + sum(
             self._epochs[item] == view.epoch for channel, items in state.channels if ">" in channel for item in items
         )
-        if sum(one.sent - one.received for one in here) != under_way:
+        if sum(one.sent - one.received for one in searching) != under_way:
             return "the robots have handled messages that were not sent in this search"
-        if view.quiescent and (under_way or not all(one.is_searching for one in here) or here != present):
-            return f"the master believes that no message is under way, but {under_way} are"
-        return ""
+        is_quiet = not under_way and searching == here and all(one.is_searching for one in searching)
+        return "" if is_quiet or not view.quiescent else f"the search counts as over, but {under_way} are under way"
 
     # Steps
 
@@ -318,8 +350,13 @@ class ExploredTeam:
 
 
 def _ended_state(number: int) -> int:
-    """Return the state of a process that ends in the state `number`, or the reverse."""
+    """Return the state of a process that has ended in the state `number`."""
     return -1 - number
+
+
+def _living(number: int) -> int:
+    """Return the number of the last state of a process before its end, if it has ended."""
+    return max(number, -1 - number)
 
 
 def _reader(channel: str) -> str:
