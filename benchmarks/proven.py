@@ -96,7 +96,7 @@ def _explored(work: Work, report: Callable[[int], None]) -> Found:
         report(states)
         return time.process_time() - began > LIMIT_S
 
-    found = explore(case, CheckOptions(protocol, run, STATES), is_over)
+    found = explore(case, CheckOptions(protocol, run, STATES, random_steps=0), is_over)
     minimum = TeamJudge(case.compiled, case.phase).minimum
     return {
         "protocol": work.protocol,

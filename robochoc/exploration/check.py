@@ -42,6 +42,7 @@ class CheckOptions(NamedTuple):
         packets: True to deliver also several waiting messages at once.
         losses: The maximum number of lost messages.
         plan: The maximum numbers of robots that crash, and of events.
+        random_steps: The maximum number of steps of random runs, if not all states were explored. None: `states`.
     """
 
     protocol: type[Protocol]
@@ -50,6 +51,7 @@ class CheckOptions(NamedTuple):
     packets: bool = False
     losses: int = 0
     plan: FaultPlan = FaultPlan()
+    random_steps: int | None = None
 
 
 class Case(NamedTuple):
@@ -89,7 +91,8 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
     if found.is_cyclic and case.phase.traits.complete and not found.fault:
         found.fault = ENDLESS
     if not (found.is_complete or found.fault):
-        play_random_runs(graph, found, seeded(options.run.seed), options.states, is_over)
+        steps = options.states if options.random_steps is None else options.random_steps
+        play_random_runs(graph, found, seeded(options.run.seed), steps, is_over)
     if found.fault:
         found.explanation = explanation_of(found, graph)
     return found
