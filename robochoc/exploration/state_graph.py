@@ -8,12 +8,12 @@ is breadth first, the way to a faulty state is one of the shortest.
 from __future__ import annotations
 
 import itertools
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from robochoc.exploration.components import strong_components
 from robochoc.exploration.local_steps import LocalState, Received, Step
 from robochoc.exploration.stage import Stage
+from robochoc.exploration.state_store import StateStore
 from robochoc.exploration.team_state import LOST, Channel, Delivery, Exploration, Move, TeamState
 from robochoc.model.outcome import Verdict
 
@@ -38,12 +38,11 @@ class StateGraph:
         self._packets, self._losses = packets, losses
         self._contents: list[bytes] = []
         self._numbers: dict[bytes, int] = {}
-        self._before: dict[TeamState, tuple[TeamState, Delivery] | None] = {}
+        self._store = StateStore()
+        self._independent_receivers: dict[tuple[int, tuple[Channel, ...]], tuple[int, ...]] = {}
+        self._deliveries: dict[tuple[int, int, tuple[Channel, ...]], Delivery] = {}
         self._ends_at_once = Verdict.SOLUTION in first.traits.concludes
         self._reduced = reduced and not losses and not self._ends_at_once
-        self._explored_states: set[TeamState] = set()
-        self._only: dict[TeamState, int] = {}
-        """The receiver of the explored steps from each state; not for states from which all steps are explored."""
 
     def explore(self, most: int, is_over: Callable[[int], bool] = lambda _: False) -> Exploration:
         """Explore up to `most` states, or up to the first fault.
@@ -52,46 +51,46 @@ class StateGraph:
             most: The maximum number of states.
             is_over: Asked from time to time, with the number of states so far, whether to stop.
         """
-        found = Exploration()
+        found, store = Exploration(), self._store
         _, first, found.fault = self.start()
         if found.fault:
             return found
-        self._before = {first: None}
-        waiting = deque([first])
-        while waiting and len(self._before) <= most and not (found.states % _OFTEN == 0 and is_over(found.states)):
-            state = waiting.popleft()
+        store.add(store.key(first))
+        while found.states < len(store) <= most and not (found.states % _OFTEN == 0 and is_over(found.states)):
+            number = found.states
             found.states += 1
-            fault, delivery = self._explored(state, found, waiting)
+            fault, delivery = self._explored(number, found)
             if fault:
                 found.fault = fault
-                found.path = [*self._path(state), *([delivery] if delivery else [])]
+                found.path = [*store.path(number), *([delivery] if delivery else [])]
                 break
         found.local_states = sum(len(robot.states) for stage in self._stages for robot in stage.robots)
-        found.is_complete = not waiting and not found.fault
+        found.is_complete = found.states == len(store) and not found.fault
         if found.is_complete:
-            found.is_cyclic = self._is_cyclic(first)
+            found.is_cyclic = self._is_cyclic()
         return found
 
-    def _explored(self, state: TeamState, found: Exploration, waiting: deque[TeamState]) -> tuple[str, Delivery | None]:
-        """Add the states after `state` to `waiting`. Return its fault, if any, and the faulty delivery."""
+    def _explored(self, number: int, found: Exploration) -> tuple[str, Delivery | None]:
+        """Add the states after a state to the store. Return its fault, if any, and the faulty delivery."""
+        store = self._store
+        state = store.state(number)
         fault = self.fault_on_the_way(state)
         if fault:
             return fault, None
-        self._explored_states.add(state)
         moves = self._chosen(state)
         if not moves or self._is_over(state):
             found.ends += 1
             fault = self.fault_at_the_end(state)
             if fault:
                 return fault, None
-        moves += self._changes(state, is_over=not moves)
-        found.steps += len(moves)
-        for delivery, after, refusal in moves:
-            if refusal:
-                return refusal, delivery
-            if after not in self._before:
-                self._before[after] = state, delivery
-                waiting.append(after)
+        changes = [*self._changes(state, is_over=not moves)]
+        found.steps += len(moves) + len(changes)
+        after = []
+        for move in moves + changes:
+            if move.refusal:
+                return move.refusal, move.delivery
+            after.append(store.add(store.key(move.state), number, move.delivery))
+        store.explored(after if self.witness(state) is None else after[len(moves) :])
         return "", None
 
     # What is in a state
@@ -138,27 +137,21 @@ class StateGraph:
             states.append(state)
         return states
 
-    def _path(self, state: TeamState) -> list[Delivery]:
-        """Return the deliveries from the start to `state`."""
-        path = []
-        while (step := self._before[state]) is not None:
-            state, delivery = step
-            path.append(delivery)
-        return path[::-1]
-
-    def _is_cyclic(self, first: TeamState) -> bool:
+    def _is_cyclic(self) -> bool:
         """Return whether the robots can continue forever although each message arrives at some time.
 
         They can if there is a set of states, each reachable from each other, in which every channel that is never empty
-        delivers a message. The problem does not change in them, because it changes a limited number of times.
+        delivers a message. The problem does not change in them, because it changes a limited number of times. After a
+        conclusion, no delivery counts.
         """
-        for component in strong_components(first, lambda state: (move.state for move in self._again(state))):
+        for component in strong_components(0, self._store.after):
             delivered: set[Channel] = set()
-            full = set.intersection(*({channel for channel, _ in state.queues} for state in component))
-            for state in component:
+            states = [self._store.state(number) for number in component]
+            full = set.intersection(*({channel for channel, _ in state.queues} for state in states))
+            for state in states:
                 places = self._stages[state.stage].places
-                for delivery, after, _ in self._again(state):
-                    if after in component:
+                for delivery, after, _ in self._moves(state):
+                    if self._store.number(self._store.key(after)) in component:
                         place = places.get(delivery.receiver, -1)
                         delivered.update((place, places[sender]) for sender in delivery.senders)
             if full <= delivered:
@@ -236,28 +229,33 @@ class StateGraph:
         for the verification of concurrent systems", LNCS 1032, 1996, Section 4). As one of them must lead to a state
         that is still to be explored, no step is put off forever.
         """
-        for receiver in self._independent(state) if self._is_reduced(state) else ():
+        for receiver in self._independent(state) if state.queues and self._is_reduced(state) else ():
             moves = [*self._moves(state, receiver)]
-            if any(move.refusal or move.state not in self._explored_states for move in moves):
-                self._only[state] = receiver
+            if any(move.refusal or self._is_unexplored(move.state) for move in moves):
                 return moves
         return [*self._moves(state)]
+
+    def _is_unexplored(self, state: TeamState) -> bool:
+        number = self._store.number(self._store.key(state))
+        return number is None or number > self._store.explored_count
 
     def _is_reduced(self, state: TeamState) -> bool:
         """Return whether some steps may be left out: the problem may not change in a state that they lead to."""
         return self._reduced and state.lossless is None and not self._stages[state.stage].changes
 
-    def _again(self, state: TeamState) -> Iterator[Move]:
-        """Yield the steps from `state` once more. After a conclusion, none of them is a delivery."""
-        deliveries = [] if self.witness(state) is not None else [*self._moves(state, self._only.get(state))]
-        yield from deliveries
-        yield from self._changes(state, is_over=not deliveries)
+    def _independent(self, state: TeamState) -> tuple[int, ...]:
+        """Return the receivers to which nobody may write before their next step, except behind waiting messages."""
+        channels = tuple([channel for channel, _ in state.queues])
+        known = self._independent_receivers.get((state.stage, channels))
+        if known is None:
+            known = tuple(self._found_independent(self._stages[state.stage], channels))
+            self._independent_receivers[state.stage, channels] = known
+        return known
 
-    def _independent(self, state: TeamState) -> Iterator[int]:
-        """Yield each receiver to which nobody may write before its next step, except behind waiting messages."""
-        stage = self._stages[state.stage]
-        full = {channel for channel, _ in state.queues}
-        receivers = dict.fromkeys(receiver for receiver, _ in full)
+    @staticmethod
+    def _found_independent(stage: Stage, channels: Sequence[Channel]) -> Iterator[int]:
+        full = {*channels}
+        receivers = dict.fromkeys(receiver for receiver, _ in channels)
         for receiver in receivers:
             active, found = {*receivers} - {receiver}, set[int]()
             while active:
@@ -298,7 +296,7 @@ class StateGraph:
             packets = [(*packet, channel) for packet, channel in longer if packet.count(channel) < left[channel]]
 
     def _received(
-        self, state: TeamState, receiver: int, packet: Sequence[Channel], queues: Mapping[Channel, tuple[int, ...]]
+        self, state: TeamState, receiver: int, packet: tuple[Channel, ...], queues: Mapping[Channel, tuple[int, ...]]
     ) -> Move:
         """Return the step in which `receiver` receives the next message of each channel in `packet`."""
         stage = self._stages[state.stage]
@@ -306,15 +304,21 @@ class StateGraph:
         received = []
         for channel in packet:
             queue = after[channel]
-            missing = next(place for place, number in enumerate(queue) if number != LOST)
+            missing = 0
+            while queue[missing] == LOST:
+                missing += 1
             received.append(Received(stage.names[channel[1]], self._contents[queue[missing]], missing))
             after[channel] = queue[missing + 1 :]
-        delivery = Delivery(stage.names[receiver], tuple([one.sender for one in received]))
+        delivery = self._deliveries.get((state.stage, receiver, packet))
+        if delivery is None:
+            delivery = Delivery(stage.names[receiver], tuple([one.sender for one in received]))
+            self._deliveries[state.stage, receiver, packet] = delivery
         step = stage.robots[receiver].packet(state.robots[receiver], tuple(received))
         refusal = step.refusal or self._send(receiver, step, after, state)
         if refusal:
             return Move(delivery, state, refusal)
-        robots = (*state.robots[:receiver], step.state, *state.robots[receiver + 1 :])
+        robots = [*state.robots]
+        robots[receiver] = step.state
         return Move(delivery, _state(robots, after, state))
 
     def _lost(self, state: TeamState, channel: Channel, queues: Mapping[Channel, tuple[int, ...]]) -> Move:
