@@ -93,6 +93,11 @@ class StateGraph:
         store.explored(after if self.witness(state) is None else after[len(moves) :])
         return "", None
 
+    @property
+    def states(self) -> Iterator[TeamState]:
+        """The states found so far."""
+        return map(self._store.state, range(len(self._store)))
+
     # What is in a state
 
     def stage_of(self, state: TeamState) -> Stage:

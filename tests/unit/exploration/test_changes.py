@@ -241,7 +241,7 @@ def test_the_states_of_real_runs_are_explored(protocol: type[Protocol], after: i
         keys = [[[*map(_key, robot.hosts)] for robot in stage.robots] for stage in graph._stages]  # noqa: SLF001
         explored = {
             tuple(known[number] for known, number in zip(keys[state.stage], state.robots, strict=True))
-            for state in graph._before  # noqa: SLF001 - all explored states
+            for state in graph.states
         }
         schedule = Concurrent(seed, 20, one_by_one=True)
         session = Simulation(course.start.compiled, protocol, schedule, parameters=case.phase.parameters)
