@@ -139,8 +139,9 @@ simulate: $(READY)  ## whole runs with faults in virtual time: make simulate SEC
 
 # The first run records which tests reach which function. Survivors are shown; all results: out/mutation/results.jsonl
 COUNT ?= 100
+# BY_KILLER=1 asks which of `check`, `simulate` and the kinds of tests notice changes of protocols, hosts and quiescence.
 mutate: $(READY)  ## all packages, changed in one place each: do the tests notice? make mutate SEED=1 COUNT=100 FILES=...
-	$(BIN)/python -m tests.mutation --count $(COUNT) --seed $(SEED) --jobs $(JOBS) $(FILES)
+	$(BIN)/python -m tests.mutation$(if $(BY_KILLER),.by_killer) --count $(COUNT) --seed $(SEED) --jobs $(JOBS) $(FILES)
 
 # Tools in an environment of their own: their versions and the project's cannot be in each other's way.
 TOOLS := $(VENV)/tools

@@ -7,18 +7,14 @@ used again while it is there. Each survivor is either equivalent to the original
 from __future__ import annotations
 
 import argparse
-import contextlib
 import json
 import os
 import re
-import resource
 import secrets
 import shutil
-import signal
 import subprocess
 import sys
 import tempfile
-import threading
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -31,6 +27,7 @@ from typing import Any
 import pytest
 
 from tests.mutation.chosen import FILE
+from tests.mutation.limited import PYTEST, applied, limited
 from tests.mutation.marks import FOLDER, prepare
 from tests.mutation.mutants import Mutant, Place, mutants_of
 
@@ -44,9 +41,6 @@ ROUNDS = ((8.0, 6), (60.0, 25))
 LONGER = 4
 """A mutant hangs if its tests use this many times their CPU time."""
 START_S = 30
-HANG_S = 120
-"""The time limit of one test."""
-MEMORY = 8 << 30
 NO_FAILURE = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 
 
@@ -152,26 +146,22 @@ class Bench:
 
     def fate(self, mutant: Mutant, first: str = "") -> dict[str, Any]:
         """Try a mutant, with the cases of the test `first` before others."""
-        file = self._tree / mutant.path
-        as_it_was = file.stat()
         cases = self._record.cases(mutant.path, function=mutant.place.function)
         if not (cases or mutant.place.function):  # a module without functions
             cases = self._record.cases(*importers(self._tree, mutant.path))
         cases = [case for case in cases if (self._tree / case.file).exists()]
         cases.sort(key=lambda case: case.test != first)
         result: dict[str, Any] = {"fate": "survived" if cases else "unreached", "reached_by": len(cases), "tried": 0}
-        file.write_text(mutant.text)
         cpu_s = 0.0
         by_circle = ([case for case in cases if case.more == more] for more in (False, True))
-        for chosen in (chosen for part in by_circle for chosen in rounds(part)):
-            failed, used = self._run(chosen)
-            cpu_s += used
-            result["tried"] += len(chosen)
-            if failed:
-                result |= {**failed, "more": chosen[0].more}
-                break
-        file.write_text(mutant.source)
-        os.utime(file, ns=(as_it_was.st_atime_ns, as_it_was.st_mtime_ns))
+        with applied(self._tree, mutant):
+            for chosen in (chosen for part in by_circle for chosen in rounds(part)):
+                failed, used = self._run(chosen)
+                cpu_s += used
+                result["tried"] += len(chosen)
+                if failed:
+                    result |= {**failed, "more": chosen[0].more}
+                    break
         return {**result, "cpu_s": round(cpu_s, 1)}
 
     def _run(self, cases: Sequence[Case]) -> tuple[dict[str, Any], float]:
@@ -182,38 +172,13 @@ class Bench:
         failed.unlink(missing_ok=True)
         files = list(dict.fromkeys(case.file for case in cases))
         limit_s = int(START_S + LONGER * sum(case.cpu_s for case in cases))
-        code, used, output = self._pytest("-x", "-p", "tests.mutation.chosen", *files, cpu_s=limit_s)
+        words = (*PYTEST, "-m", "", "-x", "-p", "tests.mutation.chosen", *files)
+        code, used, output = limited(self._tree, words, limit_s, {FILE: str(chosen)})
         if code in NO_FAILURE:
             return {}, used
         by, error = json.loads(failed.read_text()) if failed.exists() else ("", output[-300:])
         hung = code < 0 or "Timeout (" in error
         return {"fate": "hung" if hung else "killed", "by": by, "error": error, "code": code}, used
-
-    def _pytest(self, *words: str, cpu_s: int) -> tuple[int, float, str]:
-        """Run pytest; return the exit code, negative when it was stopped, the CPU time, and the output."""
-        chosen = {FILE: str(self._tree / FOLDER / "chosen"), "PYTHONDONTWRITEBYTECODE": "1"}
-        environment = {**os.environ, "PYTHONPATH": str(self._tree), **chosen}
-        plain = ("-q", "--no-header", "-p", "no:cacheprovider", "-o", f"timeout={HANG_S}", "-m", "")
-        with tempfile.TemporaryFile() as output:
-            run = subprocess.Popen(
-                [sys.executable, "-m", "pytest", *plain, *words],
-                cwd=self._tree,
-                env=environment,
-                stdout=output,
-                stderr=subprocess.STDOUT,
-                start_new_session=True,
-            )
-            resource.prlimit(run.pid, resource.RLIMIT_CPU, (cpu_s, cpu_s))
-            resource.prlimit(run.pid, resource.RLIMIT_DATA, (MEMORY, MEMORY))
-            watch = threading.Timer(HANG_S * 15, os.killpg, (run.pid, signal.SIGKILL))
-            watch.start()
-            _, status, used = os.wait4(run.pid, 0)
-            watch.cancel()
-            run.returncode = os.waitstatus_to_exitcode(status)
-            with contextlib.suppress(ProcessLookupError):
-                os.killpg(run.pid, signal.SIGKILL)
-            output.seek(0)
-            return run.returncode, used.ru_utime + used.ru_stime, output.read().decode(errors="replace")
 
 
 def copy(source: Path, target: Path) -> None:

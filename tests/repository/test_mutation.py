@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.mutation.__main__ import ROOT, Case, Record, again, draw, main, rounds
+from tests.mutation.by_killer import ANY, KILLERS, Killer, Target, Uses, area_of, attempt, drawn, table
 from tests.mutation.marks import NAME, functions, with_stores
 from tests.mutation.mutants import mutants_of
 
@@ -184,3 +185,66 @@ def test_mutants_are_killed_and_survive(tmp_path: Path, capsys: pytest.CaptureFi
         ("unused", "(x)"): "unreached",
     }
     assert capsys.readouterr().out.endswith("1 killed\n") or True
+
+
+def test_the_table_counts_by_killer_and_area_and_shows_the_survivors() -> None:
+    def lines(path: str, line: str, *fates: str) -> list[dict[str, object]]:
+        place = [path, "f", line, "old", "new", 0]
+        pairs = zip(KILLERS, fates, strict=False)
+        return [{"place": place, "killer": killer.name, "fate": fate} for killer, fate in pairs]
+
+    assert [killer.name for killer in KILLERS[:2]] == ["check", "every order"]
+    abt = "robochoc/protocols/satisfaction/abt.py"
+    found = [
+        *lines(abt, "one", "killed", "no test", "survived"),
+        *lines(abt, "two", "survived", "no test", "hung"),
+        *lines("robochoc/communication/quiescence.py", "three", "killed", "killed", "survived"),
+        *lines("robochoc/communication/host.py", "four", "survived", "survived", "survived"),
+    ]
+    text = table(found)
+    assert "| check | 1 of 2 | 0 of 1 | 1 of 1 | 2 of 4 | 1 |" in text
+    assert "| every order | 0 of 0 | 0 of 1 | 1 of 1 | 1 of 2 | 0 |" in text
+    assert "| simulate | 1 of 2 | 0 of 1 | 0 of 1 | 1 of 4 | 1 |" in text
+    assert text.endswith("4 mutants, 1 survivors\nrobochoc/communication/host.py f: `four`: new for old")
+
+
+class AnyUses(Uses):
+    """The uses of a tree without protocols."""
+
+    def __init__(self) -> None:
+        pass
+
+    def target(self, path: str) -> Target:  # noqa: ARG002 - the same for all files
+        return Target(("abt",), ())
+
+
+def test_a_killer_is_tried_in_the_changed_tree_which_is_restored(tmp_path: Path) -> None:
+    (tmp_path / "code.py").write_text("def f() -> int:\n    return 1\n")
+    mutants = mutants_of("code.py", (tmp_path / "code.py").read_text())
+    (mutant,) = (mutant for mutant in mutants if mutant.new == "(2)")
+    test = Killer("test", lambda *_: iter(()), (0,), 9)
+    known = AnyUses()
+    for exit_code, fate in (("open('code.py').read().count('(2)')", "killed"), ("0", "survived")):
+        words = ("-c", f"import sys; sys.exit({exit_code})")
+        result = attempt(known, tmp_path, mutant, test._replace(commands=lambda *_, words=words: iter([words])))
+        assert result["fate"] == fate, result
+        assert (tmp_path / "code.py").read_text() == mutant.source
+    assert attempt(known, tmp_path, mutant, test)["fate"] == "no test"
+
+
+def test_mutants_by_killer_are_of_functions_that_searches_call() -> None:
+    found = drawn(ROOT, 20, 3)
+    areas = Counter(area_of(mutant.path) for mutant in found)
+    assert areas == {"protocols": 14, "hosts": 3, "quiescence": 3}
+    assert not [mutant for mutant in found if mutant.place.function.endswith(("proves", "in_words"))]
+
+
+@pytest.mark.more
+def test_a_mutant_meets_the_nearest_protocols_and_tests() -> None:
+    uses = Uses(ROOT)
+    near = uses.target("robochoc/protocols/satisfaction/abt.py")
+    assert near.protocols[0] == "abt"
+    assert {"abt-hyb", "dynabt"} == {*near.protocols[1:]}
+    assert "tests/protocols/test_abt.py" in near.files
+    assert uses.target("robochoc/communication/host.py").protocols == ANY
+    assert uses.target("robochoc/communication/host.py").files[0] == "tests/unit/communication/test_host.py"
