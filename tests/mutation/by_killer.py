@@ -89,7 +89,9 @@ class Uses:
 
     def _files(self, module: str) -> list[str]:
         files = [f"{test.replace('.', '/')}.py" for test in touched(self._graph, [module])]
-        return [file for file in files if file.startswith(("tests/protocols/", "tests/unit/"))]
+        own = f"test_{module.rpartition('.')[2]}"
+        found = [file for file in files if file.startswith(("tests/protocols/", "tests/unit/"))]
+        return sorted(found, key=lambda file: not Path(file).stem.startswith(own))
 
     @cached_property
     def conformance(self) -> Mapping[str, list[str]]:

@@ -100,6 +100,13 @@ def test_a_session_also_holds_the_robots_around_the_good_list() -> None:
     assert replies(robot, ("RC", Evaluation(1, 1, 1, tables))) == [("RD", Evaluate(1, 3, tables=False))]
 
 
+def test_a_table_allows_the_combinations_of_its_bits() -> None:
+    bits = 0b1001_0110_1100
+    one = AllowedTable(("RA", "RB"), (3, 4), bits.to_bytes(2, "little"))
+    places = itertools.product(range(3), range(4))
+    assert [one.allows(pair) for pair in places] == [bool(bits >> at & 1) for at in range(12)]
+
+
 def test_a_good_list_without_a_solution_ends_the_search() -> None:
     robot = after(mediator(), ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB")))))
     replies(robot, ("RC", Evaluation(1, 1, 1, (table("RA", "RC"), table("RB", "RC")))))
