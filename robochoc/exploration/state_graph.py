@@ -19,7 +19,7 @@ from robochoc.model.outcome import Verdict
 
 NOT_A_NEIGHBOUR = "with which it shares no constraint; set Traits.writes_to_non_neighbours if this is intended"
 _OFTEN = 256
-"""The number of states between two checks of the time."""
+"""The number of states between two checks of the time, which is also checked after each new stage."""
 
 
 class StateGraph:
@@ -56,8 +56,11 @@ class StateGraph:
         if found.fault:
             return found
         store.add(store.key(first))
-        while found.states < len(store) <= most and not (found.states % _OFTEN == 0 and is_over(found.states)):
-            number = found.states
+        stages = 0
+        while found.states < len(store) <= most:
+            if (found.states % _OFTEN == 0 or len(self._stages) > stages) and is_over(found.states):
+                break
+            stages, number = len(self._stages), found.states
             found.states += 1
             fault, delivery = self._explored(number, found)
             if fault:
