@@ -24,6 +24,7 @@ from robochoc.exploration.changes import FaultPlan
 from robochoc.exploration.check import CheckOptions, cases_of, checked
 from robochoc.exploration.conformance import fault_in_simulation
 from robochoc.exploration.problems import small_teams
+from robochoc.exploration.shrinking import reduced
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Message
 from robochoc.protocols.order import PriorityOrder
@@ -154,7 +155,8 @@ def check_protocol(  # noqa: PLR0913 - options, by name
     for one in checked(explored, options):
         total += one.exploration.states
         if one.exploration.fault:
-            raise AssertionError(f"{protocol.__name__} on {one.team.name}, {one.report}")
+            shown = reduced(one, options) if problems is None else one
+            raise AssertionError(f"{protocol.__name__} on {shown.team.name}, {shown.report}")
     if not total:
         raise ValueError("no team was checked")
     for number, (team, case) in enumerate(cases_of(larger, options)):

@@ -21,6 +21,7 @@ from robochoc.system.time_limit import TimeLimitError, computed_by
 
 LONGEST_STEP_S = 10.0
 """The time after which a robot's step is a fault, in seconds."""
+TOO_LONG = "does not end its step within"
 
 
 class LocalState(NamedTuple):
@@ -138,7 +139,7 @@ class LocalSteps:
         try:
             return computed_by(time.monotonic() + LONGEST_STEP_S, compute)
         except TimeLimitError:
-            return before._replace(refusal=f"{self.name} does not end its step within {LONGEST_STEP_S:g} seconds")
+            return before._replace(refusal=f"{self.name} {TOO_LONG} {LONGEST_STEP_S:g} seconds")
         except BadMessageError as refused:
             return before._replace(refusal=str(refused))
         except Exception as error:  # noqa: BLE001 - any error of a protocol is a fault that is reported

@@ -94,7 +94,9 @@ def test_a_protocols_fault_is_explained_and_its_journal_is_replayed_sniffed_and_
     journal = tmp_path / "fault.journal"
     done = robochoc_within("check", "abt", "--teams", 18, "--journal", journal)
     assert done.returncode == 4
-    assert "\n8. Robot2 receives from Robot3: as long as V1 = 0, V2 cannot be 1\n" in done.stderr
+    assert "small-3-2-0-17-reduced: after 4 steps: the checker refutes" in done.stderr
+    assert "small-3-2-0-17: after 9 steps: the checker refutes" in done.stderr
+    assert "\n3. Robot2 receives from Robot3: as long as V1 = 1, V2 cannot be 1\n" in done.stderr
     assert "Robot3 has V3 = 0. The last steps: Robot3" in " ".join(done.stderr.split())
     row = json.loads(robochoc_within("check", "abt", "--teams", 18, "--json").stdout.splitlines()[-1])
     assert row["explanation"].endswith("small-3-2-0-17 has no solution.")

@@ -108,11 +108,12 @@ def check(  # noqa: PLR0913 - options, by name
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.exploration.changes import FaultPlan
     from robochoc.exploration.check import CheckOptions, checked
+    from robochoc.exploration.shrinking import reduced
     from robochoc.run.defaults import AUTO, CENTRAL
     from robochoc.run.options import Options, Runtime
     from robochoc.run.registry import protocol_named
     from robochoc.system.posix import usable_processors
-    from robochoc.system.stopping import stop_handled
+    from robochoc.system.stopping import stop_handled, stop_requested
 
     with errors_as_failures(protocol):
         run = Options(
@@ -132,9 +133,18 @@ def check(  # noqa: PLR0913 - options, by name
                 found = list(_printed(results) if as_json else results)
         if not as_json:
             _print_table(found)
+        fault = next((one for one in found if one.exploration.fault), None)
+        if fault is not None and not folders:
+            fault = reduced(fault, options, lambda: stop_requested() or _is_past(deadline))
         if html is not None and found:
-            _write_page(html, found, options)
-        _end(found, journal, options, is_late=deadline is not None and time.monotonic() > deadline)
+            _write_page(html, fault or found[0], options)
+        if journal is not None and fault is not None:
+            _write_journal(journal, fault, options)
+        _end(found, fault, is_late=_is_past(deadline))
+
+
+def _is_past(deadline: float | None) -> bool:
+    return deadline is not None and time.monotonic() > deadline
 
 
 @contextmanager
@@ -181,39 +191,37 @@ def _print_table(found: list[CheckedTeam]) -> None:
     print_table(headings, rows, right=headings[1:-1])
 
 
-def _write_page(page: Path, found: list[CheckedTeam], options: CheckOptions) -> None:
-    """Write the page of the first faulty team, or of the first team."""
+def _write_page(page: Path, team: CheckedTeam, options: CheckOptions) -> None:
     from robochoc.sniffer.orders_page import orders_page
     from robochoc.system.files import write_atomically
 
-    team = next((one for one in found if one.exploration.fault), found[0])
     with errors_as_failures(page):
         write_atomically(page, orders_page(team, options))
     click.echo(f"{page}: written; open it in a browser", err=True)
 
 
-def _end(found: list[CheckedTeam], journal: Path | None, options: CheckOptions, *, is_late: bool) -> None:
-    """Report what was found. Raises `Failure` if there is a fault, or if not everything was explored."""
+def _write_journal(journal: Path, team: CheckedTeam, options: CheckOptions) -> None:
+    """Write the run that leads to the fault of `team`, unless no single run shows it."""
     from robochoc.exploration.counterexample import write_counterexample
+
+    if team.exploration.is_cyclic:
+        click.echo(f"{journal}: not written: no single run shows the fault", err=True)
+        return
+    with errors_as_failures(journal):
+        write_counterexample(journal, team.case, team.exploration.path, options.run)
+    click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
+
+
+def _end(found: list[CheckedTeam], fault: CheckedTeam | None, *, is_late: bool) -> None:
+    """Report what was found. Raises `Failure` if there is a `fault`, or if not everything was explored."""
     from robochoc.system.plain_text import counted
     from robochoc.system.stopping import stop_requested
 
     states = counted(sum(one.exploration.states for one in found), "state")
-    faulty = [one for one in found if one.exploration.fault]
-    if faulty:
-        first = faulty[0]
-        if journal is not None and first.exploration.is_cyclic:
-            click.echo(f"{journal}: not written: no single run shows the fault", err=True)
-        elif journal is not None:
-            with errors_as_failures(journal):
-                write_counterexample(journal, first.case, first.exploration.path, options.run)
-            click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
-        raise Failure(
-            LOST,
-            "\n".join(
-                [f"{first.team.name}: {first.report}", *(f"{one.team.name}: {one.in_words}" for one in faulty[1:])]
-            ),
-        )
+    if fault is not None:
+        others = [one for one in found if one.exploration.fault and one.team.name != fault.team.name]
+        lines = [f"{fault.team.name}: {fault.report}", *(f"{one.team.name}: {one.in_words}" for one in others)]
+        raise Failure(LOST, "\n".join(lines))
     partly = sum(not one.exploration.is_complete for one in found)
     if partly or stop_requested():
         hint = "stopped" if stop_requested() else f"increase {'--timeout' if is_late else '--states'}"
