@@ -19,7 +19,7 @@ from robochoc.solver.errors import UnsupportedError
 MOST_TRIES = 200
 """The maximum number of smaller teams that are explored."""
 _FEW_STATES = 1000
-"""A smaller team may have so many states, even if the fault was found after fewer ones."""
+"""The number of states that are explored of a smaller team, even if the fault was found after fewer ones."""
 
 
 def reduced(found: CheckedTeam, options: CheckOptions, is_over: Callable[[], bool] = lambda: False) -> CheckedTeam:
