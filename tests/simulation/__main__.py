@@ -131,13 +131,18 @@ def _work(options: argparse.Namespace) -> Tally:
     return tally
 
 
+def _per_hour(number: float, seconds: float) -> str:
+    return f"{number / max(seconds, 0.001) * 3600:,.0f}"
+
+
 def _report(total: Tally, seconds: float) -> None:
     hours = total.robot_s / 3600
-    counts = total.counts
+    counts, cpu_s = total.counts, total.cpu_s
     lines = [
         f"{counts['seeds']:,} seeds, {counts['runs']:,} runs, {counts['messages']:,} messages",
-        f"{seconds:,.0f} s, {total.cpu_s:,.0f} s of CPU time",
-        f"{hours:,.0f} simulated robot-hours: {hours / max(seconds, 0.001) * 3600:,.0f} an hour",
+        f"{seconds:,.0f} s, {cpu_s:,.0f} s of CPU time",
+        f"{hours:,.0f} simulated robot-hours: {_per_hour(hours, seconds)} an hour",
+        f"an hour of CPU time: {_per_hour(hours, cpu_s)} robot-hours, {_per_hour(counts['runs'], cpu_s)} runs",
         "verdicts: " + ", ".join(f"{name} {n:,}" for name, n in total.verdicts.most_common()),
         "combined: " + ", ".join(f"{name} {n:,}" for name, n in sorted(total.combined.items())),
         "findings: " + (", ".join(f"{name} {n:,}" for name, n in total.findings.most_common()) or "none"),

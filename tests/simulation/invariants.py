@@ -39,7 +39,7 @@ def violated(plan: Plan, outcome: Outcome) -> Iterator[Finding]:
         now = _with_robots(team_after_events(plan.team, events), epoch.robots)
         if set(now.order) != set(epoch.robots):
             yield Finding("epoch", f"epoch {number} has the robots {epoch.robots}, expected {now.order}")
-        interrupted = limited or bool(epoch.lost) or number < len(plan.team.scenario)
+        interrupted = limited or bool(epoch.lost) or events < len(plan.team.scenario)
         for found in _Judge(now, plan.options, traits, limited=interrupted).faults(epoch):
             yield Finding(found.kind, f"epoch {number}: {found.detail}")
         events += not epoch.lost

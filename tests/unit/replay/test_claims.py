@@ -13,8 +13,10 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Decided
 from robochoc.journal.journal import Journal
+from robochoc.model.assembly import Extras, assemble
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Variable
 from robochoc.replay import replay
 from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
 from robochoc.verification.checker import assignment_cost
@@ -23,6 +25,7 @@ from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
 from tests.support.replays import identical, recorded
 
+COSTS = (INFINITE, 8)
 ALL_FLY = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 
 
@@ -229,3 +232,18 @@ def test_answers_of_snapshots_before_the_deadline_are_no_contradictions() -> Non
         unmarked = replace(journal, header=msgspec.structs.replace(journal.header, improve=msgspec.UNSET))
         others += not identical(replay(unmarked))
     assert others
+
+
+def test_no_solution_is_no_assignment_that_robots_have_decided() -> None:
+    """Found by `make simulate`: the robots had no values at the end, and that counted as their assignment."""
+    variables = {f"R{name}": [Variable(name, Domain("D", (range(1),)))] for name in "AB"}
+    own = [
+        Constraint("C", Relation("R", 2, Semantics.SOFT, ((0, 0),), (cost,)), ("A", "B"), ("A", "B")) for cost in COSTS
+    ]
+    parts = {"RA": own[:1], "RB": own[1:]}
+    team = assemble("none", variables, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
+    journal = recorded(team, Options(protocol="syncabb", runtime=Runtime.SIMULATOR, cache=False))
+    assert journal.outcome is not None
+    assert journal.outcome.verdict is Verdict.NO_SOLUTION
+    found = replay(journal)
+    assert identical(found), found
