@@ -139,6 +139,7 @@ def check_protocol(  # noqa: PLR0913 - options, by name
         >>> check_protocol(ABT, teams=5)
         196
     """
+    __tracebackhide__ = True  # pytest shows the fault, not this function
     plan = FaultPlan(crashes, rejoins, events)
     least_of = {"teams": (teams, 1), "robots": (robots, 1), "values": (values, 1), "states": (states, 1)}
     others = {"losses": losses, "runs": runs, **plan._asdict()}
