@@ -31,6 +31,8 @@ from robochoc.system.plain_text import counted
 from robochoc.system.stopping import stop_requested
 from robochoc.verification.objective import withdrawal_cost
 
+_FEWEST_RANDOM_STEPS = 1000
+
 
 class CheckOptions(NamedTuple):
     """The options of a check.
@@ -42,7 +44,9 @@ class CheckOptions(NamedTuple):
         packets: True to deliver also several waiting messages at once.
         losses: The maximum number of lost messages.
         plan: The maximum numbers of robots that crash, and of events.
-        random_steps: The maximum number of steps of random runs, if not all states were explored. None: `states`.
+        random_steps: The maximum number of steps of random runs, if not all states were explored. None: a tenth of
+            `states`, because such steps are rarely known yet and take much longer, but at least 1,000, if so many
+            states are allowed.
     """
 
     protocol: type[Protocol]
@@ -91,7 +95,8 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
     if found.is_cyclic and case.phase.traits.complete and not found.fault:
         found.fault = ENDLESS
     if not (found.is_complete or found.fault):
-        steps = options.states if options.random_steps is None else options.random_steps
+        few = min(options.states, max(_FEWEST_RANDOM_STEPS, options.states // 10))
+        steps = few if options.random_steps is None else options.random_steps
         play_random_runs(graph, found, seeded(options.run.seed), steps, is_over)
     if found.fault:
         found.explanation = explanation_of(found, graph)
