@@ -33,7 +33,7 @@ ROWS, PAGE = ROOT / "out" / "proven.jsonl", ROOT / "docs" / "explanation" / "pro
 SIZES = ((3, 2, 40), (4, 3, 40))
 """The maximum numbers of robots and of values, and the number of problems, which have costs if the protocol has."""
 WITHOUT_COSTS = 20
-"""The number of problems without costs, of the first size. Many of them have no solution."""
+"""The number of problems without costs, of the first size. Some of them have no solution."""
 SEED = 1
 STATES, LIMIT_S = 10_000, 60.0
 """The maximum number of states, and of seconds of CPU time, per problem."""
@@ -120,27 +120,29 @@ def _write_page(rows: Sequence[Found]) -> None:
     by_protocol = defaultdict(list)
     for row in rows:
         by_protocol[row["protocol"]].append(row)
-    complete = {name for name in protocol_names() if protocol_named(name).traits.complete}
     text = PAGE.read_text()
-    for title, wanted in (("complete protocols", complete), ("incomplete protocols", {*protocol_names()} - complete)):
-        lines = _table({name: of for name, of in sorted(by_protocol.items()) if name in wanted})
+    for title, answers in (("complete protocols", COLUMNS), ("incomplete protocols", ())):
+        wanted = [name for name in protocol_names() if protocol_named(name).traits.complete is bool(answers)]
+        lines = table(_table({name: by_protocol[name] for name in wanted if name in by_protocol}, answers))
         before, _, rest = text.partition(BEGIN.format(title))
         _, _, after = rest.partition(END.format(title))
-        text = f"{before}{BEGIN.format(title)}\n\n{table(lines)}\n\n{END.format(title)}{after}"
+        text = f"{before}{BEGIN.format(title)}\n\n{lines}\n\n{END.format(title)}{after}"
     PAGE.write_text(text)
 
 
-def _table(found: dict[str, list[Found]]) -> list[Row]:
-    head = ("protocol", "problems", "all explored", "solution", "no solution", "optimum", "states", "ends", "CPU s")
-    lines: list[Row] = [(*head, "faults")]
+COLUMNS = ("solution", "none", "optimal")
+"""The answers that complete protocols find; also the values of `answer` in rows."""
+
+
+def _table(found: dict[str, list[Found]], answers: Sequence[str]) -> list[Row]:
+    lines: list[Row] = [("protocol", "problems", "all explored", *answers, "states", "ends", "CPU s", "faults")]
     everything = [row for rows in found.values() for row in rows]
     for name, rows in [*found.items(), ("**in all**", everything)]:
         whole = [row for row in rows if row["complete"]]
-        answers = [sum(row["answer"] == answer for row in whole) for answer in ("solution", "none", "optimal")]
-        sums = [sum(row[key] for row in rows) for key in ("states", "ends")]
-        numbers = [len(rows), len(whole), *answers, *sums, round(sum(row["cpu_s"] for row in rows))]
-        faults = sum(row["fault"] is not None for row in rows)
-        lines.append((name, *(f"{number:,}" for number in numbers), str(faults)))
+        numbers = [len(rows), len(whole), *(sum(row["answer"] == answer for row in whole) for answer in answers)]
+        numbers += [sum(row[key] for row in rows) for key in ("states", "ends")]
+        numbers += [round(sum(row["cpu_s"] for row in rows)), sum(row["fault"] is not None for row in rows)]
+        lines.append((name, *(f"{number:,}" for number in numbers)))
     return lines
 
 

@@ -45,8 +45,8 @@ class CheckOptions(NamedTuple):
         losses: The maximum number of lost messages.
         plan: The maximum numbers of robots that crash, and of events.
         random_steps: The maximum number of steps of random runs, if not all states were explored. None: a tenth of
-            `states`, because such steps are rarely known yet and take much longer, but at least 1,000, if so many
-            states are allowed.
+            `states`, because such steps are rarely known yet and take much longer, but at least 1,000, if this
+            many states are allowed.
     """
 
     protocol: type[Protocol]

@@ -5,7 +5,7 @@ They hold in every order of deliveries, if no message is lost:
 - `Traits.cost_never_rises`: no cycle ends with a higher cost than the cycle before. A cycle is complete when all robots
   have chosen their values for it, which each robot records (`Findings.trail`). So a state in the middle of a cycle does
   not count.
-- `Traits.optimal_groups`: if no robot changed its value in the last cycle, no group of so many robots can lower the
+- `Traits.optimal_groups`: if no robot changed its value in the last cycle, no group of this size can lower the
   cost. Groups that share no constraint need not be excluded: if such a group could, so could a part of it.
 - `Traits.share_of_optimum`: the profit of an allocation with one task for each robot is at least this share of the
   maximum.

@@ -55,8 +55,8 @@ class Traits:
             Its robots withdraw one after the other, so earlier decisions could break a restated constraint.
         cost_never_rises: The cost never rises from one cycle of the search (`CycleProtocol`) to the next, if no message
             is lost. Violated hard constraints count first.
-        optimal_groups: If no robot has changed its value in the last cycle, no group of so many robots can lower the
-            cost together: a number, or the name of the setting with the number. 0: this is not guaranteed.
+        optimal_groups: If no robot has changed its value in the last cycle, no group of this size can lower the
+            cost together: a size, or the name of the setting with the size. 0: this is not guaranteed.
         share_of_optimum: The profit of an allocation of one task to each robot is at least this share of the maximum.
             0: there is no guarantee.
         privacy: The information that neighbours do not receive.
