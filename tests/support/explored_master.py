@@ -16,6 +16,7 @@ from typing import Any, ClassVar, NamedTuple, cast
 import msgspec
 
 from robochoc.communication.control import FromParent, FromRobot, QueueFrom, QueuesTo
+from robochoc.communication.network.control_messages import DetailedReport
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_process import RobotStart
@@ -23,7 +24,7 @@ from robochoc.exploration.state_key import content_key
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
 
-_ROBOT = msgspec.msgpack.Decoder(FromRobot)
+_ROBOT = msgspec.msgpack.Decoder(FromRobot | DetailedReport)
 _ATOMS = (int, str, float, bool, type(None))
 
 

@@ -91,7 +91,7 @@ class _Pipe:
         return -1
 
     def send(self, message: FromRobot) -> bool:
-        if isinstance(message, EpochReport):  # the time and memory would differ in each run
+        if type(message) is EpochReport:  # the time and memory would differ in each run
             lost = message.metrics.lost_messages
             message = msgspec.structs.replace(message, metrics=Metrics(lost_messages=lost))
         self.outputs.append(Output("report", "", msgspec.msgpack.encode(message)))
@@ -133,13 +133,14 @@ Wake = tuple[Action, ...]
 
 
 class Robots:
-    """The states of all robots' processes by number, and their steps.
+    """The states of all robots' processes by number, and their steps. `kind`: the class of the robots.
 
     Attributes:
         views: What is seen of each state.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: type[QueueRobot] = QueueRobot) -> None:
+        self._kind = kind
         self._robots: list[QueueRobot] = []
         self._numbers: dict[bytes, int] = {}
         self._steps: dict[tuple[int | bytes, Wake], Step] = {}
@@ -147,7 +148,7 @@ class Robots:
 
     def spawn(self, start: bytes) -> Step:
         """Return the first step of a process."""
-        return self._known((start, ()), lambda: _spawned(start))
+        return self._known((start, ()), lambda: _spawned(self._kind, start))
 
     def step(self, state: int, wake: Wake) -> Step:
         """Return the step from `state`."""
@@ -175,10 +176,10 @@ class Robots:
         return number
 
 
-def _spawned(content: bytes) -> QueueRobot:
+def _spawned(kind: type[QueueRobot], content: bytes) -> QueueRobot:
     start = start_of(content)
     host = Host.create(start.protocol, start.part)
-    return QueueRobot(host, cast("Any", _Pipe()), start.epoch, observed=False, measured=False)
+    return kind(host, cast("Any", _Pipe()), start.epoch, observed=False, measured=False)
 
 
 def _woken(robot: QueueRobot, wake: Wake) -> QueueRobot:

@@ -6,6 +6,7 @@ process, and a queue from robot to robot. Everything in a channel can be delayed
 
 from __future__ import annotations
 
+import itertools
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from robochoc.communication.processes.queues import Stamped
+from robochoc.communication.processes.robot_process import QueueRobot
 from robochoc.exploration.components import strong_components
 from tests.support.explored_master import Arrived, Ended, Input, Master, MasterView, Output, Passed, Step
 from tests.support.explored_robots import Action, Robots, RobotView, Wake, without_system
@@ -39,6 +41,7 @@ class TeamState(NamedTuple):
     channels: tuple[tuple[str, tuple[int, ...]], ...] = ()
     crashes: int = 0
     passes: int = 0
+    losses: int = 0
 
 
 class Move(NamedTuple):
@@ -72,10 +75,13 @@ class ExploredTeam:
         crashes: The maximum number of processes that are killed, at any moment, also within a step.
         passes: The maximum number of times at which nothing is read for `pass_s` seconds, at any moment.
         pass_s: That time, in seconds.
+        patient: True to let this time pass only when nothing else can happen.
+        losses: The maximum number of messages between robots that are lost.
         batches: True to let participants also read all that has arrived at once.
+        kind: The class of the robots.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - keyword options
         self,
         program: Callable[[], Any],
         judge: Judge,
@@ -83,9 +89,13 @@ class ExploredTeam:
         crashes: int = 0,
         passes: int = 0,
         pass_s: float = 1.0,
+        patient: bool = False,
+        losses: int = 0,
         batches: bool = False,
+        kind: type[QueueRobot] = QueueRobot,
     ) -> None:
-        self._master, self._robots = Master(program), Robots()
+        self._master, self._robots = Master(program), Robots(kind)
+        self._patient, self._losses = patient, losses
         self._judge, self._batches = judge, batches
         self._crashes, self._passes, self._pass_s = crashes, passes, pass_s
         self._items: list[Output] = []
@@ -150,7 +160,7 @@ class ExploredTeam:
             if view.has_ended or found.fault:
                 break
             moves = [*self._moves(state, view)]
-            usual = [move for move in moves if move.state.crashes + move.state.passes == state.crashes + state.passes]
+            usual = [move for move in moves if move.state[-3:] == state[-3:]]
             chosen = usual if usual and chance.random() < _SHARE_USUAL else moves
             words, state, found.fault = chance.choice(chosen)
             path.append(words)
@@ -160,7 +170,8 @@ class ExploredTeam:
 
     def _started(self) -> TeamState:
         step = self._master.start()
-        return self._with(TeamState(step.state, crashes=self._crashes, passes=self._passes), "", step.outputs)
+        first = TeamState(step.state, crashes=self._crashes, passes=self._passes, losses=self._losses)
+        return self._with(first, "", step.outputs)
 
     def _path(self, state: TeamState) -> list[str]:
         path = []
@@ -182,8 +193,9 @@ class ExploredTeam:
         most = 2 + self._passes + 2 * sum(one.sent for one in searching)
         if view.waves > most and not view.is_limited:
             return f"the master has started {view.waves} waves, although nothing has changed"
-        if any(last.get(name, -1) < 0 for name in view.order) or any(one.is_paused for one in searching):
-            return ""
+        is_lossy = state.losses < self._losses or any(last.get(name, -1) < 0 for name in view.order)
+        if is_lossy or any(one.is_paused for one in searching):
+            return "the search counts as over, but a message was lost" if self._is_deceived(state, view) else ""
         under_way = sum(one.held for one in searching) + sum(
             self._epochs[item] == view.epoch for channel, items in state.channels if ">" in channel for item in items
         )
@@ -192,22 +204,31 @@ class ExploredTeam:
         is_quiet = not under_way and searching == here and all(one.is_searching for one in searching)
         return "" if is_quiet or not view.quiescent else f"the search counts as over, but {under_way} are under way"
 
+    def _is_deceived(self, state: TeamState, view: MasterView) -> bool:
+        return state.losses < self._losses and view.quiescent
+
     # Steps
 
     def _moves(self, state: TeamState, view: MasterView) -> Iterator[Move]:
         channels = dict(state.channels)
         moved = False
-        for move in (*self._of_the_master(state, view, channels), *self._of_the_robots(state, channels)):
+        by_all = self._of_the_master(state, view, channels), self._of_the_robots(state, channels), self._lost(state)
+        for move in itertools.chain(*by_all):
             moved = moved or move.state != state
             if move.state != state or move.fault:
                 yield move
-        if state.passes:
-            yield self._mastered(
-                state._replace(passes=state.passes - 1), Passed(self._pass_s), f"{self._pass_s:g} s pass"
-            )
-        if not moved:
+        if state.passes and not (moved and self._patient):
+            after = state._replace(passes=state.passes - 1)
+            yield self._mastered(after, Passed(self._pass_s), f"{self._pass_s:g} s pass")
+        elif not moved:
             why = "the master waits for a time limit, since nothing else will happen"
             yield Move(why, state, why)
+
+    def _lost(self, state: TeamState) -> Iterator[Move]:
+        for queue, items in state.channels if state.losses else ():
+            if ">" in queue and self._items[items[0]].kind == "put":
+                after = self._without(state, {queue: 1})
+                yield Move(f"a message of {queue} is lost", after._replace(losses=state.losses - 1))
 
     def _of_the_master(
         self, state: TeamState, view: MasterView, channels: Mapping[str, tuple[int, ...]]

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import msgspec
 import pytest
 
-from robochoc.communication.control import EpochMessage
+from robochoc.communication.control import EpochMessage, EpochReport
 from robochoc.communication.processes import processes
 from robochoc.communication.processes.robot_process import QueueRobot
 from robochoc.communication.quiescence import FourCounters, MessageCounts
@@ -19,8 +19,9 @@ from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import Epoch
 from robochoc.exploration.problems import small_teams
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.findings import NO_FINDINGS
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import protocol_named
@@ -235,3 +236,12 @@ def test_a_verdict_that_is_known_at_the_deadline_counts_with_all_reports(script:
     program = one_search(TEAMS[2], scripted(script), timeout_s=5.0)
     found = ExploredTeam(program, in_time, passes=1, pass_s=5.0).explore(100_000)
     assert (found.fault, found.is_complete, len(found.results)) == ("", True, 2)
+
+
+def test_a_verdict_counts_only_with_the_reports_of_all_robots() -> None:
+    state = SearchState(0, ("A", "B"))
+    state.verdict = Verdict.SOLUTION
+    state.handle("A", EpochReport(0, {"a": 1}, Metrics(), NO_FINDINGS))
+    assert state.result(0).verdict == Verdict.UNKNOWN
+    state.handle("B", EpochReport(0, {"b": 1}, Metrics(), NO_FINDINGS))
+    assert state.result(0).verdict == Verdict.SOLUTION
