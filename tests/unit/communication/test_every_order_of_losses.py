@@ -50,12 +50,13 @@ def run(team: Team, protocol: str, **options: Any) -> Callable[[], Outcome]:  # 
 
 
 def answered(result: object, _robots: Mapping[str, RobotView]) -> str:
-    """Return why a run has not ended as it should: with a verdict, and without one in epochs that a loss has ended."""
+    """Return why a run has not ended as it should: with a solution, and without one in epochs that a loss has ended."""
     if not isinstance(result, Outcome):
         return f"the run has failed: {result}"
     if any(epoch.lost and epoch.verdict != Verdict.UNKNOWN for epoch in result.epochs):
         return "an epoch in which a robot was lost has a verdict"
-    return "" if result.verdict != Verdict.UNKNOWN else f"no verdict: {result.reason}"
+    has_answer = result.verdict not in {Verdict.UNKNOWN, Verdict.NO_SOLUTION}  # every team here has a solution
+    return "" if has_answer else f"{result.verdict}: {result.reason}"
 
 
 def in_time(result: object, robots: Mapping[str, RobotView]) -> str:
