@@ -10,7 +10,7 @@ from dataclasses import replace
 from robochoc.exploration.check import CheckedTeam, CheckOptions, case_of, explore
 from robochoc.exploration.local_steps import TOO_LONG
 from robochoc.exploration.team_state import Exploration
-from robochoc.model.change import apply_changes
+from robochoc.model.change import apply_changes, apply_possible_changes
 from robochoc.model.problem import Change, RemoveAgent, RemoveConstraint, RemoveValue, Team
 from robochoc.model.team_edits import ChangeError
 from robochoc.solver.compile import NoLocalSolutionError
@@ -41,7 +41,7 @@ def reduced(found: CheckedTeam, options: CheckOptions, is_over: Callable[[], boo
         if team is None:
             break
         tries += 1
-        smaller = _checked(replace(_without_needless_links(team), name=name, dropped=()), few)
+        smaller = _checked(replace(_tidied(team), name=name, dropped=()), few)
         if smaller is not None and _is_better(smaller.exploration, found.exploration):
             found, candidates = smaller, _smaller_teams(smaller.team)
     return found
@@ -62,7 +62,9 @@ def _checked(team: Team, options: CheckOptions) -> CheckedTeam | None:
 
 
 def _smaller_teams(team: Team) -> Iterator[Team]:
-    """Yield `team` without one robot, constraint or value. One robot, and one value of each variable, remain."""
+    """Yield `team` without one event, robot, constraint or value. One robot, and a value of each variable, remain."""
+    for place in range(len(team.scenario)):
+        yield replace(team, scenario=(*team.scenario[:place], *team.scenario[place + 1 :]))
     for change in _removals(team):
         with suppress(ChangeError):
             yield apply_changes(team, [change])
@@ -71,6 +73,15 @@ def _smaller_teams(team: Team) -> Iterator[Team]:
             private = tuple(one for one in robot.private if one is not left_out)
             robots = (*team.robots[:place], replace(robot, private=private), *team.robots[place + 1 :])
             yield replace(team, robots=robots)
+
+
+def _tidied(team: Team) -> Team:
+    """Return `team` without needless links, and without the changes in its scenario that are no longer possible."""
+    now, events = replace(team, scenario=()), []
+    for event in team.scenario:
+        now, possible = apply_possible_changes(now, event.changes)
+        events.append(replace(event, changes=tuple(possible)))
+    return replace(_without_needless_links(team), scenario=tuple(one for one in events if one.changes))
 
 
 def _without_needless_links(team: Team) -> Team:

@@ -18,6 +18,7 @@ from robochoc.exploration.check import CheckedTeam, CheckOptions, case_of, check
 from robochoc.exploration.counterexample import write_counterexample
 from robochoc.exploration.judgement import TeamJudge
 from robochoc.exploration.problems import small_teams
+from robochoc.exploration.shrinking import reduced
 from robochoc.exploration.state_graph import StateGraph
 from robochoc.exploration.state_key import state_key
 from robochoc.generators.random_csp import random_csp
@@ -169,6 +170,16 @@ def test_the_journal_of_a_changed_team_can_be_replayed(
     assert done.returncode == 4, done.stderr
     replayed = robochoc_within("replay", file)
     assert (replayed.returncode, replayed.stderr) == (0, "")
+
+
+def test_a_counterexample_is_reduced_to_the_events_that_matter() -> None:
+    teams = [random_scenario(team, 3, 0.1) for team in first_teams(MissesNothing, 4, 2)]
+    run = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
+    options = CheckOptions(MissesNothing, run, 3000, plan=FaultPlan(events=3))
+    faulty = next(one for one in checked(teams, options) if one.exploration.fault)
+    smaller = reduced(faulty, options)
+    assert smaller.exploration.fault
+    assert len(smaller.team.scenario) == sum(step.change is not None for step in smaller.exploration.path) == 1
 
 
 def test_the_events_are_those_of_the_scenario() -> None:
