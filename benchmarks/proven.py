@@ -112,7 +112,9 @@ def _explored(work: Work, report: Callable[[int], None]) -> Found:
 
 
 def _rows() -> list[Found]:
-    return [json.loads(line) for line in ROWS.read_text().splitlines()] if ROWS.exists() else []
+    """Return the row of each problem: the first one, if there are several."""
+    rows = [json.loads(line) for line in ROWS.read_text().splitlines()] if ROWS.exists() else []
+    return list({(row["protocol"], row["team"]): row for row in reversed(rows)}.values())
 
 
 def _write_page(rows: Sequence[Found]) -> None:
