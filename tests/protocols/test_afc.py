@@ -90,6 +90,8 @@ def test_backtrack_cpa_makes_the_robot_take_its_next_value_at_a_later_step_witho
     said = told(afc, BacktrackCPA(values(1, 2, 3), 30))
     assert said == [("RD", CPA(values(1, 2, 4), 31)), ("RE", FcCPA(values(1, 2, 4), 31))]
     assert afc.problem.checks == before
+    assert [afc.tried(place) for place in range(4)] == [True, True, True, False]
+    assert not agent(square(4), "RC").tried(0)
 
 
 def test_a_value_once_tried_is_tried_again_only_under_another_cpa() -> None:
