@@ -143,6 +143,7 @@ def test_where_nothing_is_under_way_all_are_told_to_go_on_and_the_search_ends_wh
     assert state.next_wave(wanted=True) is None
     assert state.verdict is None
     state.handle("C", WentOn(0, went=False))
+    assert state.counters.quiescent
     assert state.verdict is Verdict.SOLUTION
 
 
