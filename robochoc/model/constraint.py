@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import assert_never
@@ -288,3 +288,8 @@ def united_ranges(ranges: Iterable[range]) -> tuple[range, ...]:
         else:
             together.append(part)
     return tuple(together)
+
+
+def nameless(known: object) -> object:
+    """Return `known` with an unnamed definition if it is a constraint, for comparisons that must ignore the name."""
+    return replace(known, definition=replace(known.definition, name="")) if isinstance(known, Constraint) else known

@@ -20,6 +20,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from copy import copy, deepcopy
 from typing import TYPE_CHECKING, NamedTuple
 
+from robochoc.model.constraint import nameless
 from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Value, WhenAbsent
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import Cost
@@ -451,10 +452,12 @@ class LocalProblem:
     def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
         """Return the data that determine `tables` for these `robots`, except domains: equal data give equal tables.
 
-        The data are this robot's values and their charges, and the constraints whose other robots are all in `robots`.
+        The data are this robot's values and their charges, and the constraints whose other robots are all in `robots`,
+        without the names of their definitions, which journals do not keep.
         """
         known = {*robots}
-        return self.values, self.charges, [c.definition for c in self._constraints if known.issuperset(c.agents)]
+        constraints = [nameless(c.definition) for c in self._constraints if known.issuperset(c.agents)]
+        return self.values, self.charges, constraints
 
     def added(self, robot: str, view: Mapping[str, Value]) -> list[Cost] | None:
         """Return the cost that `robot`, the lowest in `view`, adds to each own value: the increase of `costs`.

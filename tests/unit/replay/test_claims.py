@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from random import Random
 from typing import Any
 
 import msgspec
@@ -11,7 +12,7 @@ import pytest
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
-from robochoc.journal.events import Decided
+from robochoc.journal.events import Decided, Sent
 from robochoc.journal.journal import Journal
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.costs import user_cost
@@ -23,6 +24,7 @@ from robochoc.verification.checker import assignment_cost
 from tests.support.compiled import plain_python_only
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
+from tests.support.random_changes import random_changing_team
 from tests.support.replays import identical, recorded
 
 COSTS = (INFINITE, 8)
@@ -247,3 +249,15 @@ def test_no_solution_is_no_assignment_that_robots_have_decided() -> None:
     assert journal.outcome.verdict is Verdict.NO_SOLUTION
     found = replay(journal)
     assert identical(found), found
+
+
+def test_tables_are_reused_in_replays_as_in_the_run() -> None:
+    """Found by `make simulate`: journals do not keep the names of definitions, so s-dpop computed tables again."""
+    options = Options(protocol="s-dpop", runtime=Runtime.SIMULATOR, cache=False)
+    reused = 0
+    for number in range(12):
+        journal = recorded(random_changing_team(Random(f"reuse {number}"), 4), options)
+        found = replay(journal)
+        assert identical(found), (number, found)
+        reused += any(isinstance(event, Sent) and event.type == "Reuse" for event in journal.events)
+    assert reused
