@@ -171,7 +171,8 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
         return
     began = last.run.began
     earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
-    if earlier or (recorded.assignment and (last.improved or (last.any_time and _was_decided(recorded, last)))):
+    decided = recorded.assignment and (last.improved or (last.any_time and _was_decided(recorded, last)))
+    if recorded.verdict != Verdict.NO_SOLUTION and (earlier or decided):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))

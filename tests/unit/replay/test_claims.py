@@ -118,6 +118,8 @@ def test_the_best_assignment_on_the_way_is_an_answer() -> None:
         outcome = journal.outcome
         assert outcome is not None
         assert outcome.assignment in had
+        unsolvable = replay(replace(journal, outcome=replace(outcome, verdict=Verdict.NO_SOLUTION)))
+        assert "the outcome's verdict" in {one.what for one in unsolvable.contradictions}, seed
         on_the_way += outcome.cost != user_cost(team, assignment_cost(team, values))
         for name, value in outcome.assignment.items():
             mixed = {**outcome.assignment, name: value % 4 + 1}
@@ -171,6 +173,10 @@ def test_an_answer_that_was_improved_is_as_good_as_what_the_robots_end_with() ->
     ):
         found = replay(replace(journal, outcome=claimed))
         assert {one.what for one in found.contradictions} == {f"the outcome's {field}"}
+    unsolvable = replace(outcome, verdict=Verdict.NO_SOLUTION)
+    for claimed in (unsolvable, replace(unsolvable, improvements=())):
+        found = replay(replace(journal, outcome=claimed))
+        assert "the outcome's verdict" in {one.what for one in found.contradictions}
 
 
 @plain_python_only
