@@ -12,6 +12,7 @@ from typing import NamedTuple
 from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_events
 from robochoc.exploration.explanation import explanation_of
 from robochoc.exploration.random_runs import play_random_runs
+from robochoc.exploration.stage import NotCreatedError
 from robochoc.exploration.state_graph import StateGraph
 from robochoc.exploration.team_state import Exploration
 from robochoc.generators.draws import seeded
@@ -90,7 +91,13 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
     Raises:
         UnsupportedError: with the compiled core.
     """
-    graph = graph_of(case, options)
+    try:
+        return _explored(graph_of(case, options), case, options, is_over)
+    except NotCreatedError as fault:
+        return Exploration(fault=str(fault))
+
+
+def _explored(graph: StateGraph, case: Case, options: CheckOptions, is_over: Callable[[int], bool]) -> Exploration:
     found = graph.explore(options.states, is_over)
     if found.is_cyclic and case.phase.traits.complete and not found.fault:
         found.fault = ENDLESS

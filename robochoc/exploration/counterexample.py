@@ -161,7 +161,7 @@ def write_counterexample(file: Path, case: Case, path: Sequence[Delivery], optio
     with recorded(file, journal_header(compiled.team, options)) as recorder:
         events = StartEvents(recorder)
         simulation = ScriptedSimulation(case, path, recorder)
-        with suppress(Exception):  # it may be the fault
+        with suppress(Exception, SystemExit):  # it may be the fault
             epochs = run.epochs(simulation, partial(events.report, phase.protocol, session=simulation))
             deque(itertools.islice(epochs, len(changes) + 1), 0)
     for failure in recorder.failures:

@@ -22,6 +22,12 @@ from robochoc.system.time_limit import TimeLimitError, computed_by
 LONGEST_STEP_S = 10.0
 """The time after which a robot's step is a fault, in seconds."""
 TOO_LONG = "does not end its step within"
+NOT_REPEATABLE = (
+    "behaves differently when a step is repeated: a step may depend on the robot's state and the message only;"
+    " use no chance but Protocol.chance, no clock, and no data outside the object"
+)
+MOST_REPEATED = 500
+"""The maximum number of steps of a robot that are computed twice."""
 
 
 class LocalState(NamedTuple):
@@ -70,12 +76,13 @@ class LocalSteps:
         self._steps: dict[tuple[int, tuple[Received, ...]], Step] = {}
         self._starts: dict[tuple[int, bool], Step] = {}
         self._changed: dict[int, Step] = {}
+        self._repeated = 0
         self.states: list[LocalState] = []
 
     @cached_property
     def first(self) -> Step:
         """The state of a robot that has no knowledge and is not started yet."""
-        return self._waiting(self._first)
+        return self._guarded(Step(-1), lambda: self._waiting(self._first))
 
     def changed(self, before: LocalSteps, state: int, change: Callable[[Host], None]) -> Step:
         """Return the state in which the robot, which was in a state of `before`, waits for its start after `change`.
@@ -84,9 +91,9 @@ class LocalSteps:
         """
         known = self._changed.get(state)
         if known is None:
-            host = deepcopy(before.hosts[state])
 
             def adopt() -> Step:
+                host = deepcopy(before.hosts[state])
                 change(host)
                 return self._waiting(host)
 
@@ -97,10 +104,12 @@ class LocalSteps:
         """Return the step in which the robot starts, or resumes. `lossless`: see `Host.start`."""
         known = self._starts.get((state, lossless))
         if known is None:
-            host = deepcopy(self.hosts[state])
-            known = self._starts[state, lossless] = self._guarded(
-                Step(-1), lambda: self._stepped(host, host.start(lossless=lossless))
-            )
+
+            def start() -> Step:
+                host = deepcopy(self.hosts[state])
+                return self._stepped(host, host.start(lossless=lossless))
+
+            known = self._starts[state, lossless] = self._guarded(Step(-1), start)
         return known
 
     def packet(self, state: int, packet: tuple[Received, ...]) -> Step:
@@ -112,10 +121,10 @@ class LocalSteps:
 
     def go_on(self, state: int) -> Step | None:
         """Return the step in which the robot continues without the messages that it waits for; None if it does not."""
-        host = deepcopy(self.hosts[state])
         ends = Step(-1)
 
         def go_on() -> Step:
+            host = deepcopy(self.hosts[state])
             sent = host.go_on()
             return ends if sent is None else self._stepped(host, sent)
 
@@ -123,10 +132,9 @@ class LocalSteps:
         return None if step is ends else step
 
     def _computed(self, state: int, packet: Sequence[Received]) -> Step:
-        host = deepcopy(self.hosts[state])
-        host.clock = 0
-
         def handle() -> Step:
+            host = deepcopy(self.hosts[state])
+            host.clock = 0
             for sender, content, missing in packet:
                 for _ in range(missing):
                     host.protocol.miss(sender)
@@ -136,13 +144,23 @@ class LocalSteps:
         return self._guarded(Step(state), handle)
 
     def _guarded(self, before: Step, compute: Callable[[], Step]) -> Step:
+        """Return the step that `compute` returns, or `before` with the reason why there is none."""
+        step = self._attempted(before, compute)
+        if step.refusal or self._repeated == MOST_REPEATED:
+            return step
+        self._repeated += 1
+        if self._attempted(before, compute) == step:
+            return step
+        return before._replace(refusal=f"{self.name} {NOT_REPEATABLE}")
+
+    def _attempted(self, before: Step, compute: Callable[[], Step]) -> Step:
         try:
             return computed_by(time.monotonic() + LONGEST_STEP_S, compute)
         except TimeLimitError:
             return before._replace(refusal=f"{self.name} {TOO_LONG} {LONGEST_STEP_S:g} seconds")
         except BadMessageError as refused:
             return before._replace(refusal=str(refused))
-        except Exception as error:  # noqa: BLE001 - any error of a protocol is a fault that is reported
+        except (Exception, SystemExit) as error:  # noqa: BLE001 - any error of a protocol is a fault that is reported
             return before._replace(refusal=f"{self.name} has failed: {type(error).__name__}: {error}")
 
     def _stepped(self, host: Host, sent: Sequence[Envelope]) -> Step:
@@ -156,11 +174,12 @@ class LocalSteps:
     def _number(self, host: Host, *, resumes: bool | None = None) -> int:
         """Return the number of the state of `host`. `resumes`: see `Host.resumes`; None after the start."""
         key = state_key(host.protocol), resumes
-        number = self._numbers.setdefault(key, len(self.hosts))
+        number = self._numbers.get(key, len(self.hosts))
         if number == len(self.hosts):
-            self.hosts.append(host)
             protocol = host.protocol
             self.states.append(
                 LocalState(protocol.verdict, protocol.assignment, protocol.findings, protocol.most_above_bound)
             )
+            self.hosts.append(host)
+            self._numbers[key] = number
         return number

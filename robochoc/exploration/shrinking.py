@@ -53,11 +53,11 @@ def _is_better(found: Exploration, before: Exploration) -> bool:
 
 
 def _checked(team: Team, options: CheckOptions) -> CheckedTeam | None:
-    """Return the checked team; None if the protocol does not accept it, or if there is no search."""
+    """Return the checked team; None if the protocol or an event does not accept it, or if there is no search."""
     try:
         case = case_of(team, options.protocol, options.run)
         return CheckedTeam(team, case, explore(case, options))
-    except (UnsupportedError, NoLocalSolutionError):
+    except (UnsupportedError, NoLocalSolutionError, ChangeError):
         return None
 
 

@@ -11,6 +11,11 @@ from robochoc.exploration.local_steps import LocalState, LocalSteps, Step
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol as AnyProtocol
 from robochoc.solver.agent_problem import AgentProblem
+from robochoc.system.errors import RobochocError
+
+
+class NotCreatedError(RobochocError):
+    """Raised if the protocol object of a robot cannot be created."""
 
 
 class Judge(Protocol):
@@ -66,7 +71,7 @@ class Stage:
     """
 
     def __init__(self, parts: Mapping[str, AgentProblem], protocol: type[AnyProtocol], judge: Judge) -> None:
-        hosts = {name: Host.create(protocol, part) for name, part in parts.items()}
+        hosts = {name: _host(name, protocol, part) for name, part in parts.items()}
         self.parts, self.protocol = parts, protocol
         self.robots = [LocalSteps(host) for host in hosts.values()]
         self.judge = judge
@@ -92,10 +97,20 @@ class Stage:
         """Return the stage after `change`, always the same object."""
         raise NotImplementedError
 
-    def first(self) -> list[int]:
+    def first(self) -> list[Step]:
         """Return the states of robots that have no knowledge and are not started."""
-        return [robot.first.state for robot in self.robots]
+        return [robot.first for robot in self.robots]
 
     def adopted(self, before: Stage, robots: Sequence[int]) -> list[Step]:
         """Return the state of each robot before its start in this stage, after the states `robots` of `before`."""
         raise NotImplementedError
+
+
+def _host(name: str, protocol: type[AnyProtocol], part: AgentProblem) -> Host:
+    """Return a host that is not started. Raises `NotCreatedError`, or `UnsupportedError` as the protocol does."""
+    try:
+        return Host.create(protocol, part)
+    except RobochocError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise NotCreatedError(f"{name} cannot be created: {type(error).__name__}: {error}") from error

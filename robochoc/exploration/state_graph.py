@@ -190,7 +190,10 @@ class StateGraph:
 
     def start(self) -> Move:
         """Return the step in which all robots start."""
-        return self._started(TeamState(tuple(self._stages[0].first()), (), self._losses, 0, lossless=True))
+        steps = self._stages[0].first()
+        state = TeamState(tuple([step.state for step in steps]), (), self._losses, 0, lossless=True)
+        refusal = next((step.refusal for step in steps if step.refusal), "")
+        return Move(Delivery(starts=True), state, refusal) if refusal else self._started(state)
 
     def _started(self, state: TeamState) -> Move:
         """Return the step in which all robots start."""
@@ -232,10 +235,11 @@ class StateGraph:
     def _chosen(self, state: TeamState) -> list[Move]:
         """Return the steps from `state` that must be explored; none if the search is over.
 
-        Deliveries to different robots commute. So it is enough to explore the deliveries to one robot, if every robot
-        that may write to it before has already done so: they form a persistent set (Godefroid, "Partial-order methods
-        for the verification of concurrent systems", LNCS 1032, 1996, Section 4). As one of them must lead to a state
-        that is still to be explored, no step is put off forever.
+        Deliveries to different robots commute. So it is enough to explore the deliveries to one robot, if no other
+        robot can write to it before, except behind a waiting message (with packets: not at all, because this message
+        could be in the same packet): they form a persistent set (Godefroid, "Partial-order methods for the verification
+        of concurrent systems", LNCS 1032, 1996, Section 4). As one of them must lead to a state that is still to be
+        explored, no step is put off forever.
         """
         for receiver in self._independent(state) if state.queues and self._is_reduced(state) else ():
             moves = [*self._moves(state, receiver)]
@@ -252,17 +256,18 @@ class StateGraph:
         return self._reduced and state.lossless is None and not self._stages[state.stage].changes
 
     def _independent(self, state: TeamState) -> tuple[int, ...]:
-        """Return the receivers to which nobody may write before their next step, except behind waiting messages."""
+        """Return the receivers whose next step is the same, whatever the others do before."""
         channels = tuple([channel for channel, _ in state.queues])
         known = self._independent_receivers.get((state.stage, channels))
         if known is None:
-            known = tuple(self._found_independent(self._stages[state.stage], channels))
+            known = tuple(self._found_independent(self._stages[state.stage], channels, joins=self._packets))
             self._independent_receivers[state.stage, channels] = known
         return known
 
     @staticmethod
-    def _found_independent(stage: Stage, channels: Sequence[Channel]) -> Iterator[int]:
-        full = {*channels}
+    def _found_independent(stage: Stage, channels: Sequence[Channel], *, joins: bool) -> Iterator[int]:
+        """Yield the independent receivers. `joins`: a message behind a waiting one may be in the same packet."""
+        full = set() if joins else {*channels}
         receivers = dict.fromkeys(receiver for receiver, _ in channels)
         for receiver in receivers:
             active, found = {*receivers} - {receiver}, set[int]()

@@ -20,7 +20,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.local_problem import LocalProblem
 
 _ATOMS = (int, str, bytes, float, bool, type(None))
-_NAMED = (type, FunctionType, BuiltinFunctionType, ModuleType)
+_NAMED = (type, BuiltinFunctionType, ModuleType)
 _NOT_STATE = frozenset({"problem", "outbox", "checks_at_send"})
 """Attributes of a protocol that are no state: the problem, and what is empty between two steps."""
 
@@ -44,11 +44,22 @@ def _canonical(thing: object, path: tuple[int, ...]) -> object:
         return thing
     if isinstance(thing, _NAMED):
         return thing.__name__
+    if isinstance(thing, FunctionType):
+        return _function_key(thing)
     if isinstance(thing, LocalProblem):
         return "problem"
     if id(thing) in path:
         return "containing", len(path) - path.index(id(thing))
     return kind.__name__, *_parts(thing, partial(_canonical, path=(*path, id(thing))))
+
+
+def _function_key(function: FunctionType) -> tuple[str, int]:
+    """Return a key of `function` in this process. Raises `TypeError` for a function with variables of its own."""
+    if function.__closure__:
+        raise TypeError(
+            f"{function.__qualname__} uses variables of another function: store a method or a class instead"
+        )
+    return function.__qualname__, id(function.__code__)
 
 
 def _parts(thing: Any, canonical: Any) -> list[object]:  # noqa: ANN401 - anything that a protocol contains

@@ -149,7 +149,9 @@ class _Child(Generic[Item, Result]):
         except EOFError:
             self._process.join(CHECK_S)
             self.end()
-            self._error = ChildDiedError(f"its process ended with status {self._process.exitcode}{_HINT}")
+            status = self._process.exitcode
+            hint = _HINT if status == -signal.SIGKILL else ""
+            self._error = ChildDiedError(f"its process ended with status {status}{hint}")
             return
         if isinstance(received, int):
             self.progress = received

@@ -195,6 +195,9 @@ def _write_page(page: Path, team: CheckedTeam, options: CheckOptions) -> None:
     from robochoc.sniffer.orders_page import orders_page
     from robochoc.system.files import write_atomically
 
+    if team.exploration.fault and not team.exploration.explanation.text:
+        click.echo(f"{page}: not written: the robots cannot be created", err=True)
+        return
     with errors_as_failures(page):
         write_atomically(page, orders_page(team, options))
     click.echo(f"{page}: written; open it in a browser", err=True)
@@ -204,7 +207,7 @@ def _write_journal(journal: Path, team: CheckedTeam, options: CheckOptions) -> N
     """Write the run that leads to the fault of `team`, unless no single run shows it."""
     from robochoc.exploration.counterexample import write_counterexample
 
-    if team.exploration.is_cyclic:
+    if team.exploration.is_cyclic or not team.exploration.explanation.text:
         click.echo(f"{journal}: not written: no single run shows the fault", err=True)
         return
     with errors_as_failures(journal):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import sys
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -11,6 +12,7 @@ from typing import Any
 import pytest
 
 from robochoc.exploration import check
+from robochoc.exploration.changes import Course, EpochStage
 from robochoc.exploration.check import CheckedTeam, CheckOptions, checked
 from robochoc.exploration.components import strong_components
 from robochoc.exploration.counterexample import write_counterexample
@@ -19,13 +21,16 @@ from robochoc.exploration.state_graph import StateGraph
 from robochoc.journal.events import Received
 from robochoc.journal.journal import read_journal
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.findings import Findings
 from robochoc.protocols.optimization.adopt import ADOPT
+from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.local_problem import LocalProblem
 from robochoc.testing import check_protocol
 from tests.support.compiled import plain_python_only
 from tests.support.examples import count
@@ -65,6 +70,19 @@ def test_the_reduced_orders_lead_to_the_same_ends(name: str, packets: bool, monk
     complete = [pair for pair in zip(reduced, whole, strict=True) if pair[0].exploration.is_complete]
     assert len(complete) > 3
     assert all(one.exploration.states <= other.exploration.states * 1.2 for one, other in complete)
+    assert [one.exploration.ends for one, _ in complete] == [other.exploration.ends for _, other in complete]
+
+
+@pytest.mark.parametrize("number", [29, 80])
+def test_a_message_behind_a_waiting_one_may_be_in_the_same_packet(number: int) -> None:
+    team = next(itertools.islice(small_teams(ABT.traits, 3, 2, 7), number, None))
+    options = CheckOptions(ABT, Options(protocol="abt", runtime=Runtime.SIMULATOR), packets=True)
+    case = check.case_of(team, ABT, options.run)
+    course = Course(case.compiled.team, case.phase)
+    graphs = [StateGraph(EpochStage(course, (), course.start), packets=True, reduced=one) for one in (True, False)]
+    reduced, whole = (graph.explore(3000) for graph in graphs)
+    assert reduced.is_complete
+    assert reduced.ends == whole.ends
 
 
 class Endless(ABT):
@@ -171,6 +189,64 @@ def test_a_fault_at_the_start_has_a_journal_too(tmp_path: Path) -> None:
     (faulty,) = checked([next(small_teams(ABT.traits, 3, 2, 0))], CheckOptions(BadStart, run))
     assert faulty.exploration.fault.endswith("has failed: ValueError: at the start")
     write_counterexample(tmp_path / "run.jsonl", faulty.case, faulty.exploration.path, run)
+
+
+class NotCreated(ABT):
+    """Fails when it is created."""
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:  # noqa: ARG002 - as its base
+        raise ValueError("not today")
+
+
+class NoFindings(ABT):
+    """Cannot report what it knows."""
+
+    @property
+    def findings(self) -> Findings:
+        """Raises an error."""
+        raise ValueError("not today")
+
+
+class Exits(ABT):
+    """Ends its process."""
+
+    def receive(self, sender: str, message: Any) -> None:  # noqa: ARG002, ANN401 - as its base
+        sys.exit(0)
+
+
+class CountsAll(ABT):
+    """Ignores each fifth message that any robot receives."""
+
+    received: list[str] = []  # noqa: RUF012 - the fault
+
+    def receive(self, sender: str, message: Any) -> None:  # noqa: ANN401 - as its base
+        self.received.append(sender)
+        if len(self.received) % 5:
+            super().receive(sender, message)
+
+
+class CountsInClosure(ABT):
+    """Has a function whose variables a copy shares with the original."""
+
+    def start(self) -> None:
+        number = len(self.order.names)
+        self.count = lambda: number
+        super().start()
+
+
+@pytest.mark.parametrize(
+    ("mutant", "fault"),
+    [
+        (NotCreated, "Robot1 cannot be created: ValueError: not today"),
+        (NoFindings, "Robot1 has failed: ValueError: not today"),
+        (Exits, "has failed: SystemExit: 0"),
+        (CountsAll, "behaves differently when a step is repeated"),
+        (CountsInClosure, "uses variables of another function: store a method"),
+    ],
+)
+def test_a_protocol_that_cannot_be_explored_is_a_fault(mutant: type[Protocol], fault: str) -> None:
+    with pytest.raises(AssertionError, match=fault):
+        check_protocol(mutant, teams=3)
 
 
 @pytest.mark.parametrize("wrong", [{"teams": 0}, {"robots": 0}, {"states": 0}, {"losses": -1}, {"problems": []}])
