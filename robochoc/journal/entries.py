@@ -45,6 +45,8 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     """The rule for the answer without a proof: `final` for the last values. It is omitted for the best ones."""
     improve: float | msgspec.UnsetType = msgspec.UNSET
     """The seconds after the deadline in which answers were published: the answer may be an earlier one."""
+    limit_s: float | msgspec.UnsetType = msgspec.UNSET
+    """The time limit or deadline of a search in seconds. Robots in processes may not have reported all their steps."""
     version: int = VERSION
 
 

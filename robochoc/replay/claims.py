@@ -57,7 +57,8 @@ class ReplayedRun:
     """A replayed run of `team` with its answer; the answer is None if the journal does not contain enough data.
 
     `any_time`: the answer may be any assignment that the robots had, because nothing is proven. `improved`: it may be
-    any assignment that was found at a snapshot, even if it was not published.
+    any assignment that was found at a snapshot, even if it was not published. `limited`: the reports that prove it may
+    have been too late.
     """
 
     run: RecordedRun
@@ -65,12 +66,14 @@ class ReplayedRun:
     answer: PhaseAnswer | None = None
     any_time: bool = False
     improved: bool = False
+    limited: bool = False
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, journal: Journal) -> ReplayedRun:
     """Return a replayed run with its answer."""
     improved = journal.header.improve is not UNSET
-    replayed = ReplayedRun(run, robots.compiled.team, improved=improved)
+    limited = journal.header.limit_s is not UNSET and journal.header.runtime != "simulator"
+    replayed = ReplayedRun(run, robots.compiled.team, improved=improved, limited=limited)
     final = journal.header.answer == "final"
     return replayed if journal.outcome is None else _answered(replayed, robots, journal.outcome, final=final)
 
@@ -98,7 +101,7 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_com
     if outcome.verdict != Verdict.UNKNOWN or outcome.runtime == "simulator":
         names = _COUNTS_IN_FIRST_VERSION if header.version == STAMPED_LATE else _COUNTS
         before = outcome.preprocessing.metrics if outcome.preprocessing else Metrics()
-        compared = _exceeding if _may_be_incomplete(outcome) else _differing
+        compared = _exceeding if _may_be_incomplete(header, outcome) else _differing
         yield from compared("the outcome's ", before + outcome.metrics, metrics_of(journal.events), names)
     last = _last_runs(runs)
     for number, epoch in enumerate(outcome.epochs):
@@ -107,12 +110,14 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_com
     yield from _answer_contradictions("the outcome's ", outcome, runs[-1])
 
 
-def _may_be_incomplete(outcome: Outcome) -> bool:
+def _may_be_incomplete(header: Header, outcome: Outcome) -> bool:
     """Return whether the counts may lack the steps of robots that were still computing at the end of the search.
 
-    This is possible if a deadline or an event has ended the search.
+    This is possible if a time limit or an event has ended the search. An outcome does not contain a deadline if its
+    answer is proven, for example because it costs as little as the lower bound.
     """
-    return outcome.runtime != "simulator" and bool(outcome.epochs or outcome.improvements or outcome.deadline)
+    ended = outcome.epochs or outcome.improvements or outcome.deadline or header.limit_s is not UNSET
+    return outcome.runtime != "simulator" and bool(ended)
 
 
 def _exceeding(whose: str, recorded: Metrics, replayed: Metrics, names: Sequence[str]) -> Iterator[Contradiction]:
@@ -175,7 +180,9 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     if recorded.verdict != Verdict.NO_SOLUTION and (earlier or decided):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
-    yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
+    is_proven_later = (recorded.verdict, replayed.verdict) == (Verdict.SOLUTION, Verdict.OPTIMAL)
+    names = ("assignment", "cost") if last.limited and is_proven_later else ("verdict", "assignment", "cost")
+    yield from _differing(whose, recorded, replayed, names)
     left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
     if left != right:
         yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)

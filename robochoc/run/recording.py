@@ -39,6 +39,7 @@ def journal_header(team: Team, options: Options) -> Header:
         channel=options.channel.name if options.channel else UNSET,
         message_loss=options.loss or UNSET,
         improve=UNSET if options.improve is None else options.improve,
+        limit_s=UNSET if options.limit_s is None else options.limit_s,
         answer=UNSET if options.answer == AnswerRule.BEST else options.answer,
         version=BOUNDED if options.bounds else VERSION,
     )

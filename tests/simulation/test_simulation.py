@@ -10,14 +10,16 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.run import Options, Runtime
 from tests.simulation.__main__ import main
 from tests.simulation.clock import HangError, VirtualClock
 from tests.simulation.drawing import drawn_plan
 from tests.simulation.invariants import Finding
 from tests.simulation.minimising import minimised, repeated
-from tests.simulation.plan import FIXED, Plan, changed_options
+from tests.simulation.plan import FIXED, Fault, FaultKind, Plan, changed_options
 from tests.simulation.playing import FullDisk, examine
 from tests.support.compiled import plain_python_only
 
@@ -37,6 +39,20 @@ def test_the_same_seed_gives_the_same_plan_and_run() -> None:
         one, other = examine(drawn_plan(seed)), examine(drawn_plan(seed))
         assert one == other
     assert drawn_plan(0) != drawn_plan(1)
+
+
+def test_a_stopped_robot_delays_an_answer_by_a_few_seconds_only() -> None:
+    """With a deadline of 10 s; also if the robot is stopped between the verdict and its report."""
+    team = random_csp(3, 2, 1, 0, seed=1, max_cost=9)
+    options = Options(protocol="syncbb", runtime=Runtime.PROCESSES, cache=False, deadline=10, patience=1000)
+    latest = []
+    for number in range(60):
+        stop = Fault(FaultKind.STOP, team.order[number % 3], number / 10, 10_000)
+        report = examine(Plan(number * 3 + 1, team, options, (stop,), tick_s=1e-6, delay_s=0.2))
+        assert not report.findings
+        assert report.verdict in {"optimal", "solution", "unknown"}
+        latest.append(report.robot_s / 3)
+    assert 14 < max(latest) < 16
 
 
 @pytest.fixture

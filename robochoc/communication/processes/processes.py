@@ -309,7 +309,7 @@ class ProcessesRun(Session, MasterLoop):
     def _await_reports(self, *, late: bool) -> None:
         """Wait for reports as long as reports arrive: in a large team, many reports are waiting to be read.
 
-        Without a verdict, the wait for a computing robot ends at the time limit; with a verdict, after
+        The wait for a computing robot ends at the time limit (`_limit`); with a verdict, at the latest after
         `BUSY_REPORTS_S`. The wait for a stopped robot ends after the patience. Robots are checked twice, since a robot
         that has just reported does not compute either.
         """
@@ -334,8 +334,10 @@ class ProcessesRun(Session, MasterLoop):
 
     @property
     def _limit(self) -> float | None:
-        """The deadline of a search without a verdict. After a verdict in time, the reports may arrive later."""
-        return None if self.state.verdict is not None else self._deadline
+        """The time at which the wait for reports ends. After a verdict in time, they may be late, by `REPORTS_S`."""
+        if self._deadline is None or self.state.verdict is None:
+            return self._deadline
+        return self._deadline + REPORTS_S
 
     def _silent(self) -> list[str]:
         """Return the robots that have a process and have not reported."""
