@@ -1,10 +1,14 @@
-"""`make simulate`: runs in virtual time, each decided by its seed. Exit status 1: a property does not hold."""
+"""`make simulate`: runs in virtual time, each decided by its seed.
+
+Exit status 1: a property does not hold. 130, 143: Ctrl-C or SIGTERM; findings so far have been saved.
+"""
 
 from __future__ import annotations
 
 import argparse
 import json
 import secrets
+import signal
 import subprocess
 import sys
 import time
@@ -66,9 +70,14 @@ def main() -> int:
     if options.seed is None:
         options.seed = secrets.randbelow(10**9)
     if options.inside is not None:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # the parent reports the end
         sys.stdout.write(_work(options).as_json() + "\n")
         return 0
-    return _all(options)
+    try:
+        return _all(options)
+    except KeyboardInterrupt:
+        sys.stdout.write("interrupted\n")
+        return 130
 
 
 def _all(options: argparse.Namespace) -> int:
@@ -99,6 +108,7 @@ def _join_workers(options: argparse.Namespace, total: Tally) -> int:
         for number in range(options.jobs)
     ]
     failed = 0
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # no worker is left
     try:
         for worker in workers:
             text, _ = worker.communicate()
