@@ -13,7 +13,7 @@ from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_eve
 from robochoc.exploration.explanation import explanation_of
 from robochoc.exploration.random_runs import play_random_runs
 from robochoc.exploration.stage import NotCreatedError
-from robochoc.exploration.state_graph import StateGraph
+from robochoc.exploration.state_graph import StateGraph, TooManyPacketsError
 from robochoc.exploration.team_state import Exploration
 from robochoc.generators.draws import seeded
 from robochoc.model.costs import normalized
@@ -104,7 +104,8 @@ def _explored(graph: StateGraph, case: Case, options: CheckOptions, is_over: Cal
     if not (found.is_complete or found.fault):
         few = min(options.states, max(_FEWEST_RANDOM_STEPS, options.states // 10))
         steps = few if options.random_steps is None else options.random_steps
-        play_random_runs(graph, found, seeded(options.run.seed), steps, is_over)
+        with suppress(TooManyPacketsError):
+            play_random_runs(graph, found, seeded(options.run.seed), steps, is_over)
     if found.fault:
         found.explanation = explanation_of(found, graph)
     return found

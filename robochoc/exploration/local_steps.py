@@ -177,6 +177,8 @@ class LocalSteps:
         number = self._numbers.get(key, len(self.hosts))
         if number == len(self.hosts):
             protocol = host.protocol
+            if not isinstance(protocol.findings, Findings):
+                raise TypeError(f"findings is {protocol.findings!r}; expected an object of the class Findings")
             self.states.append(
                 LocalState(protocol.verdict, protocol.assignment, protocol.findings, protocol.most_above_bound)
             )

@@ -16,10 +16,17 @@ from robochoc.exploration.stage import Stage
 from robochoc.exploration.state_store import StateStore
 from robochoc.exploration.team_state import LOST, Channel, Delivery, Exploration, Move, TeamState
 from robochoc.model.outcome import Verdict
+from robochoc.solver.errors import UnsupportedError
 
 NOT_A_NEIGHBOUR = "with which it shares no constraint; set Traits.writes_to_non_neighbours if this is intended"
+MOST_PACKETS = 20_000
+"""The maximum number of packets that are explored from a state: their number grows exponentially."""
 _OFTEN = 256
 """The number of states between two checks of the time, which is also checked after each new stage."""
+
+
+class TooManyPacketsError(UnsupportedError):
+    """Raised if more than `MOST_PACKETS` packets may be received in a state."""
 
 
 class StateGraph:
@@ -61,8 +68,11 @@ class StateGraph:
             if (found.states % _OFTEN == 0 or len(self._stages) > stages) and is_over(found.states):
                 break
             stages, number = len(self._stages), found.states
+            try:
+                fault, delivery = self._explored(number, found)
+            except TooManyPacketsError:
+                break
             found.states += 1
-            fault, delivery = self._explored(number, found)
             if fault:
                 found.fault = fault
                 found.path = [*store.path(number), *([delivery] if delivery else [])]
@@ -303,7 +313,11 @@ class StateGraph:
         """Yield the packets of waiting messages, as the channels in the order in which their messages arrive."""
         left = {channel: sum(number != LOST for number in queues[channel]) for channel in channels}
         packets: list[tuple[Channel, ...]] = [(channel,) for channel in channels]
+        number = 0
         while packets:
+            number += len(packets)
+            if number > MOST_PACKETS:
+                raise TooManyPacketsError(f"more than {MOST_PACKETS:,} packets may be received in a state")
             yield from packets
             longer = itertools.product(packets, channels)
             packets = [(*packet, channel) for packet, channel in longer if packet.count(channel) < left[channel]]

@@ -122,6 +122,25 @@ def test_the_guide_shows_the_report_of_a_fault() -> None:
     assert f"```text\n{team.name}: {faulty.report}\n```" in (ROOT / "docs" / "guides" / "check.md").read_text()
 
 
+class Floods(ABT):
+    """Sends twenty messages at its start, and ignores all."""
+
+    def start(self) -> None:
+        super().start()
+        for name in self.problem.neighbours:
+            for number in range(20):
+                self.send(name, Nogood({}, (number,)))
+
+    def receive(self, sender: str, message: Any) -> None:  # noqa: ANN401 - as its base
+        pass
+
+
+def test_a_state_with_too_many_packets_ends_the_search() -> None:
+    options = CheckOptions(Floods, Options(protocol="abt", runtime=Runtime.SIMULATOR), packets=True)
+    (partly,) = checked([next(small_teams(ABT.traits, 3, 2, 0))], options)
+    assert not partly.exploration.is_complete
+
+
 class WritesToNobody(ABT):
     """Sends a message to a robot that does not exist."""
 
@@ -207,6 +226,12 @@ class NoFindings(ABT):
         raise ValueError("not today")
 
 
+class WrongFindings(ABT):
+    """Reports what it knows in a wrong type."""
+
+    findings = 3  # type: ignore[assignment]
+
+
 class Exits(ABT):
     """Ends its process."""
 
@@ -239,6 +264,7 @@ class CountsInClosure(ABT):
     [
         (NotCreated, "Robot1 cannot be created: ValueError: not today"),
         (NoFindings, "Robot1 has failed: ValueError: not today"),
+        (WrongFindings, "Robot1 has failed: TypeError: findings is 3; expected"),
         (Exits, "has failed: SystemExit: 0"),
         (CountsAll, "behaves differently when a step is repeated"),
         (CountsInClosure, "uses variables of another function: store a method"),
