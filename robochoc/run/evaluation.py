@@ -267,6 +267,8 @@ def _start_or_cheaper(
 ) -> dict[str, int]:
     """Return the start assignment, or the assignment that the robots claim to be optimal if it costs less.
 
+    If the robots list optima, the answer is the first of the list.
+
     Raises:
         RefutedError: when the start assignment costs less.
     """
@@ -275,7 +277,8 @@ def _start_or_cheaper(
         return merged_values(result.assignments)
     if best.cost > phase.start_cost:
         raise RefutedError(f"{phase.name} claims an optimal assignment, but the start assignment costs less")
-    return merged_values(start)
+    lists = any(found.listing is not None for found in result.findings.values())
+    return merged_values(result.assignments if lists else start)
 
 
 @collection_paused()

@@ -258,3 +258,19 @@ def test_each_listed_optimum_is_checked(monkeypatch: pytest.MonkeyPatch) -> None
 def test_a_place_that_is_none_is_a_lie() -> None:
     assert fault_of_findings(Findings(listing=Listing([-1], 1)), ()) == "it has reported impossible optima"
     assert not fault_of_findings(Findings(listing=Listing([0], 1)), ())
+
+
+def test_the_answer_is_the_first_of_the_list_also_with_a_start() -> None:
+    """Otherwise the report would omit the first optimum, and show the start twice."""
+    chosen = 0
+    for number in range(12):
+        team = random_cost_team(Random(number))
+        first = solve(team, IN_SIMULATOR)
+        if first.optima is None or not first.optima.assignments:
+            continue
+        optima = first.optima.assignments
+        outcome = solve(team, replace(IN_SIMULATOR, start={**optima[-1]}, settings={"limit": "1"}))
+        assert outcome.optima is not None
+        assert dict(outcome.assignment) == outcome.optima.assignments[0] == optima[0]
+        chosen += len(optima) > 1
+    assert chosen
