@@ -102,8 +102,8 @@ def check_protocol(  # noqa: PLR0913 - options, by name
 ) -> int:
     """Check a protocol: in every order in which messages can arrive on small teams, and at random on larger ones.
 
-    In each order (`robochoc check`) must hold: verdicts and bounds are right, no robot refuses a message or fails, and
-    a protocol that is `complete` ends with an answer. The same must hold in random runs in the simulator. Besides, a
+    In each order (`robochoc check`), verdicts and bounds must be right, no robot may refuse a message or fail, and a
+    protocol that is `complete` must end with an answer. The same must hold in random runs in the simulator. Besides, a
     run must be the same again with the same seed, and `in_words` of each message must not fail.
 
     Args:

@@ -219,7 +219,7 @@ def _refuse_untolerated(options: CheckOptions) -> None:
     """Raise `UnsupportedError` for faults that the protocol does not claim to tolerate."""
     name, traits = options.run.protocol, options.protocol.traits
     if options.losses and not traits.bears_loss:
-        raise UnsupportedError(f"{name} does not tolerate lost messages; lose none")
+        raise UnsupportedError(f"{name} does not tolerate lost messages: check it without losses")
     if any(options.plan) and not traits.dynamic:
         raise UnsupportedError(
             f"{name} does not continue after a crash or an event, it starts again: check it without them"

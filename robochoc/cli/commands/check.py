@@ -93,9 +93,9 @@ def check(  # noqa: PLR0913 - options, by name
 ) -> None:
     """Explore every order in which messages can arrive, with the code of PROTOCOL that robots run.
 
-    Each state of a team, and each order of deliveries, is visited once, up to --states; a team with more states is also
-    played in random orders. In each state must hold: verdicts are right, bounds too, no robot refuses a message, and a
-    complete protocol ends with an answer. The teams are small and random, or those in TEAM.
+    Each state of a team is explored once, up to --states; a team with more states is also played in random orders. In
+    each state, verdicts and bounds must be right, no robot may refuse a message, and a complete protocol must end with
+    an answer. The teams are small and random, or those in TEAM.
 
     The table has the number of states, of steps between them, of states in which the search is over, and whether all
     states were explored. Exit status: 0 without a fault if all were, 3 if not; 4 with a fault.
@@ -140,7 +140,7 @@ def check(  # noqa: PLR0913 - options, by name
             _write_page(html, fault or found[0], options)
         if journal is not None and fault is not None:
             _write_journal(journal, fault, options)
-        _end(found, fault, is_late=_is_past(deadline))
+        _end(found, fault, is_late=_is_past(deadline), packets=packets)
 
 
 def _is_past(deadline: float | None) -> bool:
@@ -215,7 +215,7 @@ def _write_journal(journal: Path, team: CheckedTeam, options: CheckOptions) -> N
     click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
 
 
-def _end(found: list[CheckedTeam], fault: CheckedTeam | None, *, is_late: bool) -> None:
+def _end(found: list[CheckedTeam], fault: CheckedTeam | None, *, is_late: bool, packets: bool) -> None:
     """Report what was found. Raises `Failure` if there is a `fault`, or if not everything was explored."""
     from robochoc.system.plain_text import counted
     from robochoc.system.stopping import stop_requested
@@ -227,7 +227,8 @@ def _end(found: list[CheckedTeam], fault: CheckedTeam | None, *, is_late: bool) 
         raise Failure(LOST, "\n".join(lines))
     partly = sum(not one.exploration.is_complete for one in found)
     if partly or stop_requested():
-        hint = "stopped" if stop_requested() else f"increase {'--timeout' if is_late else '--states'}"
+        more = "--timeout" if is_late else "--states, or omit --packets" if packets else "--states"
+        hint = "stopped" if stop_requested() else f"increase {more}"
         rest = f"{counted(partly, 'team')} explored in part or not at all"
         raise Failure(LIMIT, f"{states}, no fault so far; {rest}: {hint}")
     click.echo(f"{states}, no fault in any order of deliveries", err=True)
