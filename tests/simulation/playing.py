@@ -12,6 +12,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from types import FrameType
 
+from robochoc.communication.processes.processes import BUSY_REPORTS_S
 from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.journal.journal import JournalError, JournalRecorder, read_journal
@@ -191,12 +192,17 @@ def _examine(plan: Plan, report: Report) -> None:
     report.messages = sum(metrics.messages.values())
     report.verdict = str(first.outcome.verdict) if first.outcome else "robots lost"
     if first.outcome is None:
-        if not (plan.has(*_DEADLY[plan.options.runtime]) or plan.options.kill):
+        if not (plan.has(*_DEADLY[plan.options.runtime]) or plan.options.kill or _is_too_slow(plan)):
             report.findings.append(Finding("lost", first.error))
     else:
         report.findings += violated(plan, first.outcome)
     report.findings += _of_journal(plan, first)
     report.findings += _of_repetition(plan, first, report)
+
+
+def _is_too_slow(plan: Plan) -> bool:
+    """Return whether a robot may compute for so long after a verdict that it is lost: it may have a few steps left."""
+    return any(fault.kind is FaultKind.SLOW and fault.for_s > BUSY_REPORTS_S / 4 for fault in plan.faults)
 
 
 def _of_journal(plan: Plan, played: _Played) -> Iterator[Finding]:
