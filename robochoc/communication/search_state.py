@@ -138,6 +138,10 @@ class SearchState:
         """True if all robots are ready."""
         return not self._unready
 
+    def is_ready(self, name: str) -> bool:
+        """Return whether the robot `name` is ready, or lost."""
+        return name not in self._unready
+
     @property
     def broken_off(self) -> bool:
         """True if the search must end without a verdict: robots were lost, or the message limit is reached."""

@@ -347,6 +347,8 @@ class Master(MasterLoop):
         away_s = self._settings.patience_s
         for name in [n for n, member in self.members.robots.items() if member.is_away(away_s) and not member.left]:
             self._lose(name, f"it has not been there for {away_s:g} s")
+        if not self.state.ready:
+            self._frame_loss.explain_unready(self.state.is_ready, away_s)
         if now - self._registry_read >= REGISTRY_S:
             self._registry_read = now
             self._registrar.welcome_again()
