@@ -228,6 +228,7 @@ def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> 
     assert earlier
 
 
+@plain_python_only
 def test_answers_of_snapshots_before_the_deadline_are_no_contradictions() -> None:
     """Found by `make simulate`: with `--improve`, an answer may be that of a snapshot, before the last values."""
     options = Options(protocol="aas", runtime=Runtime.SIMULATOR, deadline=40, improve=40, cache=False)
