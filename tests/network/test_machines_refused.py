@@ -162,7 +162,7 @@ def test_a_port_in_use(higher: int, site: Deployment) -> None:
         (["master", "--set", "colour=red"], 2, "colour"),
         (["master", "--gather", "nan"], 2, "--gather requires a number of seconds greater than 0"),
         (["master", "--timeout", "0"], 2, "--timeout requires a number of seconds greater than 0"),
-        (["master", "--deadline", "nan"], 2, "--deadline requires a number of seconds greater than 0"),
+        (["master", "--deadline", "nan"], 2, "Invalid value for '--deadline': 'nan' is not a number greater than 0"),
         (["master", "--deadline", "1", "--timeout", "1"], 2, "--deadline and --timeout both limit the time"),
         (["master", "--improve", "1"], 2, "--improve continues after --deadline SECONDS: add --deadline"),
         (["master", "--deadline", "1", "--improve", "inf"], 2, "inf is not a finite number"),

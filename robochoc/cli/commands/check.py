@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
+from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.solve import protocol_settings, settings_option
 from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
@@ -25,8 +26,15 @@ if TYPE_CHECKING:
 
 MOST_ROBOTS, MOST_VALUES = 6, 6
 
+_SECTIONS: Sections = {
+    COMMON: ("--set", "--timeout", "--states", "--jobs", "--journal", "--html", "--json", "--help"),
+    "Random teams": ("--teams", "--robots", "--values", "--seed"),
+    "Arrival and loss of messages": ("--packets", "--loss"),
+    "Changes of the problem": ("--crash", "--rejoin", "--event"),
+}
 
-@click.command()
+
+@click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("protocol", type=ProtocolName())
 @click.argument("folders", nargs=-1, type=InputPath(), metavar="[TEAM...]")
 @click.option(
