@@ -58,7 +58,7 @@ PASSED = (int(pytest.ExitCode.OK), int(pytest.ExitCode.NO_TESTS_COLLECTED))
 
 
 class Target(NamedTuple):
-    """What a mutant of one file meets: the nearest protocols that use it, and the nearest files of unit tests."""
+    """The nearest protocols that use the file of a mutant, and the nearest files of unit tests."""
 
     protocols: tuple[str, ...]
     files: tuple[str, ...]

@@ -48,7 +48,7 @@ NOT_A_RUN = (UnsupportedError, InvalidInputError, ChangeError)
 
 @dataclass
 class Report:
-    """What became of a plan.
+    """The result of a plan.
 
     Attributes:
         findings: The properties that do not hold.

@@ -119,7 +119,7 @@ class _Watch:
 
 
 class Action(NamedTuple):
-    """What a robot reads when it wakes up: orders, messages of a queue, or (without any) the end of the pipe or queue.
+    """The input of a robot that wakes up: orders, messages of a queue, or (without any) the end of the pipe or queue.
 
     `queue`: the queue; empty for the control pipe.
     """

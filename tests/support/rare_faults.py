@@ -28,7 +28,7 @@ SEED = 0
 
 
 class Found(NamedTuple):
-    """What was measured: the steps that lead to the fault, the states until then, and the random runs with a fault."""
+    """Measured numbers: the steps that lead to the fault, the states until then, and the random runs with a fault."""
 
     steps: int
     states: int
