@@ -1,7 +1,8 @@
 """A canonical, hashable key of a robot's state: equal keys, equal behaviour.
 
 The key contains everything that a protocol object contains, in the order in which it is iterated (sets, whose order
-means nothing, are sorted). It does not contain the robot's problem, which never changes, and the number of its checks.
+means nothing, are sorted). Of the robot's problem it contains what a protocol could change or add, but not the number
+of its checks, and nothing that the problem stores to be faster.
 Two objects with equal content have the same key, whether or not they are the same object.
 """
 
@@ -18,18 +19,26 @@ import numpy as np
 
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.local_problem import LocalProblem
+from robochoc.solver.shared_constraint import SharedConstraint
 
 _ATOMS = (int, str, bytes, float, bool, type(None))
 _NAMED = (type, BuiltinFunctionType, ModuleType)
 _NOT_STATE = frozenset({"problem", "outbox", "checks_at_send"})
-"""Attributes of a protocol that are no state: the problem, and what is empty between two steps."""
+"""Attributes outside the state of a protocol: its problem, which has a key of its own, and lists that are empty between
+two steps."""
+_SAME_PROBLEM = frozenset({"checks", "_domain", "_part", "_rank", "_places", "_made_filters", "_table"})
+"""Attributes of a problem outside the state: the number of checks, what all copies share, and caches."""
 
 
 def state_key(protocol: Protocol) -> bytes:
     """Return a key of the protocol object's state."""
     state = {name: part for name, part in vars(protocol).items() if name not in _NOT_STATE}
-    state["undeclared"] = protocol.problem.allows_undeclared
-    return content_key(state, (id(protocol),))
+    problem = _problem_parts(protocol.problem)
+    return content_key((state, problem), (id(protocol), id(protocol.problem)))
+
+
+def _problem_parts(problem: LocalProblem) -> dict[str, object]:
+    return {name: part for name, part in vars(problem).items() if name not in _SAME_PROBLEM}
 
 
 def content_key(content: object, path: tuple[int, ...] = ()) -> bytes:
@@ -46,8 +55,8 @@ def _canonical(thing: object, path: tuple[int, ...]) -> object:
         return thing.__name__
     if isinstance(thing, FunctionType):
         return _function_key(thing)
-    if isinstance(thing, LocalProblem):
-        return "problem"
+    if isinstance(thing, SharedConstraint):  # without its caches, which copies share
+        return "constraint", thing.key
     if id(thing) in path:
         return "containing", len(path) - path.index(id(thing))
     return kind.__name__, *_parts(thing, partial(_canonical, path=(*path, id(thing))))
@@ -73,10 +82,14 @@ def _parts(thing: Any, canonical: Any) -> list[object]:  # noqa: ANN401 - anythi
         return [thing.__name__, canonical(thing.__self__)]
     if isinstance(thing, np.ndarray):
         return [thing.dtype.str, thing.shape, thing.tobytes()]
+    return [canonical(part) for part in _attributes(thing)]
+
+
+def _attributes(thing: Any) -> list[object]:  # noqa: ANN401 - anything that a protocol contains
+    if isinstance(thing, LocalProblem):
+        return [_problem_parts(thing)]
     if is_dataclass(thing):  # without what a frozen object has computed once
-        parts = [getattr(thing, field.name) for field in fields(thing)]
-    else:
-        _, arguments, *content = thing.__reduce_ex__(5)
-        state, items, pairs = (*content, None, None, None)[:3]
-        parts = [arguments, state, *(items or ()), *(pairs or ())]
-    return [canonical(part) for part in parts]
+        return [getattr(thing, field.name) for field in fields(thing)]
+    _, arguments, *content = thing.__reduce_ex__(5)
+    state, items, pairs = (*content, None, None, None)[:3]
+    return [arguments, state, *(items or ()), *(pairs or ())]

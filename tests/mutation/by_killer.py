@@ -124,6 +124,8 @@ def _check(_: Uses, target: Target) -> Iterator[Sequence[str]]:
 def _every_order(_: Uses, target: Target) -> Iterator[Sequence[str]]:
     if target.protocols == ANY:
         yield (*PYTEST, "-x", "tests/unit/communication/test_every_order.py")
+    else:
+        yield ("-m", "tests.mutation.every_order", *target.protocols)
 
 
 def _simulate(_: Uses, target: Target) -> Iterator[Sequence[str]]:

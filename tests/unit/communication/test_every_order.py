@@ -12,12 +12,10 @@ import msgspec
 import pytest
 
 from robochoc.communication.control import EpochMessage, EpochReport
-from robochoc.communication.processes import processes
 from robochoc.communication.processes.robot_process import QueueRobot
 from robochoc.communication.quiescence import FourCounters, MessageCounts
 from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_state import SearchState
-from robochoc.communication.session import Epoch
 from robochoc.exploration.problems import small_teams
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Team
@@ -25,51 +23,14 @@ from robochoc.protocols.findings import NO_FINDINGS
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import protocol_named
-from robochoc.solver.compiled_team import ensure_compiled
 from tests.support.compiled import plain_python_only
 from tests.support.examples import count
 from tests.support.explored_robots import RobotView
+from tests.support.explored_searches import Program, concluded, one_search, two_searches
 from tests.support.explored_team import ExploredTeam, Found
 from tests.support.scripted_senders import TEAMS, Script, all_scripts, scripted
 
 pytestmark = plain_python_only
-
-
-Program = Callable[[], SearchResult]
-
-
-def one_search(team: Team, protocol: type[Protocol], *, timeout_s: float | None = None, shown: bool = False) -> Program:
-    """Return the program of a master with one search. `shown`: it counts messages from time to time, by a wave."""
-    compiled = ensure_compiled(team)
-
-    def program() -> SearchResult:
-        progress = (lambda _: None) if shown else None
-        return processes.ProcessesRun(compiled, protocol, progress=progress).run(timeout_s)
-
-    return program
-
-
-def two_searches(team: Team, protocol: type[Protocol], *, timeout_s: float | None = None) -> Program:
-    """Return the program of a master whose robots search, and search again after a change that changes nothing."""
-    compiled = ensure_compiled(team)
-
-    def program() -> SearchResult:
-        with processes.ProcessesRun(compiled, protocol) as session:
-            session.search(timeout_s)
-            session.change(Epoch(compiled))
-            return session.search()
-
-    return program
-
-
-def concluded(result: object, robots: Mapping[str, RobotView]) -> str:
-    """Return why a search has not ended as it should: with the robots' values, and the verdict of its witness."""
-    if not isinstance(result, SearchResult):
-        return f"the search has failed: {result}"
-    if result.assignments != {name: robot.assignment for name, robot in robots.items()}:
-        return f"{result.assignments} are not the values of the robots"
-    verdict = Verdict.SOLUTION if result.witness is None else robots[result.witness].verdict
-    return "" if result.verdict == verdict else f"the verdict {result.verdict} is not that of {result.witness}"
 
 
 def explored(protocol: type[Protocol], team: Team = TEAMS[2], **options: Any) -> Found:  # noqa: ANN401 - as `ExploredTeam`

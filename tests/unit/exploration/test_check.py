@@ -275,6 +275,46 @@ def test_a_protocol_that_cannot_be_explored_is_a_fault(mutant: type[Protocol], f
         check_protocol(mutant, teams=3)
 
 
+class Counts(ABT):
+    """Counts up to three received messages."""
+
+    def start(self) -> None:
+        self.count(0)
+        super().start()
+
+    def receive(self, sender: str, message: Any) -> None:  # noqa: ANN401 - as its base
+        super().receive(sender, message)
+        self.count(min(self.holder.number + 1, 3))
+
+    @property
+    def holder(self) -> Any:  # noqa: ANN401 - any object
+        """The object that has the number."""
+        return self
+
+    def count(self, number: int) -> None:
+        """Store `number`."""
+        self.holder.number = number
+
+
+class CountsInProblem(Counts):
+    """Counts them in its problem."""
+
+    @property
+    def holder(self) -> Any:  # noqa: ANN401 - any object
+        """See `Counts.holder`."""
+        return self.problem
+
+
+def test_a_state_in_the_problem_is_a_part_of_the_state() -> None:
+    def explored(protocol: type[Protocol]) -> list[tuple[int, int]]:
+        options = CheckOptions(protocol, Options(protocol="abt", runtime=Runtime.SIMULATOR), 3000)
+        results = [one.exploration for one in checked(itertools.islice(small_teams(ABT.traits, 3, 2, 0), 4), options)]
+        assert not any(one.fault for one in results)
+        return [(one.states, one.local_states) for one in results]
+
+    assert explored(Counts) == explored(CountsInProblem) != explored(ABT)
+
+
 @pytest.mark.parametrize("wrong", [{"teams": 0}, {"robots": 0}, {"states": 0}, {"losses": -1}, {"problems": []}])
 def test_a_check_of_nothing_is_an_error(wrong: dict[str, Any]) -> None:
     with pytest.raises(ValueError, match=r"it must be|no team was checked"):
