@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
@@ -26,6 +27,7 @@ class ReadProblem(NamedTuple):
         foreign: True if it was read from another tool's file, whose user knows only the original names.
         notes: The changes made while reading such a file.
         bound: The sum of costs that counts as no solution in the file's format; see `ImportResult`.
+        files: Further files that an import of such a file writes; see `ImportResult`.
     """
 
     team: Team
@@ -33,6 +35,7 @@ class ReadProblem(NamedTuple):
     foreign: bool
     notes: tuple[ConversionNote, ...] = ()
     bound: Fraction | None = None
+    files: Mapping[str, bytes] = MappingProxyType({})
 
 
 def is_foreign(place: Path) -> bool:
@@ -74,7 +77,7 @@ def read_problem(
         options = ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code)
         imported = read_foreign([place, *more], options, dialect)
         check_team(imported.team)
-        return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes, bound=imported.bound)
+        return ReadProblem(imported.team, imported.names, True, imported.notes, imported.bound, imported.files)
     for option, given in (("format", dialect), ("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
             what = f"is the folder of a team, and '{option}' is for files of other tools"

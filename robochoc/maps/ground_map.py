@@ -21,11 +21,14 @@ MAX_PIXELS = 4_000_000
 """The maximum number of pixels, as for images of maps (`occupancy/pgm.py`)."""
 MAX_VOXELS = 16_000_000
 """The maximum number of voxels, as for three-dimensional maps (`octomap/voxels.py`)."""
-_SIDE_MAX = 1_000
+SIDE_MAX = 1_000_000
+"""The maximum number of columns and rows, of which only places are stored."""
+_BLOCKED_MAX = 1_000
 _FAR = 1_000_000
 
 _Metres = Annotated[float, msgspec.Meta(ge=-_FAR, le=_FAR)]
-_Coordinate = Annotated[int, msgspec.Meta(ge=1, le=_SIDE_MAX)]
+_Coordinate = Annotated[int, msgspec.Meta(ge=1, le=_BLOCKED_MAX)]
+_Column = Annotated[int, msgspec.Meta(ge=1, le=SIDE_MAX)]
 _First = Annotated[int, msgspec.Meta(ge=-_FAR, le=_FAR)]
 
 
@@ -139,12 +142,12 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
         places: The exact places of robots in metres, by name.
     """
 
-    columns: _Coordinate
-    rows: _Coordinate
-    starts: dict[str, tuple[_Coordinate, _Coordinate]] = {}
+    columns: _Column
+    rows: _Column
+    starts: dict[str, tuple[_Column, _Column]] = {}
     blocked: Annotated[tuple[BlockedCell, ...], msgspec.Meta(max_length=MAX_BLOCKED)] = ()
     first: tuple[_First, _First] = (1, 1)
-    scale: Annotated[float, msgspec.Meta(gt=0, le=_SIDE_MAX)] | None = None
+    scale: Annotated[float, msgspec.Meta(gt=0, le=1_000)] | None = None
     volume: Volume | None = None
     walls: WallPixels | None = None
     places: dict[str, tuple[_Metres, _Metres]] = {}

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from robochoc.model.expression import Expression, UndefinedValueError, evaluate, names
+from robochoc.model.expression import Apply, Expression, UndefinedValueError, evaluate, names
 from robochoc.model.problem import Robot, Team
 
 if TYPE_CHECKING:
@@ -64,6 +64,7 @@ class MapPlaces:
         for robot in team.robots:
             own = [variable.name for variable in robot.variables]
             found = [self._formulas[name] for name in own if name in self._formulas]
+            found = [one for one in found if not any(map(_has_cases, one[1]))]  # cases are about one task
             for name in own if len(found) == 1 else ():
                 if name not in self._formulas and known.issuperset(domains[name]):
                     yield name, found[0]
@@ -78,3 +79,8 @@ def _waypoints(robot: Robot, *, has_height: bool) -> Iterator[tuple[str, tuple[s
         if len(formulas) == (3 if has_height else 2) and len(over) == 1 and over <= own:
             (name,) = over
             yield name, (name, formulas)
+
+
+def _has_cases(formula: Expression) -> bool:
+    """Return whether a formula distinguishes cases, and is thus about the values of its own variable only."""
+    return isinstance(formula, Apply) and (formula.operator == "if" or any(map(_has_cases, formula.arguments)))

@@ -18,7 +18,7 @@ _SUBJECTS = {
         ("privacy", "sniffer", "exploration", "view", "replay", "ros", "vehicles", "robots", "generators"),
     ),
     "a run": ("#fdeccb", ("run", "flight", "communication", "authority", "services", "journal")),
-    "data": ("#efe5f7", ("formats", "maps", "verification", "model", "system")),
+    "data": ("#efe5f7", ("formats", "maps", "tasks", "verification", "model", "system")),
     "reasoning": ("#fbdcd9", ("protocols", "solver")),
 }
 _FILL = {package: fill for fill, packages in _SUBJECTS.values() for package in packages}

@@ -170,9 +170,8 @@ def _import(
     try:
         imported = read_foreign(source.files, options, dialect)
         team = with_order(imported.team, order_for(imported.team, order))
-        write_team(
-            team, source.folder, replace=force, extra_files={NAMES_FILE: names_json(imported.dialect, imported.names)}
-        )
+        files = {NAMES_FILE: names_json(imported.dialect, imported.names), **imported.files}
+        write_team(team, source.folder, replace=force, extra_files=files)
     except InvalidInputError as invalid:
         return entry | {"errors": [str(diagnostic) for diagnostic in invalid.diagnostics]}
     except OrderError as error:

@@ -13,7 +13,7 @@ import click
 from robochoc.cli.options.order import order_for
 from robochoc.cli.options.recording import flushing_progress, recording
 from robochoc.cli.options.ros_setup import closed_loop
-from robochoc.cli.options.scene import ground_map, readable_map
+from robochoc.cli.options.scene import problem_map, readable_map
 from robochoc.cli.options.solve import Outputs, TeamRequest
 from robochoc.cli.reports.closed_loop import FlownMission, publication_lines, report_flight
 from robochoc.cli.reports.failures import INVALID, LIMIT, Failure, errors_as_failures
@@ -51,7 +51,7 @@ def _solve_and_show(
 
     try:
         with errors_as_failures(folder):
-            team, outcome, loop, flight = _solve(folder, options, outputs, request, sniffer)
+            team, outcome, loop, flight, problem = _solve(folder, options, outputs, request, sniffer)
     except Failure as failure:
         failure.show()
         return failure.exit_code
@@ -60,7 +60,7 @@ def _solve_and_show(
     if outputs.html or outputs.serve:
         from robochoc.cli.reports.scene import scene_for, show_scene
 
-        ground = ground_map(None, folder)
+        ground = problem_map(problem, folder)
         scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown, ground=ground)
         show_scene(scene, outputs.html, serve=outputs.serve, quiet=request.as_json)
     if outcome.verdict != "unknown":
@@ -101,6 +101,7 @@ class _FinishedRun(NamedTuple):
     outcome: Outcome
     loop: ClosedLoop | None
     flight: FlownMission
+    problem: ReadProblem
 
 
 def _solve(
@@ -129,13 +130,13 @@ def _solve(
 
     objective = None if request.ros.situation else objective_to_record(team, options)
     with (
-        closed_loop(request.ros, team, options.seed, folder) as loop,
+        closed_loop(request.ros, team, options.seed, partial(problem_map, problem, folder)) as loop,
         recording(outputs.journal, header, objective, sniffer.start()) as recorder,
     ):
         audience = ImprovementReporter(loop, quiet=request.as_json) if options.improve else None
         outcome = _observed(run, recorder, loop, audience)
         team = loop.team if loop else team
-        _print_outcome(problem._replace(team=team), outcome, request, run.choice, readable_map(folder))
+        _print_outcome(problem._replace(team=team), outcome, request, run.choice, readable_map(problem, folder))
         if loop and loop.mission is None:  # the run did not use the loop
             loop.publish(outcome)
         flight = FlownMission()
@@ -143,7 +144,7 @@ def _solve(
             flight = report_flight(loop, request.ros.flight.get("failures", ()), quiet=request.as_json)
         if audience and (outputs.html or outputs.serve) and flight.mission is None:
             flight = flight._replace(mission=audience.mission(outcome, team))
-    return _FinishedRun(team, outcome, loop, flight)
+    return _FinishedRun(team, outcome, loop, flight, problem)
 
 
 def _observed(

@@ -21,12 +21,12 @@ from robochoc.cli.options.ros import (
     given_names,
     refuse_given,
 )
-from robochoc.cli.options.scene import ground_map
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
     from robochoc.flight.mission import Drone, Leg, Mission
     from robochoc.flight.quadrotor.conditions import FlightConditions
+    from robochoc.maps.ground_map import GroundMap
     from robochoc.model.problem import Assignment, Robot, Team
     from robochoc.robots.closed_loop import ClosedLoop, Feedback
     from robochoc.robots.simulated_feedback import FlightSettings
@@ -125,10 +125,12 @@ def scale_usage() -> Iterator[None]:
 
 
 @contextmanager
-def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = None) -> Iterator[ClosedLoop | None]:
+def closed_loop(
+    ros: RosOptions, team: Team, seed: int, ground_map: Callable[[], GroundMap | None] = lambda: None
+) -> Iterator[ClosedLoop | None]:
     """Provide the closed loop for `team`, or None if no option requires it. Publications are complete on exit.
 
-    A map in the team's `folder` provides the positions of robots, the length of a unit, and the obstacles.
+    The map returned by `ground_map` has the positions of robots, the length of a unit, and the obstacles.
 
     Raises:
         Failure: if a sink or a source fails, or a decision cannot be flown.
@@ -153,7 +155,7 @@ def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = No
         sinks = open_sinks(ros.sinks, stack)
         if ros.arm:
             _allow_arming(ros.sinks, sinks)
-        ground = ground_map(None, folder)
+        ground = ground_map()
         with scale_usage():
             check_scale(ros.scale, ground)
         options = publish_options(ros.published)

@@ -12,6 +12,7 @@ from robochoc.cli.options.paths import InputPath, OutputFile
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
+    from robochoc.formats.problems import ReadProblem
     from robochoc.maps.ground_map import GroundMap
 
 Command = TypeVar("Command", bound=Callable[..., object])
@@ -60,12 +61,23 @@ def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
         raise Failure(INVALID, on_one_line(f"{file}: {error}")) from error
 
 
-def readable_map(folder: Path) -> GroundMap | None:
-    """Return the map in a team's `folder`, or None if it is missing or invalid.
+def problem_map(problem: ReadProblem, folder: Path) -> GroundMap | None:
+    """Return the map of a problem in another tool's file, or in a team's `folder`, or None. Raises `Failure`."""
+    from robochoc.formats.team_reader import GROUND_FILE
+
+    if problem.foreign and (content := problem.files.get(GROUND_FILE)):
+        from robochoc.maps.ground_map import read_ground_map
+
+        return read_ground_map(content)
+    return ground_map(None, folder)
+
+
+def readable_map(problem: ReadProblem, folder: Path) -> GroundMap | None:
+    """Return the map of a problem, or None if it is missing or invalid.
 
     The map only adds positions to printed values, so an invalid map must not end a run that does not need it.
     """
     try:
-        return ground_map(None, folder)
+        return problem_map(problem, folder)
     except Failure:
         return None

@@ -30,7 +30,7 @@ _MOST_DROPPED = 3
 """The maximum number of dropped constraints listed in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 _ONLY, _NONE = "task", "none"
-"""A robot with at most one task has one variable, whose first value means no task (`formats/dialects/tasks`)."""
+"""A robot with at most one task has one variable, whose first value means no task (`tasks/builder.py`)."""
 
 
 @collection_paused()

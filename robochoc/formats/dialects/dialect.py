@@ -62,6 +62,7 @@ class ImportResult:
         notes: The differences from the files: `renamed`, `scale`, `shared variable`, ...
         bound: An upper bound that the costs of solutions in this format do not reach. None: the format has no such
             bound, or no assignment of the team reaches it.
+        files: Further files of the team's folder, such as `map.json`: their contents by name.
     """
 
     team: Team
@@ -69,6 +70,7 @@ class ImportResult:
     names: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[ConversionNote, ...] = ()
     bound: Fraction | None = None
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Find a dialect by its name, or by the contents of a file.
 
-Each dialect is a module of this package that ends in `DIALECT = Dialect(...)`. It is imported on first use.
+Each dialect is a module of this package that ends in `DIALECT = Dialect(...)`, or a package of a higher layer. It is
+imported on first use.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import os
 import stat
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, ImportOptions, ImportResult
@@ -18,13 +20,15 @@ from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, ImportOptions, 
 NAMES = ("frodo", "xdiscsp", "dcopsolver", "tasks", "pydcop", "xcsp3", "cfn", "wcsp", "dot", "graphml")
 """The names of all dialects, in the order in which they are tried on a file."""
 
+_ELSEWHERE = MappingProxyType({"tasks": "robochoc.tasks"})
+"""The packages of dialects in higher layers; lists of tasks may have maps."""
 _BEGINNING = 64 * 1024
 """The number of bytes at the beginning of a file used to detect its format."""
 
 
 def find_dialect(name: str) -> Dialect | None:
     """Return the dialect called `name`, or None if this version has no such dialect."""
-    module = f"{__package__}.{name}"
+    module = _ELSEWHERE.get(name, f"{__package__}.{name}")
     if name not in NAMES:
         return None
     try:

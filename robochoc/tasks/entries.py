@@ -32,6 +32,8 @@ class RobotEntry:
         capacity: The maximum sum of the loads of its tasks. None: unlimited.
         most: The maximum number of its tasks. None: unlimited.
         speed: The distance that it covers per unit of time.
+        radius: The radius of the robot on a map, in metres.
+        topic: The name of the topic of its waypoints; empty: its name and `/waypoint`.
     """
 
     line: int
@@ -40,6 +42,8 @@ class RobotEntry:
     capacity: int | None
     most: int | None
     speed: Fraction
+    radius: Fraction
+    topic: str
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,8 @@ class TaskEntry:
         worth: The worth of doing it.
         load: The part of a robot's capacity that it requires.
         deadline: The latest time of arrival. None: no deadline.
+        window: The earliest and the latest beginning; a robot that arrives earlier waits. None: no latest beginning.
+        duration: The time for which the task occupies each of its robots.
         robots: The number of robots required.
     """
 
@@ -62,7 +68,14 @@ class TaskEntry:
     worth: Fraction
     load: int
     deadline: Fraction | None
+    window: tuple[Fraction, Fraction | None]
+    duration: Fraction
     robots: int
+
+    @property
+    def latest(self) -> Fraction | None:
+        """The latest time of arrival; None if there is none."""
+        return min((time for time in (self.deadline, self.window[1]) if time is not None), default=None)
 
 
 @dataclass(frozen=True)
@@ -91,6 +104,28 @@ class EntryReader:
         if node.items is None or len(node.items) not in (_PLANE, _SPACE):
             raise self._mistake(key, node, f"write {key}: [X, Y], or {key}: [X, Y, Z]")
         return tuple(self._number(key, one, -MOST) for one in node.items)
+
+    def window(self, key: str) -> tuple[Fraction, Fraction | None]:
+        """Return an earliest and a latest time; `(0, None)` if the key is missing."""
+        node = self.node(key)
+        if node is None:
+            return Fraction(0), None
+        hint = f"write {key}: [EARLIEST, LATEST]"
+        if node.items is None or len(node.items) != _PLANE:
+            raise self._mistake(key, node, hint)
+        earliest, latest = (self._number(key, one, 0) for one in node.items)
+        if latest < earliest:
+            raise MistakeError(f"{self._what} has a {key} whose end is before its beginning", hint, node.line)
+        return earliest, latest
+
+    def word(self, key: str) -> str:
+        """Return a word; empty if the key is missing."""
+        node = self.node(key)
+        if node is None:
+            return ""
+        if not isinstance(node.scalar, str) or not node.scalar:
+            raise self._mistake(key, node, f"write {key}: WORD")
+        return node.scalar
 
     def number(self, key: str, default: Fraction | None, least: int = 0) -> Fraction | None:
         """Return a decimal of at least `least`; `default` if the key is missing."""
@@ -165,8 +200,8 @@ def name_text(value: Scalar) -> str:
     return "yes" if value is True else "no" if value is False else scalar_text(value)
 
 
-def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEntry]:
-    """Return the robots in a section; add mistakes to `mistakes`."""
+def read_robots(node: Node, radius: Fraction, mistakes: DiagnosticCollector) -> dict[str, RobotEntry]:
+    """Return the robots in a section, with a default radius; add mistakes to `mistakes`."""
     found = {}
     for name, one in _named("robots", node):
         with _collecting(one, mistakes):
@@ -176,7 +211,8 @@ def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEnt
                 raise MistakeError(f"the robot '{shortened(name)}' has the speed 0", "write a number above 0", one.line)
             has = frozenset(entry.words("skills"))
             room, most = entry.integer("capacity", None), entry.integer("most", None)
-            found[name] = RobotEntry(one.line, entry.point("at"), has, room, most, speed)
+            own, topic = entry.number("radius", radius) or Fraction(0), entry.word("topic")
+            found[name] = RobotEntry(one.line, entry.point("at"), has, room, most, speed, own, topic)
     return found
 
 
@@ -188,8 +224,9 @@ def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry
             entry = EntryReader(f"the task '{shortened(name)}'", one)
             needs, worth = frozenset(entry.words("needs")), entry.required_number("worth", -MOST)
             load, robots = entry.integer("load", 1) or 0, entry.integer("robots", 1, 1) or 1
-            deadline = entry.number("deadline", None)
-            found[name] = TaskEntry(one.line, entry.point("at"), needs, worth, load, deadline, robots)
+            deadline, duration = entry.number("deadline", None), entry.number("duration", None) or Fraction(0)
+            at, window = entry.point("at"), entry.window("window")
+            found[name] = TaskEntry(one.line, at, needs, worth, load, deadline, window, duration, robots)
     return found
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from robochoc.formats.dialects.dialect import Dialect
 from robochoc.formats.dialects.pydcop.files import sections
-from robochoc.formats.dialects.tasks.reader import read
+from robochoc.tasks.reader import read
 
 _SECTIONS = {"robots", "tasks"}
 

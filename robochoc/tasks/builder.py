@@ -1,4 +1,4 @@
-"""Read a list of robots and tasks as a team: the tasks that each robot can do, and their profits."""
+"""Build the team of a task list: the tasks that each robot can do, their profits, and the robots' waypoints."""
 
 from __future__ import annotations
 
@@ -6,43 +6,24 @@ import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
 from fractions import Fraction
-from pathlib import Path
 
-from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
+from robochoc.formats.definitions import check_topic
+from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.dialect import ConversionNote, ImportOptions, ImportResult, NameMap, notes_on_names
 from robochoc.formats.dialects.exact_costs import Scale
-from robochoc.formats.dialects.pydcop.files import file_text
-from robochoc.formats.dialects.tasks.entries import (
-    MAX_PLACES,
-    EntryReader,
-    Point,
-    RobotEntry,
-    Synergy,
-    TaskEntry,
-    name_text,
-    read_robots,
-    read_synergies,
-    read_tasks,
-)
-from robochoc.formats.dialects.tasks.tours import TaskSet, TourSearch, round_length
 from robochoc.formats.symbols import check_symbol
-from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
-from robochoc.model.allocation import (
-    Distance,
-    TasksModel,
-    TaskSpec,
-    Worker,
-    assignment,
-    distance_between,
-    several_tasks,
-)
-from robochoc.model.assembly import assemble
+from robochoc.formats.team_reader import GROUND_FILE
+from robochoc.model.allocation import TasksModel, TaskSpec, Worker, assignment, several_tasks
+from robochoc.model.assembly import Extras, assemble
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.problem import ProblemKind, Team, Variable
+from robochoc.model.expression import Expression
+from robochoc.model.problem import ProblemKind, Team, Topic, Variable
 from robochoc.system.lazy_dataclass import dataclass
+from robochoc.tasks.entries import MAX_PLACES, Point, RobotEntry, Synergy, TaskEntry
+from robochoc.tasks.tours import TaskSet, Tour, TourSearch, round_length
+from robochoc.tasks.waypoints import in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
+from robochoc.tasks.ways import Ways
 
-MAX_NUMBER = 1000
-"""The maximum number of robots, and of tasks."""
 MAX_CONSTRAINTS = 200_000
 """The maximum number of constraints of the team, and of tours."""
 MAX_CREW = 16
@@ -53,102 +34,24 @@ _ONLY = "task"
 """The last part of the name of a robot's only variable."""
 
 
-def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
-    """Return the team for a list of robots and tasks.
-
-    Raises:
-        InvalidInputError: with all errors.
-    """
-    if len(paths) > 1:
-        mistakes = DiagnosticCollector(encodable(str(paths[1])))
-        mistakes.add(0, "is a second list of robots and tasks", "import one file")
-        mistakes.finish()
-    path = paths[0]
-    mistakes = DiagnosticCollector(encodable(str(path)))
-    found: ImportResult | None = None
-    with mistakes.at(0):
-        for option, given in (("infinity", options.infinity), ("owner", options.owner)):
-            if given is not None:
-                raise MistakeError(
-                    f"is a list of tasks, whose import does not support --{option}", f"leave out --{option}"
-                )
-        found = _TaskTeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
-    mistakes.finish()
-    if found is None:
-        raise InvalidInputError([])
-    return found
-
-
 @dataclass(frozen=True)
-class _TaskList:
+class TaskList:
     """The checked content of a `tasks.yaml`."""
 
     name: str
     model: TasksModel
-    distance: Distance
+    ways: Ways
     places: int
     robots: Mapping[str, RobotEntry]
     tasks: Mapping[str, TaskEntry]
     synergies: Sequence[Synergy]
     tours: bool
 
-
-def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _TaskList:
-    def read(root: Node) -> _TaskList:
-        found = _list(EntryReader("the file", root), stem, mistakes)
-        for mistake in unread_parts(root):
-            mistakes.add(mistake.line, mistake.message, mistake.hint)
-        mistakes.finish()
-        return found
-
-    read_list = read_yaml(text, read, "a list has robots and tasks")
-    _check_model(read_list, mistakes)
-    return read_list
-
-
-def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> _TaskList:
-    listed = head.required_node("tasks")
-    robots, tasks = read_robots(head.required_node("robots"), mistakes), read_tasks(listed, mistakes)
-    for what, entries in (("robots", robots), ("tasks", tasks)):
-        if len(entries) > MAX_NUMBER:
-            raise MistakeError(f"has {len(entries)} {what}", f"write at most {MAX_NUMBER}")
-    synergies = read_synergies(head.node("synergies"), [name_text(name) for name, _ in listed.named()], mistakes)
-    model = head.choice("model", TasksModel) or _model(robots, tasks)
-    distance = head.choice("distance", Distance) or Distance.STRAIGHT
-    places = head.integer("places", 0) or 0
-    if places > MAX_PLACES:
-        raise MistakeError(f"has costs with {places} decimal places", f"write places: {MAX_PLACES} or less")
-    tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
-    name = " ".join(head.words("name")) or stem
-    _check_points([*robots.values(), *tasks.values()], mistakes)
-    return _TaskList(name, model, distance, places, robots, tasks, synergies, tours)
-
-
-def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:
-    """Return `assignment` if each robot does at most one task, and each task requires one robot; else `several`."""
-    alone = all(one.most == 1 for one in robots.values()) and all(one.robots == 1 for one in tasks.values())
-    return TasksModel.ASSIGNMENT if alone else TasksModel.SEVERAL
-
-
-def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: DiagnosticCollector) -> None:
-    known = {len(one.at): one for one in entries if one.at}
-    if len(known) > 1:
-        line = list(known.values())[1].line
-        what = "a place has a different number of coordinates than the places before it"
-        mistakes.add(line, what, "write all places with two coordinates, or all with three")
-
-
-def _check_model(read: _TaskList, mistakes: DiagnosticCollector) -> None:
-    if read.model == TasksModel.ASSIGNMENT:
-        for name, robot in read.robots.items():
-            if robot.most not in (None, 1):
-                what = f"the robot '{shortened(name)}' may do {robot.most} tasks; the model assignment allows one"
-                mistakes.add(robot.line, what, "write most: 1, or model: several")
-        for name, task in read.tasks.items():
-            if task.robots > 1:
-                what = f"the task '{shortened(name)}' requires {task.robots} robots; the model assignment allows one"
-                mistakes.add(task.line, what, "write model: several")
-    mistakes.finish()
+    @property
+    def points(self) -> list[Point]:
+        """All positions in the list."""
+        found = [*(one.at for one in self.robots.values()), *(one.at for one in self.tasks.values())]
+        return [at for at in found if at]
 
 
 def _check_symbols(tasks: Mapping[str, TaskEntry]) -> None:
@@ -172,14 +75,17 @@ def _check_names(variables: Mapping[str, Sequence[Variable]]) -> None:
             names[one.name] = robot
 
 
-class _TaskTeamBuilder:
+class TaskTeamBuilder:
     """Builds a team from a task list. Tasks are numbered from 1, in the order of the file."""
 
-    def __init__(self, read: _TaskList) -> None:
+    def __init__(self, read: TaskList) -> None:
         self._read = read
         self._number = {name: number for number, name in enumerate(read.tasks, start=1)}
         self._notes: list[ConversionNote] = []
         self._sets = 0
+        self._tours_of: dict[str, dict[TaskSet, Tour]] = {}
+        self._names = list(read.tasks)
+        self._unit = unit_of(read.points)
         self._robot_names, self._task_names = NameMap(), NameMap()
         amounts = [one.worth for one in read.tasks.values()] + [one.worth for one in read.synergies]
         self._scale = Scale([*amounts, Fraction(1, 10**read.places)])
@@ -207,9 +113,14 @@ class _TaskTeamBuilder:
             raise MistakeError(what, "write fewer robots, or fewer tasks")
         name = re.sub(r"[^A-Za-z0-9_.-]+", "_", options.name or read.name)[:100].strip("._-") or "team"
         units = CostUnits(maximize=True, places=self._scale.places)
-        team: Team = assemble(name, variables, listed, kind=ProblemKind.DISWCSP, costs=units)
+        ground = self._ground()
+        topics = self._topics(workers, variables) if ground or self._unit == 1 else {}
+        team: Team = assemble(
+            name, variables, listed, kind=ProblemKind.DISWCSP, costs=units, extras=Extras(topics=topics)
+        )
         changed = self._originals(workers)
-        return ImportResult(team, "tasks", changed, (*self._notes, *notes_on_names(list(changed.items()))))
+        notes = (*self._notes, *notes_on_names(list(changed.items())))
+        return ImportResult(team, "tasks", changed, notes, files={GROUND_FILE: ground} if ground else {})
 
     def _worker(self, name: str, robot: RobotEntry) -> Worker:
         profit = {
@@ -232,18 +143,19 @@ class _TaskTeamBuilder:
         return Worker(own, own, own, profit, robot.capacity, robot.most, together, *self._tours(name, robot, profit))
 
     def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[TaskSet, int], bool]:
-        """Return the lengths of the robot's tours, and whether deadlines exclude other sets of tasks."""
+        """Return the lengths of the robot's tours, and whether times exclude other sets of tasks."""
         if not self._read.tours or not robot.at:  # for a robot without a position, all ways have length 0
             return {}, False
         numbered = enumerate(self._read.tasks.values(), start=1)
         placed = {number: entry for number, entry in numbered if number in able and entry.at}
-        lengths = TourSearch(name, robot, placed, lambda start, end: self._way(start, end, MAX_PLACES)).lengths()
-        self._sets += len(lengths)
+        found = TourSearch(name, robot, placed, lambda start, end: self._way(robot, start, end, MAX_PLACES)).tours()
+        self._tours_of[self._robot_names.allowed(name)] = found
+        self._sets += len(found)
         if self._sets > MAX_CONSTRAINTS:
             what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} tours"
             raise MistakeError(what, "use fewer robots, or a smaller number in most:")
-        hurries = any(entry.deadline is not None for entry in placed.values())
-        return {tasks: round_length(length, self._scale.places) for tasks, length in lengths.items()}, hurries
+        is_limited = any(entry.latest is not None for entry in placed.values())
+        return {tasks: round_length(tour.length, self._scale.places) for tasks, tour in found.items()}, is_limited
 
     def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> TaskSpec:
         able = sum(self._number[name] in one.profit for one in workers)
@@ -252,18 +164,72 @@ class _TaskTeamBuilder:
             raise MistakeError(what, f"restrict it by needs: to at most {MAX_CREW} robots", task.line)
         return TaskSpec(self._task_names.allowed(name), task.load, task.robots)
 
+    def _topics(
+        self, workers: Sequence[Worker], variables: Mapping[str, Sequence[Variable]]
+    ) -> dict[str, tuple[Topic, ...]]:
+        """Return the topics of robots with a position, for the places to which they go first."""
+        entries = {self._robot_names.allowed(name): entry for name, entry in self._read.robots.items()}
+        found: dict[str, tuple[Topic, ...]] = {}
+        for one in workers:
+            entry = entries[one.name]
+            formulas = self._waypoint(one, entry) if entry.at and one.name in variables else None
+            if formulas is None:
+                continue
+            topic = waypoint_topic(entry.topic or f"/{one.name}/waypoint", formulas)
+            own = variables[one.name]
+            symbols = own[0].domain.symbols
+            try:
+                check_topic(topic, [each.name for each in own], [each.name for each in own if symbols], symbols)
+            except MistakeError:
+                name = self._robot_names.originals.get(one.name, one.name)
+                text = f"the topic of the robot {shortened(name)}, which has too many tasks for a formula"
+                self._notes.append(ConversionNote("topic", text))
+            else:
+                found[one.name] = (topic,)
+        return found
+
+    def _waypoint(self, worker: Worker, entry: RobotEntry) -> tuple[Expression, ...] | None:
+        """Return the formulas for the place to which a robot goes first; None if they would be too long."""
+        home = in_units(entry.at, self._unit)
+        places = {
+            self._number[name]: in_units(task.at, self._unit)
+            for name, task in self._read.tasks.items()
+            if task.at and self._number[name] in worker.profit
+        }
+        if self._read.model == TasksModel.ASSIGNMENT:
+            return of_choice(worker.variable, places, home)
+        names = {task: self._variable(worker, task) for task in places}
+        if self._read.tours:
+            tours = self._tours_of.get(worker.name, {})
+            first = {frozenset(names[task] for task in tasks): places[one.order[0]] for tasks, one in tours.items()}
+            return of_tours({frozenset(): home, **first}, len(home))
+        tasks = list(self._read.tasks.values())
+        nearest = sorted(places, key=lambda task: self._way(entry, entry.at, tasks[task - 1].at, MAX_PLACES) or 0)
+        return of_nearest([(names[task], places[task]) for task in nearest], home)
+
+    def _ground(self) -> bytes:
+        """Return the content of `map.json`; empty if no robot has a position, or a position is too far away."""
+        robots = {self._robot_names.allowed(name): one.at for name, one in self._read.robots.items() if one.at}
+        if not robots:
+            return b""
+        from robochoc.maps.ground_map import ground_map_json  # noqa: PLC0415 - start-up
+        from robochoc.tasks.ground import plain_ground  # noqa: PLC0415 - the same
+
+        ground = plain_ground(robots, self._read.points, self._unit)
+        return ground_map_json(ground) if ground else b""
+
+    def _variable(self, worker: Worker, task: int) -> str:
+        """Return the name of the variable that is 1 if a robot does a task, in the model with several tasks."""
+        return f"{worker.variable}.{self._task_names.allowed(self._names[task - 1])}"
+
     def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
         """Return the original names in the file, by the names in the team, if the two differ."""
-        tasks = list(self._read.tasks)
         found = dict(self._robot_names.originals)
         for name, one in zip(self._read.robots, workers, strict=True):
             if self._read.model == TasksModel.ASSIGNMENT:
                 found[one.variable] = f"{name}.{_ONLY}"
             else:
-                own = {
-                    f"{one.variable}.{self._task_names.allowed(tasks[task - 1])}": tasks[task - 1]
-                    for task in one.profit
-                }
+                own = {self._variable(one, task): self._names[task - 1] for task in one.profit}
                 found |= {variable: f"{name}.{task}" for variable, task in own.items()}
         return {name: original for name, original in found.items() if name != original}
 
@@ -279,16 +245,16 @@ class _TaskTeamBuilder:
             return None
         if robot.capacity is not None and entry.load > robot.capacity:
             return None
-        if entry.deadline is not None and self._way(robot.at, entry.at, MAX_PLACES) > (
-            entry.deadline * robot.speed * 10**MAX_PLACES
-        ):
+        arrival = self._way(robot, robot.at, entry.at, MAX_PLACES)
+        latest = entry.latest
+        if arrival is None or (latest is not None and arrival > latest * robot.speed * 10**MAX_PLACES):
             return None
         worth = self._scale.units(entry.worth)
         if worth % entry.robots:
             what = f"the worth {entry.worth} of '{shortened(task)}' cannot be divided by its {entry.robots} robots"
             raise MistakeError(what, "write a multiple of their number, or more places:", entry.line)
-        way = 0 if self._read.tours else self._way(robot.at, entry.at, self._scale.places)
+        way = 0 if self._read.tours else self._way(robot, robot.at, entry.at, self._scale.places) or 0
         return int(worth) // entry.robots - way
 
-    def _way(self, start: Point, end: Point, places: int) -> int:
-        return distance_between(start, end, self._read.distance, places) if start and end else 0
+    def _way(self, robot: RobotEntry, start: Point, end: Point, places: int) -> int | None:
+        return self._read.ways.length(start, end, places, robot.radius) if start and end else 0

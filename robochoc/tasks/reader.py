@@ -1,0 +1,118 @@
+"""Read a list of robots and tasks, and check that its entries fit together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from pathlib import Path
+
+from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
+from robochoc.formats.dialects.dialect import ImportOptions, ImportResult
+from robochoc.formats.dialects.pydcop.files import file_text
+from robochoc.formats.names import check_word
+from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
+from robochoc.model.allocation import Distance, TasksModel
+from robochoc.tasks.builder import TaskList, TaskTeamBuilder
+from robochoc.tasks.entries import (
+    MAX_PLACES,
+    EntryReader,
+    RobotEntry,
+    TaskEntry,
+    name_text,
+    read_robots,
+    read_synergies,
+    read_tasks,
+)
+from robochoc.tasks.ways import PlainWays
+
+MAX_NUMBER = 1000
+"""The maximum number of robots, and of tasks."""
+
+
+def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
+    """Return the team for a list of robots and tasks.
+
+    Raises:
+        InvalidInputError: with all errors.
+    """
+    if len(paths) > 1:
+        mistakes = DiagnosticCollector(encodable(str(paths[1])))
+        mistakes.add(0, "is a second list of robots and tasks", "import one file")
+        mistakes.finish()
+    path = paths[0]
+    mistakes = DiagnosticCollector(encodable(str(path)))
+    found: ImportResult | None = None
+    with mistakes.at(0):
+        for option, given in (("infinity", options.infinity), ("owner", options.owner)):
+            if given is not None:
+                raise MistakeError(
+                    f"is a list of tasks, whose import does not support --{option}", f"leave out --{option}"
+                )
+        found = TaskTeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
+    mistakes.finish()
+    if found is None:
+        raise InvalidInputError([])
+    return found
+
+
+def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> TaskList:
+    def read(root: Node) -> TaskList:
+        found = _list(EntryReader("the file", root), stem, mistakes)
+        for mistake in unread_parts(root):
+            mistakes.add(mistake.line, mistake.message, mistake.hint)
+        mistakes.finish()
+        return found
+
+    read_list = read_yaml(text, read, "a list has robots and tasks")
+    _check_model(read_list, mistakes)
+    return read_list
+
+
+def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> TaskList:
+    listed = head.required_node("tasks")
+    robots = read_robots(head.required_node("robots"), Fraction(0), mistakes)
+    tasks = read_tasks(listed, mistakes)
+    for what, entries in (("robots", robots), ("tasks", tasks)):
+        if len(entries) > MAX_NUMBER:
+            raise MistakeError(f"has {len(entries)} {what}", f"write at most {MAX_NUMBER}")
+    synergies = read_synergies(head.node("synergies"), [name_text(name) for name, _ in listed.named()], mistakes)
+    model = head.choice("model", TasksModel) or _model(robots, tasks)
+    distance = head.choice("distance", Distance) or Distance.STRAIGHT
+    places = head.integer("places", 0) or 0
+    if places > MAX_PLACES:
+        raise MistakeError(f"has costs with {places} decimal places", f"write places: {MAX_PLACES} or less")
+    tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
+    for robot in robots.values():
+        if robot.topic:
+            with mistakes.at(robot.line):
+                check_word(robot.topic)
+    name = " ".join(head.words("name")) or stem
+    _check_points([*robots.values(), *tasks.values()], mistakes)
+    return TaskList(name, model, PlainWays(distance), places, robots, tasks, synergies, tours)
+
+
+def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:
+    """Return `assignment` if each robot does at most one task, and each task requires one robot; else `several`."""
+    alone = all(one.most == 1 for one in robots.values()) and all(one.robots == 1 for one in tasks.values())
+    return TasksModel.ASSIGNMENT if alone else TasksModel.SEVERAL
+
+
+def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: DiagnosticCollector) -> None:
+    known = {len(one.at): one for one in entries if one.at}
+    if len(known) > 1:
+        line = list(known.values())[1].line
+        what = "a place has a different number of coordinates than the places before it"
+        mistakes.add(line, what, "write all places with two coordinates, or all with three")
+
+
+def _check_model(read: TaskList, mistakes: DiagnosticCollector) -> None:
+    if read.model == TasksModel.ASSIGNMENT:
+        for name, robot in read.robots.items():
+            if robot.most not in (None, 1):
+                what = f"the robot '{shortened(name)}' may do {robot.most} tasks; the model assignment allows one"
+                mistakes.add(robot.line, what, "write most: 1, or model: several")
+        for name, task in read.tasks.items():
+            if task.robots > 1:
+                what = f"the task '{shortened(name)}' requires {task.robots} robots; the model assignment allows one"
+                mistakes.add(task.line, what, "write model: several")
+    mistakes.finish()

@@ -1,0 +1,123 @@
+"""The waypoints of a list's robots: formulas for the place to which a robot goes first, given its tasks.
+
+A robot without tasks stays at its position, and so does a robot whose tasks have no position. Coordinates are integers
+in a unit that divides all coordinates of the list; `map.json` has its length.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.problem import Topic
+from robochoc.tasks.entries import Point
+
+LEAVES_MAX = 1_000
+"""The maximum number of cases in the formula of a tour."""
+
+Cells = tuple[int, ...]
+"""A place, in units."""
+_Cases = Mapping[frozenset[str], Cells]
+
+
+def unit_of(points: Iterable[Point]) -> Fraction:
+    """Return the length of a unit: 1 if all coordinates are integers, else the largest that divides them all."""
+    parts = [part for point in points for part in point]
+    below = math.lcm(*(part.denominator for part in parts))
+    return Fraction(1) if below == 1 else Fraction(math.gcd(*(int(part * below) for part in parts)), below)
+
+
+def in_units(point: Point, unit: Fraction) -> Cells:
+    """Convert a place to units."""
+    return tuple(int(part / unit) for part in point)
+
+
+def waypoint_topic(name: str, formulas: Sequence[Expression]) -> Topic:
+    """Return the topic for a place in the plane, at the height 0, or in space."""
+    x, y, *z = formulas
+    return Topic(name, x=x, y=y, z=z[0] if z else Constant(0))
+
+
+def of_choice(variable: str, places: Mapping[int, Cells], home: Cells) -> tuple[Expression, ...]:
+    """Return the formulas of the place of the chosen task, for a symbolic variable.
+
+    Args:
+        variable: The variable.
+        places: The place of each task with a position, by value.
+        home: The place of a robot with another value.
+    """
+
+    def tree(values: Sequence[int], axis: int) -> Expression:
+        if len(values) == 1:
+            return Constant(places[values[0]][axis])
+        half = len(values) // 2
+        return Apply("if", (_is_one_of(variable, values[:half]), tree(values[:half], axis), tree(values[half:], axis)))
+
+    away = sorted(places, key=lambda value: places[value])
+    if not away:
+        return tuple(map(Constant, home))
+    return tuple(
+        Apply("if", (_is_one_of(variable, away), tree(away, axis), Constant(home[axis]))) for axis in range(len(home))
+    )
+
+
+def of_nearest(places: Sequence[tuple[str, Cells]], home: Cells) -> tuple[Expression, ...]:
+    """Return the formulas of the place of the first task that is done.
+
+    Args:
+        places: The variables that are 1 if their tasks are done, with the places of these tasks, the nearest first.
+        home: The place of a robot without such a task.
+    """
+
+    def tree(some: Sequence[tuple[str, Cells]], axis: int) -> Expression:
+        if len(some) == 1:
+            return Constant(some[0][1][axis])
+        half = len(some) // 2
+        return Apply("if", (_is_any_done(some[:half]), tree(some[:half], axis), tree(some[half:], axis)))
+
+    if not places:
+        return tuple(map(Constant, home))
+    return tuple(
+        Apply("if", (_is_any_done(places), tree(places, axis), Constant(home[axis]))) for axis in range(len(home))
+    )
+
+
+def of_tours(first: _Cases, dimensions: int) -> tuple[Expression, ...] | None:
+    """Return the formulas of the first place of a tour; None if they would be too long.
+
+    Args:
+        first: The first place of each possible tour, by the variables that are 1 if its tasks are done. The set without
+            tasks has the place of the robot.
+        dimensions: The number of coordinates.
+    """
+    leaves = 0
+
+    def tree(cases: _Cases, axis: int) -> Expression:
+        nonlocal leaves
+        found = {place[axis] for place in cases.values()}
+        if len(found) == 1 or leaves > LEAVES_MAX:
+            leaves += 1
+            return Constant(found.pop())
+        # The task that most often decides, so that the formula stays short.
+        places = Counter((name, place[axis]) for names, place in cases.items() for name in names)
+        number = {name: sum(name in names for names in cases) for name, _ in places}
+        name, _ = max((one for one in places if number[one[0]] < len(cases)), key=lambda one: (places[one], one))
+        done = {names: place for names, place in cases.items() if name in names}
+        left = {names: place for names, place in cases.items() if name not in names}
+        return Apply("if", (Apply("eq", (Name(name), Constant(1))), tree(done, axis), tree(left, axis)))
+
+    found = tuple(tree(first, axis) for axis in range(dimensions))
+    return found if leaves <= LEAVES_MAX else None
+
+
+def _is_one_of(variable: str, values: Sequence[int]) -> Expression:
+    members = tuple(map(Constant, values))
+    return Apply("eq" if len(values) == 1 else "in", (Name(variable), *members))
+
+
+def _is_any_done(some: Sequence[tuple[str, Cells]]) -> Expression:
+    terms: tuple[Expression, ...] = tuple(Name(name) for name, _ in some)
+    return Apply("gt", (terms[0] if len(terms) == 1 else Apply("add", terms), Constant(0)))
