@@ -31,6 +31,7 @@ from tests.fuzz.mutations import (
 )
 from tests.support.foreign_files import CFN, FRODO, WCSP, XDISCSPS
 from tests.support.foreign_problems import random_problem
+from tests.support.task_lists import LIST
 
 OPTIONS = (
     ImportOptions(),
@@ -57,19 +58,24 @@ def exported(name: str, *shown: str) -> Sequence[bytes]:
     assert dialect is not None, f"there is no dialect {name}"
     chance = Random(3)
     made = [text.encode() for text in shown]
-    for number in range(12):
+    for number in range(12 if dialect.write else 0):
         with suppress(UnsupportedError):
             made.append(_first_file(_written(dialect, random_problem(chance, plain=number % 2 == 0)[1])))
     return [text for text in made if text and len(text) < LARGEST]
 
 
-def check_file(name: str, file_name: str, content: bytes) -> bool:
+def check_file(name: str, file_name: str, content: bytes, options: Sequence[ImportOptions] = OPTIONS) -> bool:
     """A file is recognised or not, read or refused; of what is read, a team is made that can be read."""
     with folder() as place:
         path = place / file_name
         path.write_bytes(content)
         recognise(path)
-        return _checked(partial(read_foreign, [path], OPTIONS[len(content) % len(OPTIONS)], name)) is not None
+        return _checked(partial(read_foreign, [path], options[len(content) % len(options)], name)) is not None
+
+
+def check_tasks(content: bytes) -> bool:
+    """A list of robots and tasks is read or refused. It has no options."""
+    return check_file("tasks", "p.yaml", content, OPTIONS[:1])
 
 
 def check_several(content: bytes) -> bool:
@@ -220,6 +226,10 @@ XCSP3_SYMBOLS = """<instance format="XCSP3" type="CSP"><variables><var id="c" ty
 <var id="d" type="symbolic"> red blue </var></variables><constraints><intension> ne(c,d) </intension>
 <extension><list> c d </list><conflicts> (red,blue) </conflicts></extension></constraints></instance>"""
 
+TOURS = """{distance: straight, places: 2, tours: yes, model: several, robots: {ann: {at: [0, 0], most: 3, speed: 2},
+bob: {at: [9, 9.5], skills: [eye], capacity: 4}}, tasks: {near: {at: [4, 0], worth: 5}, far: {at: [6, 0], worth: 5.25,
+deadline: 7}, big: {at: [1, 1], needs: [eye], worth: 8, load: 2}}, synergies: [{tasks: [near, far], worth: -1}]}"""
+
 _of_xml = one_of(spoilt_xml, spoilt_xml, spoilt_xml, spoilt_text, spoilt_bytes)
 _of_text = one_of(spoilt_text, spoilt_text, spoilt_text, spoilt_bytes)
 
@@ -236,5 +246,6 @@ TARGETS = (
     _target("pydcop", "p.yaml", _of_text, PYDCOP),
     _target("cfn", "p.cfn", _of_text, CFN, '[["up" >-5.0] [2 2] [[[0] [1.0 0.5]] [[0 1] [-1.0 0.5 -2.0 5.5]]]]'),
     _target("wcsp", "p.wcsp", _of_text, WCSP),
+    Target("foreign-tasks", partial(exported, "tasks", LIST, TOURS), _of_text, check_tasks),
     Target("foreign-names", names_files, one_of(spoilt_json, spoilt_json, spoilt_text, spoilt_bytes), check_names),
 )

@@ -86,14 +86,13 @@ class DdsServices(Services):
 
     def _receive(self, name: str, _: str, content: bytes) -> None:
         """Accept a request; called in the subscription's thread."""
-        order = _ORDERS.get(content[:2])
-        if order is None or not _ENCAPSULATION + _HEADER <= len(content) <= MESSAGE_BYTES_MAX:
+        found = split_request(content)
+        if found is None:
             return  # without a client id no answer is possible
-        begin, end = _ENCAPSULATION, _ENCAPSULATION + _HEADER
-        header = struct.pack("<Qq", *struct.unpack(f"{order}Qq", content[begin:end]))
+        header, message = found
         kind = self._kinds[name]
         try:
-            fields = types_of(2).decode(f"{kind}_Request", content[:begin] + content[end:])
+            fields = types_of(2).decode(f"{kind}_Request", message)
         except FieldsError:
             self._write(name, header, self._refuse(f"the request cannot be read as one of {kind}"))
             return
@@ -106,3 +105,12 @@ class DdsServices(Services):
         kind = self._kinds[name]
         content = types_of(2).encode(f"{kind}_Response", known_fields(kind, fields))
         self._ends[name].write(content[:_ENCAPSULATION] + header + content[_ENCAPSULATION:])
+
+
+def split_request(content: bytes) -> tuple[bytes, bytes] | None:
+    """Return the header of a request, in little-endian order, and the message; None if it is too short or too long."""
+    order = _ORDERS.get(content[:2])
+    begin, end = _ENCAPSULATION, _ENCAPSULATION + _HEADER
+    if order is None or not end <= len(content) <= MESSAGE_BYTES_MAX:
+        return None
+    return struct.pack("<Qq", *struct.unpack(f"{order}Qq", content[begin:end])), content[:begin] + content[end:]
