@@ -28,6 +28,7 @@ COMMANDS = {
     "app": ("app", "Model, solve and fly in a browser, without formulas."),
     "authority": ("authority", "Enrol and revoke robots for runs on several machines."),
     "cache": ("cache", "Show or clear the cache of solved local problems."),
+    "capacity": ("capacity", "Measure the largest team that this machine solves in time."),
     "check": ("check", "Explore every order of messages on small teams."),
     "compare": ("compare", "Compare protocols on problems: a table, a picture."),
     "compile": ("compile_team", "Compile the robots' local problems and show their sizes."),
@@ -57,7 +58,7 @@ The lines are stored here so that `robochoc --help` need not import any command.
 
 
 POSIX_COMMANDS = frozenset(
-    ["app", "authority", "compare", "directory", "experiment", "master", "robot", "serve", "sniff"]
+    ["app", "authority", "capacity", "compare", "directory", "experiment", "master", "robot", "serve", "sniff"]
 )
 """The commands that start or signal other processes, lock files, or use a network."""
 

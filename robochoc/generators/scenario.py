@@ -22,6 +22,7 @@ from typing import TypeVar
 
 from robochoc.generators.draws import MAX_CONSTRAINTS, check_bounds, seeded
 from robochoc.model.change import apply_changes
+from robochoc.model.copies import renamed_constraint
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -200,7 +201,7 @@ class _ScenarioBuilder:
             return None
         old = self._one(like)
         terms = dict(zip(old.variables, (one, other), strict=True))
-        return self._added(replace(_renamed(old, terms), name=f"Added{next(self._numbers)}", line=0))
+        return self._added(replace(renamed_constraint(old, terms), name=f"Added{next(self._numbers)}", line=0))
 
     def _added(self, constraint: Constraint) -> AddConstraint:
         """Return the change that adds `constraint` to the lowest robot in its scope, under the second lowest."""
@@ -218,7 +219,7 @@ class _ScenarioBuilder:
         model = self._one(self._team.robots)
         number = next(self._numbers)
         terms = {own.name: f"Late{number}.{place}" for place, own in enumerate(model.variables, 1)}
-        constraints = [_renamed(one, terms) for one in _constraints_of(self._team, model.name)]
+        constraints = [renamed_constraint(one, terms) for one in _constraints_of(self._team, model.name)]
         variables = tuple(Variable(terms[own.name], own.domain) for own in model.variables)
         return AddAgent(
             self._joining(replace(model, name=f"Late{number}", variables=variables, topics=()), constraints)
@@ -265,12 +266,3 @@ def _constraints_of(team: Team, name: str) -> list[Constraint]:
     own = {variable.name for variable in team[name].variables}
     shared = (one for robot in team.robots for one in robot.shared)
     return [*team[name].private, *(one for one in shared if not own.isdisjoint(one.variables))]
-
-
-def _renamed(constraint: Constraint, terms: Mapping[str, str]) -> Constraint:
-    """Return `constraint` over other variables."""
-    scope, parameters = (
-        tuple(terms.get(term, term) if isinstance(term, str) else term for term in part)
-        for part in (constraint.scope, constraint.parameters)
-    )
-    return replace(constraint, scope=scope, parameters=parameters)
