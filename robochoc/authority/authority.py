@@ -21,6 +21,7 @@ from robochoc.authority.certificates import (
     MASTER,
     CertificateError,
     ca_certificate,
+    check_hosts,
     check_issued,
     fingerprint,
     key_pem,
@@ -156,10 +157,15 @@ class Authority:
         return cls(folder, key, certificate, observer=observer, clock=clock, lifetime=lifetime)
 
     def enrol(
-        self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME, may: Iterable[Right] = ()
+        self,
+        name: str,
+        role: Role = Role.ROBOT,
+        ttl: timedelta = TOKEN_LIFETIME,
+        may: Iterable[Right] = (),
+        hosts: Sequence[str] = (),
     ) -> EnrolmentToken:
         """Return a token for `name` that can be used once, within `ttl`. See `enrol_all`."""
-        return self.enrol_all([name], role, ttl, may)[name]
+        return self.enrol_all([name], role, ttl, may, hosts)[name]
 
     def enrol_all(
         self,
@@ -167,8 +173,12 @@ class Authority:
         role: Role = Role.ROBOT,
         ttl: timedelta = TOKEN_LIFETIME,
         may: Iterable[Right] = (),
+        hosts: Sequence[str] = (),
     ) -> dict[str, EnrolmentToken]:
         """Return a token for each of `names`. Enrols no name if one is invalid, and raises `InvalidNameError`.
+
+        A standby master needs the `hosts` by which robots reach it: its certificate contains them. Raises
+        `HostNameError` for an invalid one.
 
         A name that is already enrolled also gets a new token. When the token is redeemed, previous certificates of the
         name are revoked, because a name has one key, and a revoked name is readmitted. The role and the rights `may`,
@@ -177,13 +187,16 @@ class Authority:
         rights = tuple(sorted(set(may)))
         names = list(names)
         for name in names:
-            check_member_name(name, role)
+            check_member_name(name, role, hosts)
+        check_hosts(hosts)
         tokens = {name: EnrolmentToken.new(fingerprint(self.certificate)) for name in names}
         with self._registry.change() as members:
             for name, token in tokens.items():
                 invitation = Invitation(digest(token.secret), self.clock() + ttl.total_seconds())
                 member = members.get(name) or EnrolledName(name, role)
-                members[name] = msgspec.structs.replace(member, role=role, invitation=invitation, may=rights)
+                members[name] = msgspec.structs.replace(
+                    member, role=role, invitation=invitation, may=rights, hosts=tuple(hosts)
+                )
         return tokens
 
     def redeem(self, secret: bytes, request: bytes, origin: str = "") -> bytes:
@@ -202,7 +215,7 @@ class Authority:
         with self._reported_refusals(what, request, origin) as (name, holder), self._registry.change() as members:
             now = self.clock()
             member, invitation = _redeemable(members, digest(secret), name, now)
-            certificate, issued = self._issue(holder, name)
+            certificate, issued = self._issue(holder, name, member.hosts or None)
             members[name] = EnrolledName(
                 name,
                 member.role,
@@ -210,6 +223,7 @@ class Authority:
                 (issued,),
                 (*member.withdrawn, *member.certificates),
                 may=member.may,
+                hosts=member.hosts,
             ).without_expired(now)
         self.report(Granted(t=now, who=name, what=what, origin=origin))
         return certificate
@@ -239,7 +253,7 @@ class Authority:
             member = members[name].without_expired(now)
             if len(member.certificates) >= IN_FORCE_AT_MOST:
                 raise NotGrantedError(f"this name already has {IN_FORCE_AT_MOST} valid certificates, the maximum")
-            certificate, issued = self._issue(holder, name)
+            certificate, issued = self._issue(holder, name, member.hosts or None)
             members[name] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
         self.report(Granted(t=now, who=name, what=what, origin=origin))
         return certificate

@@ -223,6 +223,12 @@ def hosts_of(certificate: x509.Certificate) -> tuple[str, ...]:
     )
 
 
+def check_hosts(hosts: Sequence[str]) -> None:
+    """Raise `HostNameError` if one of `hosts` is not possible in a certificate."""
+    for host in hosts:
+        _host(host)
+
+
 def _host(host: str) -> x509.DNSName | x509.IPAddress:
     try:
         address = ipaddress.ip_address(host)

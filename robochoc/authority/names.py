@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 
 from robochoc.authority.certificates import LONGEST_NAME, MASTER
 from robochoc.authority.registry import Role
@@ -32,8 +32,8 @@ def describe_enrolled(name: str, members: Collection[str]) -> str:
     return f"{near}enrolled: {', '.join(known[:_MOST_NAMED])}" + (f" and {more} more" if more > 0 else "")
 
 
-def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
-    """Raise `InvalidNameError` if `name` is not allowed for `role`."""
+def check_member_name(name: str, role: Role = Role.ROBOT, hosts: Sequence[str] = ()) -> None:
+    """Raise `InvalidNameError` if `name` is not allowed for `role`, or a master has no hosts."""
     shown = on_one_line(shortened(name))
     if not is_name(name):
         raise InvalidNameError(
@@ -41,7 +41,12 @@ def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
         )
     if len(name) > LONGEST_NAME:
         raise InvalidNameError(f"'{shown}' is too long: use at most {LONGEST_NAME} characters")
-    if name.upper() == MASTER or role == Role.MASTER:
+    if name.upper() == MASTER:
         raise InvalidNameError(
-            f"the name {MASTER} is reserved for the master, which needs no token; choose another name or role"
+            f"the name {MASTER} is reserved for the master on the Authority's machine, which needs no token;"
+            " choose another name"
         )
+    if role == Role.MASTER and not hosts:
+        raise InvalidNameError(f"{name} is a standby master, and robots check its address: add --host NAME")
+    if hosts and role != Role.MASTER:
+        raise InvalidNameError(f"{name} has the role {role}, and only a master has hosts: remove --host")

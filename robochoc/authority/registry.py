@@ -78,6 +78,8 @@ class EnrolledName(msgspec.Struct, frozen=True):
     """Certificates that were revoked, or replaced by certificates for a new key."""
     revoked: bool = False
     may: tuple[Right, ...] = ()
+    hosts: tuple[str, ...] = ()
+    """The host names and addresses of a standby master, which its certificate contains."""
 
     def state(self, now: float) -> EnrolmentState:
         """Return the state of this name at Unix time `now`."""

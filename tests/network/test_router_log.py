@@ -62,7 +62,7 @@ IDENTITY = InMemoryAuthority([]).master_identity(("127.0.0.1",))
 
 
 def refusals(log: bytes) -> Iterator[Refusal]:
-    return Log({"A": ()}).refusals(log)
+    return Log({"A", "MASTER"}).refusals(log)
 
 
 def read_in(pieces: list[bytes]) -> list[Refusal]:

@@ -40,10 +40,13 @@ def name_in(key: str) -> str:
     return key.rpartition("/")[2]
 
 
-def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> dict[str, Any]:
+def access_control(
+    reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None, master: str = MASTER
+) -> dict[str, Any]:
     """Return zenoh's `access_control`: each participant in `reach` may write to the master and its own receivers.
 
-    The `sniffers` among them may request the journal from the master (None: no one may).
+    The `sniffers` among them may request the journal from the master (None: no one may). The certificate of the leading
+    master has the name `master`; on the network, it is always called `MASTER`.
     Raises `ValueError` for names with a special meaning in keys: `*` could write in everyone's name.
     """
     strange = next((name for name in reach if not is_name(name) or name == MASTER), None)
@@ -62,7 +65,8 @@ def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str]
             mine += _sniffing(name, journal_key(ALL), asks="egress", answers="ingress")
         rules += mine
         policies.append({"rules": [rule["id"] for rule in mine], "subjects": [name]})
-    subjects = [{"id": name, "cert_common_names": [name]} for name in (*reach, MASTER)]
+    subjects = [{"id": name, "cert_common_names": [name]} for name in reach]
+    subjects.append({"id": MASTER, "cert_common_names": [master]})
     return {
         "enabled": True,
         "default_permission": "deny",

@@ -47,6 +47,8 @@ class ConnectionPolicy:
         # Robots give up after their patience, so the end of the router must be detected earlier.
         self._router = Router(endpoint, identity, refused, lease_ms, scratch, patience_s / 2)
         self._ways = ways
+        self._masters = (MASTER, identity.name)
+        """The names that no client of the router may have."""
         self.admitted: tuple[str, ...] = ()
         """The names that may connect under the router's current rules."""
         self.sniffable = False
@@ -69,7 +71,7 @@ class ConnectionPolicy:
         when it is issued.
         """
         names = partial(self._admission.names, invited=True)
-        there = [*names(Role.ROBOT), *names(Role.OBSERVER)]
+        there = [name for role in Role for name in names(role) if name not in self._masters]
         admitted = {name: self._ways.get(name, ()) for name in there if not self.is_revoked(name)}
         sniffers = tuple(name for name in names(right=Right.SNIFF) if name in admitted)
         rules = admitted, sniffers if self.sniffable else None
@@ -157,7 +159,9 @@ class MasterConnection:
             self.policy.open()
             inbox, lease_ms = Inbox(self.policy.share_of), self._settings.lease_ms
             senders = self.policy.admitted
-            self._transport = Transport(self._endpoint, self._identity, senders=senders, inbox=inbox, lease_ms=lease_ms)
+            self._transport = Transport(
+                self._endpoint, self._identity, name=MASTER, senders=senders, inbox=inbox, lease_ms=lease_ms
+            )
             if self.journal_server.publication:
                 self._transport.answer(journal_key(ALL), self.journal_server.answer)
         except BaseException:

@@ -20,7 +20,6 @@ from typing import IO, NamedTuple, cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import access_control, journal_qos
-from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
 from robochoc.system.errors import RobochocError
 from robochoc.system.signals import signals_delayed
@@ -129,7 +128,9 @@ class Router:
         process.stdin.write(f"{json.dumps(self._scratch)}\n{json.dumps(self._settings(reach, sniffers))}\n".encode())
         process.stdin.flush()
         first_output = self._wait_until_ready(process.stdout)
-        self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), first_output], daemon=True)
+        self._reader = threading.Thread(
+            target=self._read, args=[process.stdout, Log([*reach, self._identity.name]), first_output], daemon=True
+        )
         self._reader.start()
         self._is_closed.clear()
         self._response.clear()
@@ -196,7 +197,7 @@ class Router:
                 "close_link_on_expiration": True,
             },
             "transport/link/tx/lease": self._lease_ms,
-            "access_control": access_control(reach, sniffers),
+            "access_control": access_control(reach, sniffers, self._identity.name),
             "qos/network": [] if sniffers is None else [journal_qos()],
         }
 
@@ -239,10 +240,10 @@ class Router:
 
 
 class Log:
-    """Parses refusals in the router's log. Only the names in `reach` have rules."""
+    """Parses refusals in the router's log. Only the `admitted` names have rules."""
 
-    def __init__(self, reach: Collection[str]) -> None:
-        self._reach = reach
+    def __init__(self, admitted: Collection[str]) -> None:
+        self._admitted = admitted
         self._names: dict[bytes, str] = {}
         """The name of each session. zenoh logs the certificate's name only when the right is not in its cache."""
         self._denied: dict[bytes, tuple[bytes, bytes, bytes] | None] = {}
@@ -253,7 +254,7 @@ class Log:
         plain = _COLOURS.sub(b"", log)
         for name in _ACCEPTED.findall(plain):
             who = name.decode(errors="replace")
-            if who not in {*self._reach, MASTER}:
+            if who not in self._admitted:
                 yield Refusal(who, "connect", "it is not registered with the Authority")
         if len(self._names) > _KEPT_SESSIONS:
             self._names.clear()

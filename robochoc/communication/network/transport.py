@@ -59,8 +59,9 @@ Answering = Callable[[str, bytes], bytes | None]
 class Transport:
     """The connection of `identity` to the router at `endpoint` (`HOST:PORT`); a context manager.
 
-    It tracks the presence of the names in `watch`, and puts the frames from `senders` (and others: `subscribe`) into
-    `inbox`. A link that is silent for `lease_ms` counts as down. Raises `CannotConnectError` if no connection is
+    Its name in the run is `name`, by default the name in the certificate; a leading master is called `MASTER` in every
+    run. It tracks the presence of the names in `watch`, and puts the frames from `senders` (and others: `subscribe`)
+    into `inbox`. A link that is silent for `lease_ms` counts as down. Raises `CannotConnectError` if no connection is
     established within `patience_s`.
     """
 
@@ -69,13 +70,14 @@ class Transport:
         endpoint: str,
         identity: Identity,
         *,
+        name: str = "",
         watch: Iterable[str] = (ALL,),
         senders: Iterable[str] = TEAM,
         inbox: Inbox | None = None,
         patience_s: float = 10.0,
         lease_ms: int = LEASE_MS,
     ) -> None:
-        self.name = identity.name
+        self.name = name or identity.name
         self.inbox = inbox or Inbox()
         self._publishers: dict[str, zenoh.ext.AdvancedPublisher] = {}
         self._subscribers: dict[str, _Subscriber] = {}

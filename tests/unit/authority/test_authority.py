@@ -24,6 +24,7 @@ from robochoc.authority.certificates import (
     CertificateError,
     HostNameError,
     check_issued,
+    hosts_of,
     new_key,
     pem,
     read_certificate,
@@ -302,9 +303,33 @@ def test_the_longest_name_can_be_certified(authority: Authority, tmp_path: Path)
     assert identity_of(authority, "A" * 64, tmp_path / "a").name == "A" * 64
 
 
-def test_the_master_role_and_name_belong_together(authority: Authority) -> None:
+def test_a_standby_master_is_certified_for_its_hosts(authority: Authority, tmp_path: Path) -> None:
+    hosts = ["localhost", "192.0.2.7"]
+    key = new_key()
+    secret = authority.enrol("B", Role.MASTER, hosts=hosts).secret
+    certificate = read_certificate(authority.redeem(secret, signing_request(key, "B")))
+    assert hosts_of(certificate) == tuple(hosts)
+    assert hosts_of(read_certificate(authority.renew(signing_request(key, "B"), certificate))) == tuple(hosts)
+    assert hosts_of(identity_of(authority, "A", tmp_path / "a").certificate) == ()
+    assert authority.names(Role.MASTER) == ("B",)
+    authority.enrol("B")
+    assert authority.names(Role.MASTER) == ()
+
+
+@looped("host", ["0.0.0.0", "a..b"])  # noqa: S104 - that is refused
+def test_hosts_that_no_standby_can_have(authority: Authority, host: str) -> None:
+    with pytest.raises(HostNameError):
+        authority.enrol("B", Role.MASTER, hosts=[host])
+    assert authority.members() == ()
+
+
+def test_the_roles_of_masters_and_robots(authority: Authority) -> None:
+    with pytest.raises(InvalidNameError, match="B is a standby master, and robots check its address: add --host NAME"):
+        authority.enrol("B", Role.MASTER)
+    with pytest.raises(InvalidNameError, match="A has the role robot, and only a master has hosts: remove --host"):
+        authority.enrol("A", hosts=["localhost"])
     with pytest.raises(InvalidNameError, match="needs no token"):
-        authority.enrol("A", Role.MASTER)
+        authority.enrol(MASTER, Role.MASTER, hosts=["localhost"])
     with pytest.raises(InvalidNameError, match="new Authority"):
         authority.revoke(MASTER)
     authority.master_identity(["localhost"])
