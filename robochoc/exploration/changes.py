@@ -10,15 +10,10 @@ import zlib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
-from functools import cached_property, partial
 from typing import NamedTuple
 
-from robochoc.communication.host import Host, order_of
 from robochoc.communication.search_result import SearchResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.exploration.judgement import TeamJudge
-from robochoc.exploration.local_steps import Step
-from robochoc.exploration.stage import Change, Stage
 from robochoc.generators.scenario import random_scenario
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Verdict
@@ -31,6 +26,20 @@ from robochoc.solver.compiled_team import CompiledTeam
 CRASH = "its process was killed"
 _ONE_CHANGE = 0.001
 """A rate of changes that gives one change per event."""
+
+
+class Change(NamedTuple):
+    """A change of the problem, which ends a stage and opens the next one.
+
+    Attributes:
+        in_words: The change in a few words.
+        lost: The robots that crash; empty if the next event happens.
+        back: Those of them that are restarted.
+    """
+
+    in_words: str = ""
+    lost: tuple[str, ...] = ()
+    back: tuple[str, ...] = ()
 
 
 class FaultPlan(NamedTuple):
@@ -143,52 +152,3 @@ class _UnsearchedSession(Session):
 
     def close(self) -> None:
         """See `Session.close`."""
-
-
-class EpochStage(Stage):
-    """The stage of `epoch`, which follows from `changes` in `course`."""
-
-    def __init__(self, course: Course, changes: Sequence[Change], epoch: Epoch) -> None:
-        self._course, self._changes, self._epoch = course, changes, epoch
-        protocol = course.phase.protocol
-        super().__init__(epoch.parts(protocol), protocol, TeamJudge(epoch.compiled, course.phase))
-        self._after: dict[Change, Stage] = {}
-
-    @cached_property
-    def changes(self) -> Sequence[Change]:
-        """See `Stage.changes`."""
-        return [*self._epochs]
-
-    @cached_property
-    def _epochs(self) -> dict[Change, Epoch]:
-        """The epochs that may follow."""
-        found = {}
-        for change in self._course.may_follow(self._epoch.team, self._changes):
-            after = self._course.after([*self._changes, change])
-            if after is not None and after.team.robots:
-                found[change._replace(in_words=after.opened_by)] = after.epoch
-        return found
-
-    def after(self, change: Change) -> Stage:
-        """See `Stage.after`."""
-        known = self._after.get(change)
-        if known is None:
-            changes = *self._changes, change
-            known = self._after[change] = EpochStage(self._course, changes, self._epochs[change])
-        return known
-
-    def adopted(self, before: Stage, robots: Sequence[int]) -> list[Step]:
-        """See `Stage.adopted`."""
-        steps = []
-        for robot in self.robots:
-            place = before.places.get(robot.name)
-            if place is None or robot.name in self._epoch.restarted:
-                steps.append(robot.first)
-            else:
-                steps.append(robot.changed(before.robots[place], robots[place], partial(self._change, robot.name)))
-        return steps
-
-    def _change(self, name: str, host: Host) -> None:
-        """Let the robot of `host` adopt the problem of this epoch."""
-        part = self.parts[name]
-        host.change(part, self._epoch.invalidated, order_of(part))

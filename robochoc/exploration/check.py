@@ -9,10 +9,10 @@ from contextlib import suppress
 from functools import partial
 from typing import NamedTuple
 
-from robochoc.exploration.changes import Course, EpochStage, FaultPlan, with_events
+from robochoc.exploration.changes import Course, FaultPlan, with_events
 from robochoc.exploration.explanation import explanation_of
 from robochoc.exploration.random_runs import play_random_runs
-from robochoc.exploration.stage import NotCreatedError
+from robochoc.exploration.stage import NotCreatedError, Stage
 from robochoc.exploration.state_graph import StateGraph, TooManyPacketsError
 from robochoc.exploration.team_state import Exploration
 from robochoc.generators.draws import seeded
@@ -99,8 +99,9 @@ def explore(case: Case, options: CheckOptions, is_over: Callable[[int], bool] = 
 
 def _explored(graph: StateGraph, case: Case, options: CheckOptions, is_over: Callable[[int], bool]) -> Exploration:
     found = graph.explore(options.states, is_over)
-    if found.is_cyclic and case.phase.traits.complete and not found.fault:
-        found.fault = ENDLESS
+    endless = graph.endless_run() if found.is_cyclic and case.phase.traits.complete else None
+    if endless is not None:
+        found.fault, (found.path, found.cycle) = ENDLESS, endless
     if not (found.is_complete or found.fault):
         few = min(options.states, max(_FEWEST_RANDOM_STEPS, options.states // 10))
         steps = few if options.random_steps is None else options.random_steps
@@ -120,8 +121,7 @@ def graph_of(case: Case, options: CheckOptions) -> StateGraph:
     if kind_of_core() != PURE:
         raise UnsupportedError("compiled protocols cannot be copied; set the environment variable ROBOCHOC_PURE to 1")
     course = Course(case.compiled.team, case.phase, options.plan)
-    first = EpochStage(course, (), course.start)
-    return StateGraph(first, packets=options.packets, losses=options.losses)
+    return StateGraph(Stage.first_of(course), packets=options.packets, losses=options.losses)
 
 
 ENDLESS = (
@@ -174,6 +174,7 @@ class CheckedTeam(NamedTuple):
             "fault": found.fault or None,
             "explanation": found.explanation.text or None,
             "path": [delivery.as_dict() for delivery in found.path],
+            "cycle": [delivery.as_dict() for delivery in found.cycle],
         }
 
 

@@ -16,16 +16,25 @@ LAST_STEPS = 3
 
 def explanation_of(found: Exploration, graph: StateGraph) -> Explanation:
     """Explain the fault that was found in `graph`."""
-    states, texts = graph.along(found.path), StateTexts(graph)
-    steps = tuple(texts.step(state, delivery) for state, delivery in zip(states, found.path, strict=False))
+    states, texts = graph.along(found.run), StateTexts(graph)
+    steps = tuple(texts.step(state, delivery) for state, delivery in zip(states, found.run, strict=False))
     sentences = [f"{found.fault[:1].upper()}{found.fault[1:]}."]
-    if states and not found.is_cyclic:
+    if found.cycle:
+        sentences.append(_about_the_cycle(len(found.path), len(steps)))
+    elif states:
         sentences += _about_the_state(states[-1], graph, len(steps))
     if steps:
         last = steps[-LAST_STEPS:]
         sentences.append(f"{'The steps' if len(last) == len(steps) else 'The last steps'}: {'. '.join(last)}.")
     state = states[-1] if states else graph.start().state
     return Explanation(" ".join([*sentences, graph.stage_of(state).judge.right_answer]), steps)
+
+
+def _about_the_cycle(before: int, steps: int) -> str:
+    """Return a sentence about the steps that can be repeated. `before`: the number of steps before them."""
+    first = f"the state after step {before}" if before else "the state at the start"
+    one = steps == before + 1
+    return f"{f'Step {steps} leads' if one else f'Steps {before + 1} to {steps} lead'} back to {first}."
 
 
 def _about_the_state(state: TeamState, graph: StateGraph, steps: int) -> Iterator[str]:

@@ -64,14 +64,14 @@ class TeamJudge:
         return f"A solution is {values}."
 
     def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
-        """See `stage.Judge`."""
+        """Return the fault when the search is over; empty if there is none. `witness`: the robot that concluded it."""
         key = (*map(id, robots), losses)
         if key not in self._judged:
             self._judged[key] = self._fault_at_the_end(robots, witness, losses)
         return self._judged[key]
 
     def on_the_way(self, robots: Sequence[LocalState], losses: int) -> str:
-        """See `stage.Judge`."""
+        """Return the fault in a state at any time; empty if there is none. `losses`: the number of lost messages."""
         if self.minimum < INFINITE and any(one.verdict == Verdict.NO_SOLUTION for one in robots):
             return NO_SOLUTION_IS_WRONG
         bound = lower_bound({str(place): one.findings for place, one in enumerate(robots)})
@@ -103,7 +103,7 @@ class TeamJudge:
         return "" if losses or witness is not None else self._promises.at_the_end(robots)
 
     def answer_in_words(self, robots: Sequence[LocalState], witness: int | None) -> str:
-        """See `stage.Judge`."""
+        """Return the answer when the search is over without a fault."""
         answer = self._answer(robots, witness, 0)
         values = f": {values_text(self.team, answer.assignment)}" if answer.assignment else ""
         is_costly = answer.cost is not None and self.team.kind == ProblemKind.DISWCSP

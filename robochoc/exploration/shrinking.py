@@ -49,7 +49,7 @@ def reduced(found: CheckedTeam, options: CheckOptions, is_over: Callable[[], boo
 
 def _is_better(found: Exploration, before: Exploration) -> bool:
     """Return whether there is a fault, after no more steps than `before`."""
-    return bool(found.fault) and len(found.path) <= len(before.path)
+    return bool(found.fault) and len(found.run) <= len(before.run)
 
 
 def _checked(team: Team, options: CheckOptions) -> CheckedTeam | None:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import cached_property
-from typing import NamedTuple, Protocol
+from collections.abc import Sequence
+from functools import cached_property, partial
 
-from robochoc.communication.host import Host
-from robochoc.exploration.local_steps import LocalState, LocalSteps, Step
-from robochoc.model.problem import Team
-from robochoc.protocols.protocol import Protocol as AnyProtocol
+from robochoc.communication.host import Host, order_of
+from robochoc.communication.session import Epoch
+from robochoc.exploration.changes import Change, Course
+from robochoc.exploration.judgement import TeamJudge
+from robochoc.exploration.local_steps import LocalSteps, Step
+from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.system.errors import RobochocError
 
@@ -18,50 +19,18 @@ class NotCreatedError(RobochocError):
     """Raised if the protocol object of a robot cannot be created."""
 
 
-class Judge(Protocol):
-    """Judges the states of a team."""
-
-    @property
-    def team(self) -> Team:
-        """The team."""
-
-    @property
-    def right_answer(self) -> str:
-        """The answer of a correct run, as a sentence."""
-
-    def answer_in_words(self, robots: Sequence[LocalState], witness: int | None) -> str:
-        """Return the answer when the search is over without a fault."""
-
-    def at_the_end(self, robots: Sequence[LocalState], witness: int | None, losses: int) -> str:
-        """Return the fault when the search is over; empty if there is none. `witness`: the robot that concluded it."""
-
-    def on_the_way(self, robots: Sequence[LocalState], losses: int) -> str:
-        """Return the fault in a state at any time; empty if there is none. `losses`: the number of lost messages."""
-
-
-class Change(NamedTuple):
-    """A change of the problem, which ends a stage and opens the next one.
-
-    Attributes:
-        in_words: The change in a few words.
-        lost: The robots that crash; empty if the next event happens.
-        back: Those of them that are restarted.
-    """
-
-    in_words: str = ""
-    lost: tuple[str, ...] = ()
-    back: tuple[str, ...] = ()
-
-
 class Stage:
     """The robots of a team while its problem does not change: an epoch of a run.
 
     Args:
+        course: The possible courses of the run.
+        changes: The changes that have led to the epoch.
+        epoch: The epoch.
+
+    Attributes:
         parts: Each robot's part of the problem, by name, in priority order.
         protocol: The class of the protocol.
         judge: The judge of the robots' states.
-
-    Attributes:
         robots: The steps of each robot.
         names: The names of the robots.
         places: The place of each robot in `robots`.
@@ -70,15 +39,18 @@ class Stage:
         traits: The traits of the protocol.
     """
 
-    def __init__(self, parts: Mapping[str, AgentProblem], protocol: type[AnyProtocol], judge: Judge) -> None:
-        hosts = {name: _host(name, protocol, part) for name, part in parts.items()}
-        self.parts, self.protocol = parts, protocol
+    def __init__(self, course: Course, changes: Sequence[Change], epoch: Epoch) -> None:
+        self._course, self._changes, self._epoch = course, changes, epoch
+        self._after: dict[Change, Stage] = {}
+        self.protocol = course.phase.protocol
+        self.parts = epoch.parts(self.protocol)
+        self.judge = TeamJudge(epoch.compiled, course.phase)
+        hosts = {name: _host(name, self.protocol, part) for name, part in self.parts.items()}
         self.robots = [LocalSteps(host) for host in hosts.values()]
-        self.judge = judge
         self.names = [*hosts]
         self.places = {name: place for place, name in enumerate(self.names)}
         self.everybody = {*range(len(self.names))}
-        self.traits = protocol.traits
+        self.traits = self.protocol.traits
         self.writers = [
             {
                 self.places[name]
@@ -88,14 +60,33 @@ class Stage:
             for place, host in enumerate(hosts.values())
         ]
 
+    @classmethod
+    def first_of(cls, course: Course) -> Stage:
+        """Return the stage before the first change."""
+        return cls(course, (), course.start)
+
     @cached_property
     def changes(self) -> Sequence[Change]:
         """The changes that may end this stage."""
-        return ()
+        return [*self._epochs]
+
+    @cached_property
+    def _epochs(self) -> dict[Change, Epoch]:
+        """The epochs that may follow."""
+        found = {}
+        for change in self._course.may_follow(self._epoch.team, self._changes):
+            after = self._course.after([*self._changes, change])
+            if after is not None and after.team.robots:
+                found[change._replace(in_words=after.opened_by)] = after.epoch
+        return found
 
     def after(self, change: Change) -> Stage:
         """Return the stage after `change`, always the same object."""
-        raise NotImplementedError
+        known = self._after.get(change)
+        if known is None:
+            changes = *self._changes, change
+            known = self._after[change] = Stage(self._course, changes, self._epochs[change])
+        return known
 
     def first(self) -> list[Step]:
         """Return the states of robots that have no knowledge and are not started."""
@@ -103,10 +94,22 @@ class Stage:
 
     def adopted(self, before: Stage, robots: Sequence[int]) -> list[Step]:
         """Return the state of each robot before its start in this stage, after the states `robots` of `before`."""
-        raise NotImplementedError
+        steps = []
+        for robot in self.robots:
+            place = before.places.get(robot.name)
+            if place is None or robot.name in self._epoch.restarted:
+                steps.append(robot.first)
+            else:
+                steps.append(robot.changed(before.robots[place], robots[place], partial(self._change, robot.name)))
+        return steps
+
+    def _change(self, name: str, host: Host) -> None:
+        """Let the robot of `host` adopt the problem of this epoch."""
+        part = self.parts[name]
+        host.change(part, self._epoch.invalidated, order_of(part))
 
 
-def _host(name: str, protocol: type[AnyProtocol], part: AgentProblem) -> Host:
+def _host(name: str, protocol: type[Protocol], part: AgentProblem) -> Host:
     """Return a host that is not started. Raises `NotCreatedError`, or `UnsupportedError` as the protocol does."""
     try:
         return Host.create(protocol, part)

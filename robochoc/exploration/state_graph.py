@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
-from robochoc.exploration.components import strong_components
+from robochoc.exploration.endless_runs import Edge, EndlessRun, endless_run
 from robochoc.exploration.local_steps import LocalState, Received, Step
 from robochoc.exploration.stage import Stage
 from robochoc.exploration.state_store import StateStore
@@ -80,7 +80,7 @@ class StateGraph:
         found.local_states = sum(len(robot.states) for stage in self._stages for robot in stage.robots)
         found.is_complete = found.states == len(store) and not found.fault
         if found.is_complete:
-            found.is_cyclic = self._is_cyclic()
+            found.is_cyclic = self.endless_run() is not None
         return found
 
     def _explored(self, number: int, found: Exploration) -> tuple[str, Delivery | None]:
@@ -155,26 +155,26 @@ class StateGraph:
             states.append(state)
         return states
 
-    def _is_cyclic(self) -> bool:
-        """Return whether the robots can continue forever although each message arrives at some time.
+    def endless_run(self) -> EndlessRun | None:
+        """Return a run of explored states in which the robots continue forever although each message arrives.
 
-        They can if there is a set of states, each reachable from each other, in which every channel that is never empty
-        delivers a message. The problem does not change in them, because it changes a limited number of times. After a
-        conclusion, no delivery counts.
+        The problem does not change in it, because it changes a limited number of times. After a conclusion, no delivery
+        counts. None: there is no such run.
         """
-        for component in strong_components(0, self._store.after):
-            delivered: set[Channel] = set()
-            states = [self._store.state(number) for number in component]
-            full = set.intersection(*({channel for channel, _ in state.queues} for state in states))
-            for state in states:
-                places = self._stages[state.stage].places
-                for delivery, after, _ in self._moves(state):
-                    if self._store.number(self._store.key(after)) in component:
-                        place = places.get(delivery.receiver, -1)
-                        delivered.update((place, places[sender]) for sender in delivery.senders)
-            if full <= delivered:
-                return True
-        return False
+        return endless_run(self._store.after, self._edges, self._waiting)
+
+    def _edges(self, number: int) -> Iterator[Edge]:
+        """Yield the steps from a state to explored states."""
+        state = self._store.state(number)
+        places = self._stages[state.stage].places
+        for delivery, after, _ in self.moves(state):
+            reached = self._store.number(self._store.key(after))
+            if reached is not None:
+                channels = frozenset((places[delivery.receiver], places[sender]) for sender in delivery.senders)
+                yield Edge(reached, delivery, channels)
+
+    def _waiting(self, number: int) -> set[Channel]:
+        return {channel for channel, _ in self._store.state(number).queues}
 
     def witness(self, state: TeamState) -> int | None:
         """Return the robot that has concluded the search alone; None if there is none."""

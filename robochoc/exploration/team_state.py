@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from robochoc.exploration.stage import Change
+from robochoc.exploration.changes import Change
 
 Channel = tuple[int, int]
 """The places of a receiver and a sender in the order of the robots."""
@@ -92,7 +92,9 @@ class Exploration:
             arrives. None: unknown.
         random_runs: The number of runs in random orders, played because something is left to explore.
         fault: The fault that ended it; empty if there is none.
-        path: The deliveries from the start to the fault.
+        path: The deliveries from the start to the fault. If the robots may continue forever: to the first state that
+            they reach again.
+        cycle: The deliveries from this state back to it; empty for other faults.
         explanation: The fault in words.
     """
 
@@ -105,7 +107,13 @@ class Exploration:
     random_runs: int = 0
     fault: str = ""
     path: Sequence[Delivery] = ()
+    cycle: Sequence[Delivery] = ()
     explanation: Explanation = NO_EXPLANATION
+
+    @property
+    def run(self) -> Sequence[Delivery]:
+        """The path and, once, the cycle."""
+        return [*self.path, *self.cycle]
 
 
 class Move(NamedTuple):

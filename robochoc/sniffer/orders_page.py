@@ -32,7 +32,7 @@ _TITLE = "<title>Orders</title>"
 
 
 def orders_page(checked: CheckedTeam, options: CheckOptions, most: int = MOST_STATES) -> bytes:
-    """Return the page in UTF-8. It begins with the deliveries that lead to the fault of `checked`, if it has one.
+    """Return the page in UTF-8. It begins with the run that leads to the fault of `checked`, if it has one.
 
     Args:
         checked: The team.
@@ -73,7 +73,7 @@ class _Content:
     def as_dict(self) -> dict[str, Any]:
         """Return the data of the page."""
         found, team = self._checked.exploration, self._checked.team
-        path = self._path(found.path)
+        path = self._path(found.run)
         is_complete = self._add_states()
         number = f"{counted(len(self._numbers), 'state')}{'' if is_complete else ', not all states of the team'}"
         return {

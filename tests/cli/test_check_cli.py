@@ -11,7 +11,9 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import read_journal
+from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
@@ -104,6 +106,26 @@ def test_a_protocols_fault_is_explained_and_its_journal_is_replayed_sniffed_and_
     assert robochoc_within("privacy", journal).returncode == 0
     page = PageData(Trace.of(read_journal(journal.read_bytes())))
     assert "V2 cannot be 1" in page.details(0).decode()
+
+
+def test_an_endless_run_is_reported_with_its_cycle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    receive = vars(ABT)["receive"]
+
+    def asking_again(self: ABT, sender: str, message: Message) -> None:
+        receive(self, sender, message)
+        if isinstance(message, Ok):
+            self.send(sender, AddLink())
+
+    monkeypatch.setattr(ABT, "receive", asking_again)
+    journal = tmp_path / "fault.journal"
+    done = robochoc_within("check", "abt", "--teams", 2, "--journal", journal)
+    assert done.returncode == 4
+    assert "Steps 2 to 3 lead back to the state after step 1." in " ".join(done.stderr.split())
+    assert journal.exists()
+    row = json.loads(robochoc_within("check", "abt", "--teams", 2, "--json").stdout.splitlines()[-1])
+    assert [len(row["path"]), len(row["cycle"])] == [1, 2]
+    for command in ("replay", "privacy"):
+        assert robochoc_within(command, journal).returncode == 0
 
 
 def test_the_page_is_that_of_the_first_team_and_does_not_replace_the_journal(tmp_path: Path) -> None:

@@ -212,14 +212,14 @@ def _write_page(page: Path, team: CheckedTeam, options: CheckOptions) -> None:
 
 
 def _write_journal(journal: Path, team: CheckedTeam, options: CheckOptions) -> None:
-    """Write the run that leads to the fault of `team`, unless no single run shows it."""
+    """Write the run that leads to the fault of `team`, unless its robots cannot be created."""
     from robochoc.exploration.counterexample import write_counterexample
 
-    if team.exploration.is_cyclic or not team.exploration.explanation.text:
-        click.echo(f"{journal}: not written: no single run shows the fault", err=True)
+    if not team.exploration.explanation.text:
+        click.echo(f"{journal}: not written: the robots cannot be created", err=True)
         return
     with errors_as_failures(journal):
-        write_counterexample(journal, team.case, team.exploration.path, options.run)
+        write_counterexample(journal, team.case, team.exploration.run, options.run)
     click.echo(f"{journal}: written; next: robochoc sniff {journal}", err=True)
 
 

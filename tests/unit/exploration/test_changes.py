@@ -13,12 +13,13 @@ import pytest
 from robochoc.communication.host import Host
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.exploration.changes import Course, EpochStage, FaultPlan
+from robochoc.exploration.changes import Course, FaultPlan
 from robochoc.exploration.check import CheckedTeam, CheckOptions, case_of, checked
 from robochoc.exploration.counterexample import write_counterexample
 from robochoc.exploration.judgement import TeamJudge
 from robochoc.exploration.problems import small_teams
 from robochoc.exploration.shrinking import reduced
+from robochoc.exploration.stage import Stage
 from robochoc.exploration.state_graph import StateGraph
 from robochoc.exploration.state_key import state_key
 from robochoc.generators.random_csp import random_csp
@@ -245,7 +246,7 @@ def test_the_states_of_real_runs_are_explored(protocol: type[Protocol], after: i
         team = random_scenario(first_teams(protocol, 1, number)[0], 1, 0.1, seed, after=after)
         case = case_of(team, protocol, Options(protocol=protocol.__name__, runtime=Runtime.SIMULATOR))
         course = Course(case.compiled.team, case.phase, EVENT)
-        graph = StateGraph(EpochStage(course, (), course.start), reduced=False)
+        graph = StateGraph(Stage.first_of(course), reduced=False)
         if not graph.explore(3_000).is_complete:
             continue
         compared += 1

@@ -12,11 +12,12 @@ from typing import Any
 import pytest
 
 from robochoc.exploration import check
-from robochoc.exploration.changes import Course, EpochStage
+from robochoc.exploration.changes import Course
 from robochoc.exploration.check import CheckedTeam, CheckOptions, checked
 from robochoc.exploration.components import strong_components
 from robochoc.exploration.counterexample import write_counterexample
 from robochoc.exploration.problems import small_teams
+from robochoc.exploration.stage import Stage
 from robochoc.exploration.state_graph import StateGraph
 from robochoc.journal.events import Received
 from robochoc.journal.journal import read_journal
@@ -79,7 +80,7 @@ def test_a_message_behind_a_waiting_one_may_be_in_the_same_packet(number: int) -
     options = CheckOptions(ABT, Options(protocol="abt", runtime=Runtime.SIMULATOR), packets=True)
     case = check.case_of(team, ABT, options.run)
     course = Course(case.compiled.team, case.phase)
-    graphs = [StateGraph(EpochStage(course, (), course.start), packets=True, reduced=one) for one in (True, False)]
+    graphs = [StateGraph(Stage.first_of(course), packets=True, reduced=one) for one in (True, False)]
     reduced, whole = (graph.explore(3000) for graph in graphs)
     assert reduced.is_complete
     assert reduced.ends == whole.ends
