@@ -2,6 +2,9 @@
 
 The master waits until all robots are ready, orders the start, requests counters until they prove quiescence, and ends
 the search. `SearchState` makes its decisions; each runtime implements the transport of control messages.
+
+All waits are in this module, and every wait ends. `_serve_until` requires a deadline. Only the waits of a search have
+none, since computations may last for any time: they end if all robots wait for data that are lost (`is_stalled`).
 """
 
 from __future__ import annotations
@@ -20,6 +23,8 @@ from robochoc.system.stopping import stop_requested
 
 TICK_S = 0.2
 """The interval between two progress reports, in seconds."""
+TRANSIT_S = 10.0
+"""The longest transit of a message between processes on a busy machine, in seconds."""
 
 
 class MasterLoop(ABC):
@@ -72,13 +77,13 @@ class MasterLoop(ABC):
         Raises the same errors as `_serve`.
         """
         state = self.state
-        self._serve_until(lambda: state.ready or state.broken_off or stop_requested(), deadline)
+        self._serve_search(lambda: state.ready or state.broken_off or stop_requested(), deadline)
         if not state.ready or state.ended:
             return
         self._order_start()
         self._kills.start(time.monotonic())
-        state.ordered = state.searching = True
-        self._serve_until(lambda: state.ended or self.is_to_stop, deadline)
+        state.start()
+        self._serve_search(lambda: state.ended or self.is_to_stop, deadline)
         state.searching = False
         self._kills.end(time.monotonic())
 
@@ -87,25 +92,31 @@ class MasterLoop(ABC):
         """True if a stop was requested, or the watch is satisfied."""
         return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
-    def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
+    def _serve_until(self, done: Callable[[], bool], deadline: float) -> None:
         """Serve the robots until `done()` or the deadline, on the monotonic clock. Raises the errors of `_serve`."""
-        while not done():
-            now = time.monotonic()
-            if is_past(deadline):
-                return
-            kill_s = self._kills.wait_s(now) if self.state.searching else None  # only then robots are killed
-            waits = (TICK_S, None if deadline is None else deadline - now, kill_s)
-            watch = self.watch if self.state.searching else None
-            soon = TICK_S if watch is None else watch.wait_s(now)
-            self._serve(min(soon, *(wait for wait in waits if wait is not None)), deadline)
-            if now - self._checked >= self.check_s:
-                self._checked = now
-                self._check_robots(now)
-            if self.state.searching:
-                self._detect_end(now)
+        while not done() and not is_past(deadline):
+            self._serve_once(time.monotonic(), deadline)
+
+    def _serve_search(self, done: Callable[[], bool], deadline: float | None) -> None:
+        """Serve the robots until `done()` or the deadline. The state ends a search that can never continue."""
+        while not done() and not is_past(deadline):
+            now, is_searching = time.monotonic(), self.state.searching
+            watch = self.watch if is_searching else None
+            kill_s = self._kills.wait_s(now) if is_searching else None  # only then robots are killed
+            self._serve_once(now, deadline, kill_s, None if watch is None else watch.wait_s(now))
+            self._detect_end(now)
+            if is_searching:
                 self._kill_due()
             if watch is not None:
                 self._take_snapshots(watch)
+
+    def _serve_once(self, now: float, deadline: float | None, *waits_s: float | None) -> None:
+        """Serve the robots once, after a wait of at most `TICK_S` and these seconds. Then check for lost robots."""
+        waits_s = (TICK_S, None if deadline is None else deadline - now, *waits_s)
+        self._serve(min(wait for wait in waits_s if wait is not None), deadline)
+        if now - self._checked >= self.check_s:
+            self._checked = now
+            self._check_robots(now)
 
     def _take_snapshots(self, watch: SearchWatch) -> None:
         """Pass a complete snapshot to `watch`, and request the next snapshot when it is due."""
@@ -116,6 +127,15 @@ class MasterLoop(ABC):
             number = self.state.start_snapshot()
             if number is not None:
                 self._ask_for_snapshot(number)
+
+    @property
+    def _transit_s(self) -> float:
+        """The longest transit of a message, in seconds."""
+        return TRANSIT_S
+
+    def _end_stalled(self) -> None:
+        """End a search that can never continue."""
+        self.state.stuck = self.state.describe_stall()
 
     def _ask_for_snapshot(self, number: int) -> None:
         """Request snapshot number `number` from all robots."""
@@ -131,13 +151,21 @@ class MasterLoop(ABC):
                 self._kill(name)
 
     def _detect_end(self, now: float) -> None:
-        """Start a wave if it could prove quiescence, or if the progress report needs the message count."""
+        """Start a wave if it could prove quiescence, or if the progress report needs the message count.
+
+        A search that can never continue ends.
+        """
+        state = self.state
+        if state.is_stalled(now, self._transit_s):
+            self._end_stalled()
+            return
         wanted = self._progress is not None and now - self._shown >= TICK_S
         if self._progress and wanted:
             self._shown = now
-            self._progress(Progress(self.state.counters.sent, time.monotonic() - self._began))
-        if self.state.start_continuation():
+            stage = f"waiting for {names}" if (names := state.awaited(now)) else ""
+            self._progress(Progress(state.counters.sent, time.monotonic() - self._began, stage))
+        if state.start_continuation():
             self._send_all(GoOn())
-        wave = self.state.next_wave(wanted=wanted)
+        wave = state.next_wave(wanted=wanted and state.searching)
         if wave is not None:
             self._send_all(CounterWave(wave))

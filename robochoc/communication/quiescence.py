@@ -55,6 +55,16 @@ class FourCounters:
         """The numbers of messages sent and received by all robots; None while any robot's counters are unknown."""
         return None if self._unreported else self._total
 
+    @property
+    def counted(self) -> MessageCounts:
+        """The numbers of messages sent and received, according to the latest reports."""
+        return self._total
+
+    @property
+    def missing(self) -> int:
+        """The number of messages that were sent and not received, according to the latest reports."""
+        return self._total.sent - self._total.received
+
     def latest(self, robot: str) -> MessageCounts | None:
         """Return the latest counters of `robot`, or None if it has not reported any."""
         return self._latest.get(robot)
@@ -81,6 +91,11 @@ class FourCounters:
     def is_wave_open(self) -> bool:
         """True if some robots have not yet answered the latest wave."""
         return bool(self._unanswered)
+
+    def close_wave(self) -> None:
+        """Ignore all further answers to the open wave."""
+        self._wave += self.is_wave_open
+        self._unanswered = set()
 
     def answer(self, robot: str, wave: int, counts: MessageCounts) -> None:
         """Record `robot`'s answer to `wave`. After the last answer it is known whether the search is quiescent."""

@@ -18,6 +18,15 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
 
 NO_TRAITS = Traits()
+_ASKED_ENOUGH = 2
+_AWAITED_S = 10.0
+"""The time without changes after which the progress report names the robots that have not answered, in seconds."""
+_MOST_NAMED = 3
+
+
+def first_names(names: Sequence[str]) -> str:
+    """Return the first of these names as a text."""
+    return ", ".join(names[:_MOST_NAMED]) + ", ..." * (len(names) > _MOST_NAMED)
 
 
 class SearchState:
@@ -31,6 +40,7 @@ class SearchState:
         max_messages: The limit on messages, if there is one.
         ordered: True if the robots were ordered to start.
         searching: True if the robots are searching now.
+        stuck: The reason why the search can never end; empty if it can end.
         lossy: True if messages are lost and the protocol tolerates this: waiting robots continue without the lost
             messages, until no robot can continue.
     """
@@ -54,6 +64,10 @@ class SearchState:
         self._undecided: set[str] = set()
         self._went = False
         self._snapshots = SnapshotRound()
+        self.stuck = ""
+        self._still: tuple[MessageCounts, int] | None = None
+        self._still_since = 0.0
+        self._asked = 0
 
     def handle(self, name: str, message: EpochMessage) -> str:
         """Handle a control message from the robot `name`. Return why the message is invalid, or an empty text.
@@ -82,7 +96,15 @@ class SearchState:
 
     def _count(self, name: str, wave: int, counts: MessageCounts) -> str:
         self.counters.answer(name, wave, counts)
+        if not self.ordered:
+            self.counters.quiescent = False  # the search has not started
         return ""
+
+    def start(self) -> None:
+        """Record that the robots were ordered to start. Answers to an earlier wave do not count."""
+        self.ordered = self.searching = True
+        self.counters.close_wave()
+        self._still, self._asked = None, 0
 
     def _conclude(self, name: str, verdict: str) -> str:
         """Record a verdict that the robot `name` concluded alone. Only the first verdict counts."""
@@ -138,14 +160,16 @@ class SearchState:
         """True if all robots are ready."""
         return not self._unready
 
-    def is_ready(self, name: str) -> bool:
-        """Return whether the robot `name` is ready, or lost."""
-        return name not in self._unready
+    @property
+    def unready(self) -> tuple[str, ...]:
+        """The robots that are not ready, sorted."""
+        return tuple(sorted(self._unready))
 
     @property
     def broken_off(self) -> bool:
-        """True if the search must end without a verdict: robots were lost, or the message limit is reached."""
-        return bool(self.lost) or (self.max_messages is not None and self.counters.sent >= self.max_messages)
+        """True if the search must end without a verdict: robots are lost, a limit is reached, or it is stuck."""
+        over = self.max_messages is not None and self.counters.sent >= self.max_messages
+        return bool(self.lost or self.stuck) or over
 
     @property
     def ended(self) -> bool:
@@ -154,8 +178,49 @@ class SearchState:
 
     @property
     def wave_due(self) -> bool:
-        """True if a wave could prove quiescence, or show that the message limit is reached."""
-        return self.counters.due or (self.max_messages is not None and not self.counters.is_wave_open)
+        """True if a wave could prove quiescence, or show that the message limit is reached or the search is stuck."""
+        if self.counters.is_wave_open:
+            return False
+        return bool(self._asked) or (self.ordered and (self.counters.due or self.max_messages is not None))
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """The robots that are not ready or, if all are ready, have not reported their counters, sorted."""
+        return self.unready or self.counters.silent
+
+    def is_stalled(self, now: float, patience_s: float) -> bool:
+        """Return whether the search can never continue: robots wait for data that are lost.
+
+        A computing robot does not answer waves. So this is certain if robots are not ready or messages are missing,
+        nothing has changed for `patience_s` seconds, and all robots then answer two waves with the same counts. While a
+        robot has not answered whether it continues, no waves are started.
+
+        Args:
+            now: The time on the monotonic clock.
+            patience_s: The longest transit of a message, in seconds.
+        """
+        counters = self.counters
+        waits = bool(self._unready) or counters.total is None or counters.missing != 0
+        mark = (counters.counted, len(self._unready))
+        if mark != self._still or self._undecided:
+            self._still, self._still_since, self._asked = mark, now, 0
+        elif not waits:
+            self._asked = 0
+        elif now - self._still_since > patience_s and not counters.is_wave_open:
+            if self._asked == _ASKED_ENOUGH:
+                return True
+            self._asked += 1
+        return False
+
+    def describe_stall(self) -> str:
+        """Return why the search can never continue. It must be stalled."""
+        if self._unready:
+            return f"{first_names(self.unready)} cannot start: data from other robots were lost for good"
+        return f"{self.counters.missing:,} messages between robots were lost for good"
+
+    def awaited(self, now: float) -> str:
+        """Return the names of the robots that have not answered, if nothing has changed for long; otherwise empty."""
+        return first_names(self.silent) if now - self._still_since > _AWAITED_S else ""
 
     def next_wave(self, *, wanted: bool = False) -> int | None:
         """Return the number of a wave to start now, or None.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import count
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -11,8 +10,6 @@ import pytest
 from robochoc.communication.network.control_messages import LostFrames
 from robochoc.communication.network.frame_loss import LossTracker
 
-PATIENCE_S = 3.0
-
 
 @pytest.fixture
 def lost() -> dict[str, str]:
@@ -20,33 +17,33 @@ def lost() -> dict[str, str]:
 
 
 @pytest.fixture
-def tracker(lost: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> LossTracker:
-    """A tracker for which a second passes whenever it looks at the clock."""
-    seconds = count()
-    clock = SimpleNamespace(monotonic=lambda: float(next(seconds)))
-    monkeypatch.setattr("robochoc.communication.network.frame_loss.time", clock)
-    members = cast("Any", SimpleNamespace(robots=dict.fromkeys(("RX1", "RX2"))))
+def tracker(lost: dict[str, str]) -> LossTracker:
+    members = cast("Any", SimpleNamespace(robots=dict.fromkeys(("RX1", "RX2", "RX3"))))
     return LossTracker(members, lambda *_: None, lambda name, why, **_: lost.update({name: why}))
 
 
-def test_frames_lost_before_the_search_are_a_loss_if_the_receiver_does_not_become_ready(
-    tracker: LossTracker, lost: dict[str, str]
-) -> None:
-    """`make simulate` found a run that waited forever for a robot without the copies of its constraints."""
+def test_the_sender_is_lost_for_whom_the_search_waits(tracker: LossTracker, lost: dict[str, str]) -> None:
+    assert not tracker.is_reported
     tracker.note_between("RX2", LostFrames("RX1", 1))
-    tracker.explain_unready(lambda _: False, PATIENCE_S)
-    assert not lost
-    for _ in range(5):
-        tracker.explain_unready(lambda name: name == "RX2", PATIENCE_S)
-    assert not lost
-    tracker.explain_unready(lambda _: False, PATIENCE_S)
+    tracker.note_between("RX3", LostFrames("RX2", 4))
+    assert tracker.explain(["RX2"])
     assert lost == {"RX1": "1 frames of it to RX2 were lost for good (reported by RX2)"}
+    assert not tracker.explain(["RX1"])
 
 
-def test_reports_from_an_earlier_search_do_not_count(tracker: LossTracker, lost: dict[str, str]) -> None:
+def test_all_senders_are_lost_if_messages_are_missing(tracker: LossTracker, lost: dict[str, str]) -> None:
     tracker.note_between("RX2", LostFrames("RX1", 1))
-    tracker.start_search()
-    for _ in range(5):
-        tracker.explain_unready(lambda _: False, PATIENCE_S)
+    tracker.note_between("RX3", LostFrames("RX2", 4))
+    assert tracker.explain([])
+    assert [*lost] == ["RX1", "RX2"]
+
+
+def test_losses_among_robots_that_are_gone_explain_nothing(tracker: LossTracker, lost: dict[str, str]) -> None:
+    """If they did, the master would wait forever for robots that it had already removed."""
+    tracker.note_between("RX2", LostFrames("RX1", 1))
+    del tracker._members.robots["RX2"]  # noqa: SLF001 - as the master removes it
+    assert not tracker.explain([])
+    tracker.note_between("RX3", LostFrames("RX1", 2))
+    del tracker._members.robots["RX1"]  # noqa: SLF001
+    assert not tracker.explain([])
     assert not lost
-    assert not tracker.explain_missing()

@@ -5,16 +5,19 @@ from __future__ import annotations
 import threading
 from typing import cast
 
+import pytest
+
 from robochoc.authority.admission import InMemoryAuthority
-from robochoc.communication.control import Counters, WentOn
+from robochoc.communication.control import Counters, Ready, WentOn
 from robochoc.communication.network.audited_state import AuditedSearchState
-from robochoc.communication.network.control_messages import LostFrames
+from robochoc.communication.network.control_messages import Bye, LostFrames
 from robochoc.communication.network.master import HELD_S, Master
 from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.settings import PATIENCE_S
 from robochoc.communication.network.transport import HEARTBEAT_S
+from robochoc.communication.search_result import RobotsLostError
 from robochoc.journal.events import Decided, Received, Refused, actor
 
 
@@ -25,27 +28,72 @@ def test_what_a_robot_tells_of_others() -> None:
     assert actor(Refused(t=0, who="A", what="", why="")) != "A"
 
 
-def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -> None:
+def started() -> AuditedSearchState:
+    """The state of a search by A and B, which were ordered to start."""
     state = AuditedSearchState(1, ["A", "B"])
+    for name in state.order:
+        state.handle(name, Ready(1))
+    state.start()
+    return state
+
+
+def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -> None:
+    state = started()
     state.handle("A", Counters(1, 0, 3, 0))
-    assert state.missing(0, 10) == 0
+    assert not state.is_stalled(0, 10)
     state.handle("B", Counters(1, 0, 0, 2))
-    assert [state.missing(now, 10) for now in (1, 5, 10.9)] == [0, 0, 0]
+    assert [state.is_stalled(now, 10) for now in (1, 5, 10.9)] == [False] * 3
     for now in (12, 13):
-        assert state.missing(now, 10) == 0
+        assert not state.is_stalled(now, 10)
         assert state.wave_due
         wave = state.counters.start_wave()
         state.handle("A", Counters(1, wave, 3, 0))
-        assert state.missing(now + 50, 10) == 0, "B has not answered"
+        assert not state.is_stalled(now + 50, 10), "B has not answered"
         state.handle("B", Counters(1, wave, 0, 2))
-    assert state.missing(14, 10) == 1
+    assert state.is_stalled(14, 10)
+    assert state.describe_stall() == "1 messages between robots were lost for good"
     state.handle("B", Counters(1, 0, 0, 3))
-    assert state.missing(15, 10) == 0
+    assert not state.is_stalled(15, 10)
+
+
+def test_a_robot_that_waits_for_lost_data_before_the_start_ends_the_search() -> None:
+    """`make simulate` found a master that waited forever for frames lost in an earlier search."""
+    state = AuditedSearchState(1, ["A", "B"])
+    state.handle("A", Ready(1))
+    assert not state.is_stalled(0, 10)
+    assert not state.wave_due, "B may compute"
+    for now in (11, 12):
+        assert not state.is_stalled(now, 10)
+        wave = state.next_wave()
+        assert wave is not None
+        for name in state.order:
+            assert not state.is_stalled(now + 50, 10), f"{name} may compute"
+            state.handle(name, Counters(1, wave, 0, 0))
+    assert state.is_stalled(13, 10)
+    assert state.describe_stall() == "B cannot start: data from other robots were lost for good"
+    assert state.awaited(13) == "B"
+    assert state.verdict is None, "no message was sent, but this is not the end of a search"
+    state.handle("B", Ready(1))
+    assert not state.is_stalled(13, 10)
+
+
+def test_answers_to_a_wave_before_the_start_prove_nothing() -> None:
+    state = AuditedSearchState(1, ["A", "B"])
+    for name in state.order:
+        state.handle(name, Counters(1, 0, 0, 0))
+        state.handle(name, Ready(1))
+    before = state.counters.start_wave()
+    state.start()
+    for name in state.order:
+        state.handle(name, Counters(1, before, 0, 0))
+    assert not state.counters.quiescent
+    wave = state.next_wave()
+    assert wave not in {None, before}
 
 
 def test_no_message_is_missing_while_a_robot_has_not_said_whether_it_goes_on() -> None:
     """A busy machine may give it no turn for long, and no wave asks the others before."""
-    state = AuditedSearchState(1, ["A", "B"])
+    state = started()
     state.lossy = True
     for name in ("A", "B"):
         state.handle(name, Counters(1, 0, 1, 1))
@@ -56,10 +104,10 @@ def test_no_message_is_missing_while_a_robot_has_not_said_whether_it_goes_on() -
     state.handle("A", WentOn(1, went=True))
     state.handle("A", Counters(1, 0, 2, 1))
     for now in (0, 11, 12, 13, 14):
-        assert state.missing(now, 10) == 0
+        assert not state.is_stalled(now, 10)
         assert state.next_wave() is None
     state.handle("B", WentOn(1, went=False))
-    assert [state.missing(now, 10) for now in (15, 24, 26)] == [0, 0, 0]
+    assert [state.is_stalled(now, 10) for now in (15, 24, 26)] == [False] * 3
     assert state.next_wave() is not None, "now all are asked"
 
 
@@ -103,20 +151,34 @@ def test_refusals_of_several_threads() -> None:
     assert told[-1] == "no (10,000 times so far)"
 
 
+def a_master() -> Master:
+    authority = InMemoryAuthority(("A", "B"))
+    master = Master(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:7447", NetworkMembers())
+    for name in ("A", "B"):
+        master.members.robots[name] = Member(cast("Profile", None), "incarnation")
+    return master
+
+
+def test_a_robot_that_leaves_before_the_end_is_lost() -> None:
+    """Otherwise it would be asked no more, although the master waits for it, and its absence would not count."""
+    master = a_master()
+    master.members.closed = True
+    with pytest.raises(RobotsLostError, match="A was lost: it has left before the end of the run"):
+        master._handle("A", master.members.robots["A"], Bye())  # noqa: SLF001 - as it arrives
+
+
 def test_messages_that_zenoh_may_hold_back_are_not_missing_yet() -> None:
     """It holds them for as long as it asks for an earlier one; the loss of that one a robot reports."""
     asked: list[float] = []
 
     class Recorded(AuditedSearchState):
-        def missing(self, now: float, patience_s: float) -> int:
+        def is_stalled(self, now: float, patience_s: float) -> bool:
             asked.append(patience_s)
-            return super().missing(now, patience_s)
+            return super().is_stalled(now, patience_s)
 
-    authority = InMemoryAuthority(("A", "B"))
-    master = Master(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:7447", NetworkMembers())
+    master = a_master()
     master.state = Recorded(1, ["A", "B"])
     master._detect_end(0)  # noqa: SLF001 - a step of its loop
-    master.members.robots["A"] = Member(cast("Profile", None), "incarnation")
     master._frame_loss.note_between("B", LostFrames("A", 3))  # noqa: SLF001 - as B says it
     master._detect_end(0)  # noqa: SLF001
     assert asked == [PATIENCE_S + HELD_S, PATIENCE_S]

@@ -113,7 +113,7 @@ def enough(state: AuditedSearchState) -> bool:
 
 
 def test_two_waves_of_equal_sums_are_quiet() -> None:
-    state = AuditedSearchState(1, ROBOTS)
+    state = begun(AuditedSearchState(1, ROBOTS))
     assert not due(state)
     all_hear(state, Counters(1, 0, 2, 2))
     assert due(state)
@@ -122,7 +122,7 @@ def test_two_waves_of_equal_sums_are_quiet() -> None:
 
 
 def test_news_between_two_waves_are_not_quiet() -> None:
-    state = AuditedSearchState(1, ROBOTS)
+    state = begun(AuditedSearchState(1, ROBOTS))
     all_hear(state, Counters(1, 0, 2, 2))
     waved(state, 3, 3)
     assert not quiet(state)
@@ -140,7 +140,7 @@ def test_what_is_under_way_is_not_quiet() -> None:
 
 
 def test_a_limit_on_messages_breaks_off() -> None:
-    state = AuditedSearchState(1, ROBOTS, max_messages=9)
+    state = begun(AuditedSearchState(1, ROBOTS, max_messages=9))
     assert state.wave_due  # how many there are is asked for all the time
     waved(state, 2, 0)
     assert not enough(state)

@@ -89,7 +89,7 @@ def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
 class ReadsOneReportAtATime(ProcessesRun):
     """Its time for reports is over after each of them."""
 
-    def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
+    def _serve_until(self, done: Callable[[], bool], deadline: float) -> None:
         if self.state.verdict is None:
             return super()._serve_until(done, deadline)
         silent = len(self._silent())

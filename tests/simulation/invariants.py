@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import NamedTuple
 
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Answer, Outcome, Verdict
-from robochoc.model.problem import INFINITE, ProblemKind, Team
+from robochoc.model.problem import INFINITE, ProblemKind, Robot, Team
 from robochoc.model.team_edits import constraints_in_force, without_robots
 from robochoc.protocols.traits import Traits
-from robochoc.run import Options, Withdrawal
+from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named
 from robochoc.verification.checker import assignment_cost, needlessly_withdrawn, violations
 from tests.simulation.plan import FaultKind, Plan
@@ -28,6 +29,8 @@ class Finding(NamedTuple):
 
 def violated(plan: Plan, outcome: Outcome) -> Iterator[Finding]:
     """Yield the properties that `outcome` does not have."""
+    if plan.options.runtime == Runtime.NETWORK:
+        plan = replace(plan, team=_without_files(plan.team, outcome.lost))
     for fault in plan.faults:
         if fault.kind is FaultKind.LIE:
             yield from _in_spite_of(fault.robot, plan.team, outcome)
@@ -61,6 +64,16 @@ def _in_spite_of(traitor: str, team: Team, outcome: Outcome) -> Iterator[Finding
         owners = {now.owner[name] for name in constraint.variables}
         if traitor not in owners and not constraint.allows(outcome.assignment):
             yield Finding("checked", f"{constraint.name} over {constraint.variables} counts as checked, but is broken")
+
+
+def _without_files(team: Team, lost: Collection[str]) -> Team:
+    """Return `team` without the constraints in the files of `lost` robots: across machines, no other robot has them."""
+    return replace(team, robots=tuple(_without_constraints(one) if one.name in lost else one for one in team.robots))
+
+
+def _without_constraints(robot: Robot) -> Robot:
+    parents = tuple(replace(parent, constraints=()) for parent in robot.parents)
+    return replace(robot, private=(), parents=parents)
 
 
 def _with_robots(team: Team, names: Collection[str]) -> Team:

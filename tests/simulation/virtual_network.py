@@ -15,7 +15,7 @@ import msgspec
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Counters, Ready, RobotFailed
-from robochoc.communication.network.control_messages import CheckResult, ToRobot
+from robochoc.communication.network.control_messages import CheckResult, DetailedReport, ToRobot
 from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Inbox, Item, PresenceChanged
 from robochoc.communication.network.master import Master
@@ -63,6 +63,8 @@ LIES: tuple[Callable[[], traitors.Lie], ...] = (
     lambda: traitors.counting(lambda count: count + 1),
     lambda: traitors.spending(checks=2**53),
     lambda: traitors.finding(Findings(bound=10**6)),
+    traitors.leaving,
+    lambda: traitors.leaving(at=DetailedReport),
 )
 """The lies of traitors. Some have a state, so that each run needs its own."""
 

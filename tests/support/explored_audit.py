@@ -15,16 +15,13 @@ from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import DetailedReport, Exchanged
 from robochoc.communication.network.plausibility import Declarations, Doubt
 from robochoc.communication.processes.robot_process import QueueRobot
-from robochoc.communication.search_result import SearchResult
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import is_past
 from robochoc.model.problem import Team
 from robochoc.protocols.message import Envelope
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import ensure_compiled
 from tests.support.explored_master import Run
-
-PATIENCE_S = 10.0
-"""The longest transit of a message, in seconds."""
 
 
 class Audit(NamedTuple):
@@ -63,19 +60,12 @@ class AuditedRobot(QueueRobot):
 
 
 class AuditedRun(Run):
-    """The session of a master that audits. Messages that have not arrived for too long are lost, as in `Master`."""
+    """The session of a master that audits. A search that is stuck is a result, as in `Master`."""
 
     def _new_state(self, epoch: int, order: Sequence[str]) -> AuditedSearchState:
         team = self.compiled.team
         shown = {robot.name: {one.name: one.domain for one in robot.variables} for robot in team.robots}
         return AuditedSearchState(epoch, order, None, Declarations(self._protocol.traits, shown))
-
-    def _detect_end(self, now: float) -> None:
-        state = cast("AuditedSearchState", self.state)
-        if missing := state.missing(now, PATIENCE_S):
-            state.stuck = f"{missing} messages were lost for good"
-        else:
-            super()._detect_end(now)
 
     def _finish(self, began: float, *, late: bool) -> SearchResult:
         state = cast("AuditedSearchState", self.state)
@@ -89,7 +79,12 @@ def audited_search(team: Team, protocol: type[Protocol]) -> Callable[[], Audit]:
 
     def program() -> Audit:
         with AuditedRun(compiled, protocol) as session:
-            result = session.search()
+            try:
+                result = session.search()
+            except RobotsLostError:
+                if not session.state.stuck:
+                    raise
+                result = session.state.result(0.0)
             state = cast("AuditedSearchState", session.state)
             return Audit(result, state.stuck, (*state.doubts_about_counts, *state.doubts_about_verdict))
 

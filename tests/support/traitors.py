@@ -12,7 +12,14 @@ from dataclasses import replace
 import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Ready
-from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, SearchTask, ToMaster
+from robochoc.communication.network.control_messages import (
+    Bye,
+    CheckResult,
+    DetailedReport,
+    Exchanged,
+    SearchTask,
+    ToMaster,
+)
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
@@ -29,6 +36,17 @@ def concluding(verdict: str, *, at: type = Counters) -> Lie:
     def lie(me: Searcher, word: ToMaster) -> Iterator[ToMaster]:
         if isinstance(word, at):
             yield Conclusion(me.epoch, verdict)
+        yield word
+
+    return lie
+
+
+def leaving(at: type = Counters) -> Lie:
+    """It takes its leave once it says a word of a kind, and goes on."""
+
+    def lie(_me: Searcher, word: ToMaster) -> Iterator[ToMaster]:
+        if isinstance(word, at):
+            yield Bye()
         yield word
 
     return lie

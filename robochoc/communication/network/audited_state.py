@@ -26,10 +26,9 @@ from robochoc.communication.network.plausibility import (
     widest_gap,
 )
 from robochoc.communication.quiescence import MessageCounts
-from robochoc.communication.search_state import SearchState
+from robochoc.communication.search_state import SearchState, first_names
 from robochoc.model.outcome import CheckCounts, Violations
 
-_ASKED_ENOUGH = 2
 _MOST_NAMED = 3
 """The maximum number of doubts described in a text."""
 
@@ -37,7 +36,6 @@ _MOST_NAMED = 3
 class AuditedSearchState(SearchState):
     """The state of a search whose robots are not trusted: their messages are checked for plausibility.
 
-    stuck: The reason why the search can never end; empty if it can end.
     drops: True if robots must drop messages.
     duration_s: The duration of the search in seconds, after `note_end` was called.
     """
@@ -50,7 +48,6 @@ class AuditedSearchState(SearchState):
         declared: Declarations = NOTHING_DECLARED,
     ) -> None:
         super().__init__(epoch, order, max_messages, declared.traits)
-        self.stuck = ""
         self.drops = False
         self.duration_s = 0.0
         self._declared = declared
@@ -61,9 +58,6 @@ class AuditedSearchState(SearchState):
         self._snapshot_checks: dict[str, CheckResult] = {}
         self._snapshot_checked = 0
         self._contradictions: list[Doubt] = []
-        self._still: MessageCounts | None = None
-        self._still_since = 0.0
-        self._asked = 0
 
     def handle(self, name: str, message: EpochMessage) -> str:
         """See `SearchState.handle`. Robots also report the costs of their constraints."""
@@ -143,37 +137,7 @@ class AuditedSearchState(SearchState):
         """Record the end of the search after `duration_s` seconds. `in_time`: the time limit was not reached."""
         self.duration_s = duration_s
         if not in_time:
-            self._late = tuple(sorted(self._unready)) or self.counters.silent
-
-    @property
-    def broken_off(self) -> bool:
-        """True if the search must end without a verdict: see `SearchState.broken_off`, or it is stuck."""
-        return bool(self.stuck) or super().broken_off
-
-    @property
-    def wave_due(self) -> bool:
-        """True if a wave is useful: for the reasons in `SearchState.wave_due`, or because messages are missing."""
-        return super().wave_due or (bool(self._asked) and not self.counters.is_wave_open)
-
-    def missing(self, now: float, patience_s: float) -> int:
-        """Return the number of messages that are certainly lost; 0 until this is certain.
-
-        The loss is certain if no message was sent or received for `patience_s` seconds, and all robots report the same
-        counts in two later waves, since then no message is in transit either. While a robot has not answered whether it
-        continues, no waves are started.
-
-        Args:
-            now: The time on the monotonic clock.
-            patience_s: The longest transit of a message, in seconds.
-        """
-        total = self.counters.total
-        if total is None or total != self._still or total.sent == total.received or self._undecided:
-            self._still, self._still_since, self._asked = total, now, 0
-        elif now - self._still_since > patience_s and not self.counters.is_wave_open:
-            if self._asked == _ASKED_ENOUGH:
-                return total.sent - total.received
-            self._asked += 1
-        return 0
+            self._late = self.silent
 
     @property
     def by_quiescence(self) -> bool:
@@ -229,7 +193,7 @@ class AuditedSearchState(SearchState):
     @property
     def unfinished(self) -> str:
         """A text on the robots that had not finished at the time limit; empty if no such robot is known."""
-        names = ", ".join(self._late[:_MOST_NAMED]) + ", ..." * (len(self._late) > _MOST_NAMED)
+        names = first_names(self._late)
         waited = f"{names} {'has' if len(self._late) == 1 else 'have'} not answered the master"
         doubts = [doubt.why for doubt in self.doubts_about_counts]
         return "; ".join(filter(None, [waited if names else "", *(doubts or [widest_gap(self._accounts)])]))

@@ -2,15 +2,14 @@
 
 A robot whose frames to the master are lost counts as lost. An observer only loses its request. The loss of frames
 between two robots is reported by one of them, but may be caused by wrong frame numbers from the other. So the loss
-counts only if messages are missing according to the counters of all robots, or, before the search, if the robot that
-reports it does not become ready.
+counts only if the search can never continue (`SearchState.is_stalled`): messages are missing, or the robot that reports
+the loss cannot start. No later frame on that way is accepted either, so the loss counts in later searches too.
 """
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable
-from typing import NamedTuple, Protocol
+from collections.abc import Callable, Collection
+from typing import Protocol
 
 from robochoc.communication.network.control_messages import LostFrames
 from robochoc.communication.network.inbox import FramesLost
@@ -23,14 +22,6 @@ class _Lose(Protocol):
     def __call__(self, name: str, why: str, *, for_good: bool) -> None: ...
 
 
-class _Loss(NamedTuple):
-    """A loss that the robot `reporter` has reported, with the time of its report on the monotonic clock."""
-
-    why: str
-    reporter: str
-    since: float
-
-
 class LossTracker:
     """Tracks lost frames in a run of `members`. `refuse` reports each loss (who, what, why); `lose` removes a robot."""
 
@@ -38,17 +29,17 @@ class LossTracker:
         self._members = members
         self._refuse = refuse
         self._lose = lose
-        self._said: dict[str, _Loss] = {}
-        """The first loss of each sender's frames reported in this search."""
-
-    def start_search(self) -> None:
-        """Start a search, and discard the reports from previous searches."""
-        self._said.clear()
+        self._said: dict[tuple[str, str], str] = {}
+        """The first report of each robot on each sender, by sender and reporter."""
 
     @property
     def is_reported(self) -> bool:
-        """True if a robot has reported a loss of frames from another robot in this search."""
-        return bool(self._said)
+        """True if a robot of the team has reported a loss of frames from another robot of the team."""
+        return bool(self._losses)
+
+    @property
+    def _losses(self) -> dict[tuple[str, str], str]:
+        return {way: why for way, why in self._said.items() if self._members.robots.keys() >= {*way}}
 
     def note_at_master(self, missed: FramesLost) -> None:
         """Report the loss of frames to the master, and mark their sender as lost if it participates.
@@ -67,25 +58,17 @@ class LossTracker:
         why = f"{gap.frames:,} frames of it to {name} were lost for good (reported by {name})"
         self._refuse(gap.who, f"a frame to {name}", why)
         if gap.who in self._members.robots:
-            self._said.setdefault(gap.who, _Loss(why, name, time.monotonic()))
+            self._said.setdefault((gap.who, name), why)
 
-    def explain_missing(self) -> bool:
-        """Mark the senders of lost frames as lost, since protocol messages are missing. Return whether there are any.
+    def explain(self, unready: Collection[str]) -> bool:
+        """Mark senders of lost frames as lost, since the search can never continue. Return whether there are any.
 
-        Raises `RobotsLostError`.
-        """
-        for name, loss in self._said.items():
-            self._lose(name, loss.why, for_good=True)
-        return bool(self._said)
-
-    def explain_unready(self, is_ready: Callable[[str], bool], patience_s: float) -> None:
-        """Mark the senders of lost frames as lost if the robot that lacks them has not become ready for `patience_s`.
-
-        Before a search, robots send each other copies of constraints, without which none can start.
+        Before a search, robots send each other copies of constraints, without which none can start. So if robots are
+        `unready`, only their reports count.
 
         Raises `RobotsLostError`.
         """
-        now = time.monotonic()
-        for name, loss in self._said.items():
-            if now - loss.since > patience_s and not is_ready(loss.reporter):
-                self._lose(name, loss.why, for_good=True)
+        guilty = {sender: why for (sender, name), why in self._losses.items() if not unready or name in unready}
+        for sender, why in guilty.items():
+            self._lose(sender, why, for_good=True)
+        return bool(guilty)

@@ -9,6 +9,7 @@ A robot counts as lost when its liveliness token has been missing for longer tha
 
 from __future__ import annotations
 
+import math
 import secrets
 import time
 from collections.abc import Callable, Mapping
@@ -172,6 +173,7 @@ class Master(MasterLoop):
         self._requests = RequestHandler(self._journal_server, self._facilitator, self._send, self.events.refuse)
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
+        self._has_ended = False
         self.snapshots: CheckedSnapshots | None = None
         """The snapshots in the current search, if robots must check them."""
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
@@ -201,12 +203,13 @@ class Master(MasterLoop):
         Raises `UnsupportedError` for a constraint over a variable that belongs to no neighbour of the constraint's
         robot.
         """
-        self._serve_until(lambda: self.members.complete, deadline)
+        until = math.inf if deadline is None else deadline  # people start the robots
+        self._serve_until(lambda: self.members.complete, until)
         unseen = self.members.unseen()
         while unseen and not is_past(deadline):
             for name, variables in unseen.items():
                 self._send(name, DomainRequest(variables))
-            self._serve_until(lambda before=unseen: self.members.unseen() != before, deadline)  # type: ignore[misc]
+            self._serve_until(lambda before=unseen: self.members.unseen() != before, until)  # type: ignore[misc]
             unseen = self.members.unseen()
         self.members.closed = self.members.complete and not unseen
         invalid = next(self.members.invalid_scopes(), None) if self.members.closed else None
@@ -235,7 +238,6 @@ class Master(MasterLoop):
         """
         began = time.monotonic()
         self.events.start_search()
-        self._frame_loss.start_search()
         deadline = None if timeout is None else began + timeout
         self._policy.open_ways(self.members.reach(writes_to_non_neighbours=traits.writes_to_non_neighbours))
         epoch, declared = self.state.epoch + 1, self.members.declared(traits)
@@ -302,6 +304,7 @@ class Master(MasterLoop):
     def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
         """Announce the end of the run until all robots confirm it, even those that have just joined or returned."""
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
+        self._has_ended = True
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):
             # A run may end before the next check of the directory.
@@ -347,8 +350,6 @@ class Master(MasterLoop):
         away_s = self._settings.patience_s
         for name in [n for n, member in self.members.robots.items() if member.is_away(away_s) and not member.left]:
             self._lose(name, f"it has not been there for {away_s:g} s")
-        if not self.state.ready:
-            self._frame_loss.explain_unready(self.state.is_ready, away_s)
         if now - self._registry_read >= REGISTRY_S:
             self._registry_read = now
             self._registrar.welcome_again()
@@ -371,17 +372,14 @@ class Master(MasterLoop):
                 self._lose(name, "its certificate was revoked")
         self._connection.follow_registry()
 
-    def _detect_end(self, now: float) -> None:
-        """See `MasterLoop._detect_end`. The search also ends if messages are missing without a reported loss.
+    @property
+    def _transit_s(self) -> float:
+        """See `MasterLoop`. Without a reported loss, zenoh may only have delayed the missing messages."""
+        return self._settings.patience_s + (0 if self._frame_loss.is_reported else HELD_S)
 
-        zenoh may only have delayed such messages, so the master waits longer for them.
-        """
-        held_s = 0 if self._frame_loss.is_reported else HELD_S
-        missing = self.state.missing(now, self._settings.patience_s + held_s)
-        if missing and not self._frame_loss.explain_missing():
-            self.state.stuck = f"{missing:,} messages between robots were lost for good"
-        else:
-            super()._detect_end(now)
+    def _end_stalled(self) -> None:
+        if not self._frame_loss.explain(self.state.unready):
+            super()._end_stalled()
 
     # Control messages
 
@@ -426,9 +424,16 @@ class Master(MasterLoop):
             case LostFrames():
                 self._frame_loss.note_between(name, message)
             case Bye():
-                member.left = True
+                self._dismiss(name, member)
             case _:
                 raise AssertionError(message)  # `Framing` decodes no other messages
+
+    def _dismiss(self, name: str, member: Member) -> None:
+        """Record that the robot has left after the end, or count it as lost if the run is not over."""
+        if self._has_ended:
+            member.left = True
+        else:
+            self._lose(name, "it has left before the end of the run", for_good=True)
 
     def _note_failure(self, name: str, why: str, refusal: type[UnsupportedError] | None = None) -> None:
         """Record that the robot `name` cannot continue, if there is a `why`. A `refusal` ends the run."""

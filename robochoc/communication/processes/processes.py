@@ -296,6 +296,8 @@ class ProcessesRun(Session, MasterLoop):
     def _finish(self, began: float, *, late: bool) -> SearchResult:
         """End the search, collect the reports, and return the result."""
         wall_s = time.monotonic() - began
+        if self.state.stuck:
+            raise RobotsLostError(dict.fromkeys(self.state.order, self.state.stuck))
         self._send_all(Pause())
         self._await_reports(late=late)
         silent = self._silent()

@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 
+from robochoc.communication.master_loop import TRANSIT_S
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.quiescence import MessageCounts
 from robochoc.communication.search_state import SearchState
 from robochoc.model.outcome import Verdict
 from tests.support.compiled import plain_python_only
 from tests.support.examples import count
-from tests.support.explored_audit import PATIENCE_S, Audit, AuditedRobot, audited_search
+from tests.support.explored_audit import Audit, AuditedRobot, audited_search
 from tests.support.explored_robots import RobotView
 from tests.support.explored_team import ExploredTeam, Found
 from tests.support.scripted_senders import TEAMS, Script, all_scripts, scripted
@@ -21,8 +22,8 @@ from tests.support.scripted_senders import TEAMS, Script, all_scripts, scripted
 pytestmark = plain_python_only
 
 CONCLUDED: Script = {"RA": ("RB",), "RB": ("RA", "!")}
-LATE: dict[str, Any] = {"passes": 5, "pass_s": 1.2 * PATIENCE_S, "patient": True}
-"""Time passes only when nothing else can happen: no message is under way for longer than the patience."""
+LATE: dict[str, Any] = {"passes": 5, "pass_s": 1.2 * TRANSIT_S, "patient": True}
+"""Time passes only when nothing else can happen: no message is under way for longer than `TRANSIT_S`."""
 
 
 def trusted(result: object, robots: Mapping[str, RobotView]) -> str:

@@ -121,7 +121,7 @@ class _Waits(MasterLoop):
         """No robot is there to listen."""
 
     def wait(self) -> list[float]:
-        self._serve_until(lambda: len(self.waits) == 3, None)
+        self._serve_search(lambda: len(self.waits) == 3, None)
         return self.waits
 
 

@@ -43,7 +43,7 @@ def lossy(protocol: str, runtime: Runtime, loss: float = 0.2, **settings: str) -
 def quiet(names: str) -> SearchState:
     """A search of robots that have told twice that nothing is under way: three messages were sent in all."""
     state = SearchState(0, names)
-    state.lossy = state.searching = True
+    state.lossy = state.ordered = state.searching = True
     for name in names:
         state.handle(name, Counters(0, 0, 1, 1))
     wave = state.next_wave()
