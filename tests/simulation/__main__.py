@@ -1,6 +1,7 @@
 """`make simulate`: runs in virtual time, each decided by its seed.
 
-Exit status 1: a property does not hold. 130, 143: Ctrl-C or SIGTERM; findings so far have been saved.
+Exit status 1: a property does not hold. 2: invalid options, or a file that cannot be repeated. 130, 143: Ctrl-C or
+SIGTERM; findings so far have been saved.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from collections import Counter
 from pathlib import Path
 
 from tests.simulation.drawing import drawn_plan
-from tests.simulation.minimising import minimised, repeated, written
+from tests.simulation.minimising import minimised, read, written
 from tests.simulation.plan import Plan, changed_options
 from tests.simulation.playing import Report, examine
 
@@ -66,7 +67,11 @@ def main() -> int:
     parser.add_argument("--inside", type=int, default=None, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.repeat:
-        return _repeat(options.repeat)
+        try:
+            plan = read(options.repeat)
+        except (OSError, ValueError) as error:
+            parser.error(str(error))
+        return _repeat(plan)
     if options.seed is None:
         options.seed = secrets.randbelow(10**9)
     if options.inside is not None:
@@ -160,10 +165,8 @@ def _report(total: Tally, seconds: float) -> None:
     sys.stdout.write("\n".join(lines) + "\n")
 
 
-def _repeat(path: Path) -> int:
-    """Repeat a run from a file. Return 1 if its finding is there again."""
-    content = json.loads(path.read_bytes())
-    plan = repeated(drawn_plan(content["seed"]), content["reductions"])
+def _repeat(plan: Plan) -> int:
+    """Play `plan`. Return 1 if it has a finding."""
     report = examine(plan)
     for finding in report.findings:
         sys.stdout.write(f"{finding.kind}: {finding.detail}\n")

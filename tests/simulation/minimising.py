@@ -8,6 +8,7 @@ from pathlib import Path
 
 from robochoc.model.team_edits import ChangeError
 from robochoc.system.errors import RobochocError
+from tests.simulation.drawing import drawn_plan
 from tests.simulation.invariants import Finding
 from tests.simulation.plan import Plan, Reduction, described, possible_reductions, reduced
 
@@ -47,6 +48,24 @@ def repeated(plan: Plan, reductions: list[tuple[str, str, int]]) -> Plan:
     """Return `plan` without the parts that an earlier minimisation has left out."""
     for what, which, number in reductions:
         plan = reduced(plan, Reduction(what, which, number))
+    return plan
+
+
+def read(path: Path) -> Plan:
+    """Return the plan in a file.
+
+    Raises:
+        OSError: if the file cannot be read.
+        ValueError: if it does not contain a finding, or if its seed decides another run now.
+    """
+    try:
+        content = json.loads(path.read_bytes())
+        plan = repeated(drawn_plan(content["seed"]), content["reductions"])
+        planned = content["plan"]
+    except (ValueError, TypeError, LookupError, RobochocError) as error:
+        raise ValueError(f"{path} is not a finding of this version of make simulate: {error}") from error
+    if json.loads(json.dumps(described(plan))) != planned:
+        raise ValueError(f"{path}: seed {plan.seed} decides another run now; try SEED={plan.seed} COUNT=1")
     return plan
 
 

@@ -98,6 +98,17 @@ def test_a_planted_fault_is_found_and_made_small(
     deaf.undo()
     deaf.setattr(sys, "argv", ["simulate", "--repeat", str(file)])
     assert main() == 0
+    for text, fault in [
+        (json.dumps(content | {"plan": {}}), f"seed {plan.seed} decides another run now"),
+        (json.dumps(content | {"reductions": [["robot"]]}), "is not a finding of this version"),
+        ("[]", "is not a finding of this version"),
+        ("{", "is not a finding of this version"),
+        (None, "No such file"),
+    ]:
+        file.unlink() if text is None else file.write_text(text)
+        with pytest.raises(SystemExit, match="2"):
+            main()
+        assert fault in capsys.readouterr().err
 
 
 def test_minimisation_keeps_the_kind_of_a_finding_and_ends() -> None:
