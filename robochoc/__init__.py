@@ -11,6 +11,7 @@ Names:
     Outcome: The result of a run; `solve()` returns its subclass `Solution`.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
     register: Registers a protocol of this program under a name.
+    travel_times: Travel times of a robot between places on a map, around its walls.
     read_result: Reads a JSON result of `robochoc solve --json` as an `Outcome`.
     AgentsContainer: The master or robots on one machine of a network.
     journal: Journals of runs; `journal.rows(path)` returns rows for pandas or polars.
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from robochoc.communication.search_result import RobotsLostError
     from robochoc.formats.diagnostics import InvalidInputError
     from robochoc.formats.result import read_result
+    from robochoc.maps.reachability.travel import travel_times
     from robochoc.model.outcome import Outcome, Verdict
     from robochoc.modelling.array_problem import ArrayProblem
     from robochoc.modelling.cpmpy_models import from_cpmpy
@@ -94,6 +96,7 @@ __all__ = [
     "minimum",
     "read_result",
     "register",
+    "travel_times",
 ]
 
 __version__ = "1.0.0"
@@ -121,6 +124,7 @@ _PLACES = {
     "register": "robochoc.run.registry",
     "RefutedError": "robochoc.verification.checker",
     "RobochocError": "robochoc.system.errors",
+    "travel_times": "robochoc.maps.reachability.travel",
     "RobotsLostError": "robochoc.communication.search_result",
     "UnknownProtocolError": "robochoc.run.registry",
     "UnsupportedError": "robochoc.solver.errors",

@@ -22,7 +22,7 @@ from robochoc.system.lazy_dataclass import dataclass
 from robochoc.tasks.entries import MAX_PLACES, Point, RobotEntry, Synergy, TaskEntry
 from robochoc.tasks.tours import TaskSet, Tour, TourSearch, round_length
 from robochoc.tasks.waypoints import in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
-from robochoc.tasks.ways import Ways
+from robochoc.tasks.ways import MapWays, Ways
 
 MAX_CONSTRAINTS = 200_000
 """The maximum number of constraints of the team, and of tours."""
@@ -215,6 +215,11 @@ class TaskTeamBuilder:
         from robochoc.maps.ground_map import ground_map_json  # noqa: PLC0415 - start-up
         from robochoc.tasks.ground import plain_ground  # noqa: PLC0415 - the same
 
+        if isinstance(self._read.ways, MapWays):
+            try:
+                return ground_map_json(self._read.ways.ground(robots, self._unit))
+            except ValueError as error:
+                self._notes.append(ConversionNote("map", f"the map, so that flights have no walls: {error}"))
         ground = plain_ground(robots, self._read.points, self._unit)
         return ground_map_json(ground) if ground else b""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from enum import StrEnum
 from fractions import Fraction
 from pathlib import Path
 
@@ -23,10 +24,20 @@ from robochoc.tasks.entries import (
     read_synergies,
     read_tasks,
 )
-from robochoc.tasks.ways import PlainWays
+from robochoc.tasks.ways import MapWays, PlainWays, Ways, map_at
 
+RADIUS_M = Fraction(1, 5)
+"""The default radius of robots on a map."""
 MAX_NUMBER = 1000
 """The maximum number of robots, and of tasks."""
+
+
+class Measure(StrEnum):
+    """The measures of distances: those of `Distance`, or ways around the walls of a map."""
+
+    STREETS = "streets"
+    STRAIGHT = "straight"
+    MAP = "map"
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
@@ -48,16 +59,16 @@ def read(paths: Sequence[Path], options: ImportOptions) -> ImportResult:
                 raise MistakeError(
                     f"is a list of tasks, whose import does not support --{option}", f"leave out --{option}"
                 )
-        found = TaskTeamBuilder(_read(file_text(path), path.stem, mistakes)).imported(options)
+        found = TaskTeamBuilder(_read(file_text(path), path, mistakes)).imported(options)
     mistakes.finish()
     if found is None:
         raise InvalidInputError([])
     return found
 
 
-def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> TaskList:
+def _read(text: str, path: Path, mistakes: DiagnosticCollector) -> TaskList:
     def read(root: Node) -> TaskList:
-        found = _list(EntryReader("the file", root), stem, mistakes)
+        found = _list(EntryReader("the file", root), path, mistakes)
         for mistake in unread_parts(root):
             mistakes.add(mistake.line, mistake.message, mistake.hint)
         mistakes.finish()
@@ -68,16 +79,15 @@ def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> TaskList:
     return read_list
 
 
-def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> TaskList:
+def _list(head: EntryReader, path: Path, mistakes: DiagnosticCollector) -> TaskList:
     listed = head.required_node("tasks")
-    robots = read_robots(head.required_node("robots"), Fraction(0), mistakes)
+    robots = read_robots(head.required_node("robots"), head.number("radius", RADIUS_M) or Fraction(0), mistakes)
     tasks = read_tasks(listed, mistakes)
     for what, entries in (("robots", robots), ("tasks", tasks)):
         if len(entries) > MAX_NUMBER:
             raise MistakeError(f"has {len(entries)} {what}", f"write at most {MAX_NUMBER}")
     synergies = read_synergies(head.node("synergies"), [name_text(name) for name, _ in listed.named()], mistakes)
     model = head.choice("model", TasksModel) or _model(robots, tasks)
-    distance = head.choice("distance", Distance) or Distance.STRAIGHT
     places = head.integer("places", 0) or 0
     if places > MAX_PLACES:
         raise MistakeError(f"has costs with {places} decimal places", f"write places: {MAX_PLACES} or less")
@@ -86,9 +96,38 @@ def _list(head: EntryReader, stem: str, mistakes: DiagnosticCollector) -> TaskLi
         if robot.topic:
             with mistakes.at(robot.line):
                 check_word(robot.topic)
-    name = " ".join(head.words("name")) or stem
+    name = " ".join(head.words("name")) or path.stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
-    return TaskList(name, model, PlainWays(distance), places, robots, tasks, synergies, tours)
+    ways = _ways(head, path.parent, robots, tasks, mistakes)
+    return TaskList(name, model, ways, places, robots, tasks, synergies, tours)
+
+
+def _ways(
+    head: EntryReader,
+    folder: Path,
+    robots: Mapping[str, RobotEntry],
+    tasks: Mapping[str, TaskEntry],
+    mistakes: DiagnosticCollector,
+) -> Ways:
+    """Return the ways given by `map` and `distance`. Raises `MistakeError`."""
+    name, measure = head.word("map"), head.choice("distance", Measure)
+    if name:
+        node = head.required_node("map")
+        if measure not in (None, Measure.MAP):
+            raise MistakeError(f"has a map and distance: {measure}", "delete one of them", node.line)
+        mistakes.finish()
+        ways = MapWays(map_at(name, folder, node.line), robots, tasks)
+        ways.check(mistakes)
+        mistakes.finish()
+        return ways
+    if measure == Measure.MAP:
+        raise MistakeError("has distance: map, but no map", "write map: FILE", head.required_node("distance").line)
+    usual = head.number("radius", RADIUS_M)
+    lines = [node.line for node in [head.node("radius")] if node]
+    lines += [one.line for one in robots.values() if one.radius != usual]
+    if lines:
+        raise MistakeError("has a radius, but no map", "write map: FILE, or delete the radius", lines[0])
+    return PlainWays(Distance(measure or Distance.STRAIGHT))
 
 
 def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:

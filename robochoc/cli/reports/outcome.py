@@ -303,9 +303,11 @@ def _simulated(outcome: Outcome) -> str:
 
 def _values(team: Team, assignment: Mapping[str, int | str], places: Mapping[str, Place]) -> list[str]:
     """Return a table of tasks, a board, or a list of values, with their positions if these are known."""
+    if tasks := task_table(team, assignment):
+        return tasks
     if places:
         return _list(team, {name: f"{value}{_at(places.get(name))}" for name, value in assignment.items()})
-    return task_table(team, assignment) or _board(team, assignment) or _list(team, assignment)
+    return _board(team, assignment) or _list(team, assignment)
 
 
 def _at(place: Place | None) -> str:

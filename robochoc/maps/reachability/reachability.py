@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
-from math import atan2, floor
+from math import floor
 
-import msgspec
-
-from robochoc.maps.ground_map import MAX_BLOCKED, GroundMap, Volume, WallPixels, WallVoxels
-from robochoc.maps.occupancy.packed import packed
+from robochoc.maps.ground_map import GroundMap
 from robochoc.maps.reachability.cell_size import AnyCells
-from robochoc.maps.reachability.cells import Cells, Cubes, Place
+from robochoc.maps.reachability.cells import Cells, Place
+from robochoc.maps.reachability.ground import ground_on
 from robochoc.maps.reachability.path_lengths import UNREACHED, lengths_from
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -79,61 +77,7 @@ class Reachability:
         Raises:
             ValueError: Too many cells of a three-dimensional map are blocked.
         """
-        cells = self.cells
-        standing = {
-            name: self._numbered_from_1(cells.containing(start))
-            for name, start in zip(self.names, self.starts, strict=True)
-        }
-        first = cells.first
-        ground = GroundMap(
-            cells.columns,
-            cells.rows,
-            {name: (at[0], at[1]) for name, at in standing.items()},
-            first=(first[0], first[1]),
-            scale=float(cells.side),
-        )
-        places = {name: (float(start[0]), float(start[1])) for name, start in zip(self.names, self.starts, strict=True)}
-        ground = msgspec.structs.replace(ground, places=places)
-        if isinstance(cells, Cubes):
-            levels = {name: at[2] for name, at in standing.items()}
-            return msgspec.structs.replace(ground, volume=self._volume(cells, levels))
-        return msgspec.structs.replace(ground, walls=self._walls(cells))
-
-    def _volume(self, cells: Cubes, starts: dict[str, int]) -> Volume:
-        if len(cells.blocked) > MAX_BLOCKED:
-            raise ValueError(f"{len(cells.blocked):,} cells are blocked, more than {MAX_BLOCKED:,}; use larger cells")
-        blocked = (self._numbered_from_1(cells.coordinates(cell)) for cell in cells.blocked)
-        cubes = tuple((at[0], at[1], at[2]) for at in blocked)
-        heights = {name: float(start[2]) for name, start in zip(self.names, self.starts, strict=True)}
-        walls = self._walls_in_space(cells)
-        return Volume(cells.counts[2], cells.first[2], starts, cubes, cells.sides, walls, heights)
-
-    def _walls(self, cells: Cells) -> WallPixels:
-        grid = cells.grid
-        rows, columns = grid.free.shape
-        return WallPixels(
-            columns,
-            rows,
-            float(grid.resolution),
-            (float(grid.origin[0]), float(grid.origin[1])),
-            float(self.radius),
-            float(self.speed),
-            packed(grid.free),
-            packed(grid.occupied),
-            atan2(grid.rotation.sine, grid.rotation.cosine),
-        )
-
-    def _walls_in_space(self, cells: Cubes) -> WallVoxels:
-        grid = cells.grid
-        levels, rows, columns = grid.free.shape
-        x, y, z = map(float, grid.origin)
-        free, occupied = packed(grid.free), packed(grid.occupied)
-        sizes = (columns, rows, levels, float(grid.resolution))
-        return WallVoxels(*sizes, (x, y, z), float(self.radius), float(self.speed), free, occupied)
-
-    def _numbered_from_1(self, coordinates: tuple[int, ...]) -> tuple[int, ...]:
-        """Return the coordinates of a cell as columns, rows and levels of a `GroundMap`, which are numbered from 1."""
-        return tuple(one - first + 1 for one, first in zip(coordinates, self.cells.first, strict=True))
+        return ground_on(self.cells, dict(zip(self.names, self.starts, strict=True)), self.radius, self.speed)
 
 
 def squared(one: Place, other: Place) -> Fraction:
