@@ -1,8 +1,9 @@
 """ROS types: encodes the fields of messages in ROS 1 and ROS 2, and decodes their bytes.
 
 Only this module uses `rosbags.typesys`. It supports the types of ROS 1 Noetic, of ROS 2 Humble (which later versions
-also have), of installed packages (`waypoint_types.py`), and of the offered services. Definitions in recordings are
-untrusted: they are compared with ours line by line, and never parsed by rosbags, which generates and runs code.
+also have), of installed packages (`waypoint_types.py`), and of services and actions (`interfaces.py`). Definitions in
+recordings are untrusted: they are compared with ours line by line, and never parsed by rosbags, which generates and
+runs code.
 """
 
 from __future__ import annotations
@@ -15,7 +16,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from numbers import Real
-from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, cast
 
 import numpy as np
@@ -24,34 +24,10 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
 from robochoc.robots.sink import Fields
+from robochoc.ros.interfaces import part_definition
 from robochoc.ros.waypoint_types import definition_of, short_kind
 from robochoc.system.errors import RobochocError
 
-DECIDE_REQUEST = """\
-string team
-string changes
-float64 timeout
-"""
-DECIDE_RESPONSE = """\
-bool success
-string message
-string verdict
-string cost
-string[] variables
-int64[] values
-string[] withdrawn
-string result
-"""
-SERVICE_TYPES: Mapping[str, str] = MappingProxyType(
-    {
-        "robochoc_msgs/Decide_Request": DECIDE_REQUEST,
-        "robochoc_msgs/Decide_Response": DECIDE_RESPONSE,
-        # ROS 2 adds this field to a structure without fields.
-        "std_srvs/Trigger_Request": "uint8 structure_needs_at_least_one_member\n",
-        "std_srvs/Trigger_Response": "bool success\nstring message\n",
-    }
-)
-"""The requests and responses of the offered services, as definitions of messages."""
 DEFINITION_MAX = 1 << 15
 """The maximum number of characters in a definition in a recording. Known definitions have up to about 5,000."""
 _LINE = re.compile(r"([A-Za-z][\w/]*)((?:<=\d+)?(?:\[[<=\d]*\])?)\s+([A-Za-z]\w*)\s*(=?)", re.ASCII)
@@ -139,12 +115,6 @@ class Types:
             self._definitions[name] = Definition(text, md5)
         return self._definitions[name]
 
-    def type_hash(self, kind: str) -> str:
-        """Return the hash of `kind`, by which ROS 2 compares definitions (REP 2016). Raises `UnknownTypeError`."""
-        name = self._name(kind)
-        self._conversion(kind, name)
-        return self._store.hash_rihs01(name)
-
     def has_same_fields(self, kind: str, text: str) -> bool:
         """Return whether `text` defines the same fields as `kind`. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)
@@ -191,7 +161,7 @@ class Types:
         short = short_kind(kind)
         name = short.replace("/", "/msg/", 1)
         if name not in self._store.fielddefs:
-            text = SERVICE_TYPES.get(kind) or definition_of(kind)
+            text = part_definition(short) or definition_of(kind)
             if not text:
                 problem = f"ROS {self.version} has no type {kind!r}"
                 raise UnknownTypeError(f"{problem}; add its definition to its mapping (documentation, page ROS)")

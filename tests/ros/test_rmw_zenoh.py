@@ -22,6 +22,7 @@ from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX, RmwZenohSink, RmwZeno
 from robochoc.ros.live.rmw_zenoh_keys import RosNode, ZenohTopic, attachment
 from robochoc.ros.live.rmw_zenoh_session import RouterAddress
 from robochoc.ros.message_types import types_of
+from robochoc.ros.type_hashes import type_hash
 from tests.support.cases import looped
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S, wait_until
@@ -31,9 +32,9 @@ from tests.support.zenoh_ros2 import FarEnd, Router
 POSE, POINT, TEXT = "geometry_msgs/PoseStamped", "geometry_msgs/PointStamped", "std_msgs/String"
 BATTERY = "sensor_msgs/BatteryState"
 STAMP = 1_700_000_000_123_456_789
-POSE_HASH = types_of(2).type_hash(POSE)
+POSE_HASH = type_hash(POSE)
 POSE_KEY = f"geometry_msgs::msg::dds_::PoseStamped_/{POSE_HASH}"
-TEXT_HASH = types_of(2).type_hash(TEXT)
+TEXT_HASH = type_hash(TEXT)
 TEXT_KEY = f"std_msgs::msg::dds_::String_/{TEXT_HASH}"
 
 pytestmark = pytest.mark.usefixtures("no_ros_here")
@@ -244,9 +245,9 @@ def test_a_source_that_comes_late_receives_the_last_message(router: Router) -> N
 
 def test_hashes_are_those_that_the_sdk_computes(end: FarEnd) -> None:
     assert end.ask("hashes") == {
-        kind: types_of(2).type_hash(kind)
+        kind: type_hash(kind)
         for kind in ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/PointStamped", "std_msgs/msg/String")
-    } | {"sensor_msgs/msg/BatteryState": types_of(2).type_hash(BATTERY)}
+    } | {"sensor_msgs/msg/BatteryState": type_hash(BATTERY)}
 
 
 def test_the_sdk_receives_all_also_when_it_comes_late(router: Router, end: FarEnd) -> None:

@@ -21,9 +21,10 @@ from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
 from robochoc.ros.live import rmw_zenoh_session
 from robochoc.ros.live.rmw_zenoh import MESSAGE_BYTES_MAX
 from robochoc.ros.live.rmw_zenoh_keys import RosNode, ZenohTopic, attachment, sender
-from robochoc.ros.live.rmw_zenoh_service import RmwZenohServices, service_hash
+from robochoc.ros.live.rmw_zenoh_service import RmwZenohServices
 from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.message_types import UnknownTypeError, types_of
+from robochoc.ros.type_hashes import service_hash, type_hash
 from tests.support.cases import looped
 from tests.support.faults import running
 from tests.support.limits import HANG_S, wait_until
@@ -107,7 +108,7 @@ def test_hashes_are_those_of_ros() -> None:
 
 
 def test_a_service_has_the_key_and_the_token_of_rmw_zenoh() -> None:
-    service = ZenohTopic.for_service("/robochoc/hangar/decide", TRIGGER, "RIHS01_10f3")
+    service = ZenohTopic.for_topic("/robochoc/hangar/decide", TRIGGER, "RIHS01_10f3")
     assert service.key(7) == "7/robochoc/hangar/decide/std_srvs::srv::dds_::Trigger_/RIHS01_10f3"
     assert RosNode(7, "aac3178e146ba6f1fc6e6a4085e77f21").entity_token(3, "SS", service) == (
         "@ros2_lv/7/aac3178e146ba6f1fc6e6a4085e77f21/0/3/SS/%/%/robochoc_aac3178e/%robochoc%hangar%decide/"
@@ -290,7 +291,7 @@ def test_nothing_is_left_of_a_server_that_is_killed(
         place,
     ]
     heard: list[str] = []
-    key = f"0/robochoc/feedback/std_msgs::msg::dds_::String_/{types_of(2).type_hash('std_msgs/String')}"
+    key = f"0/robochoc/feedback/std_msgs::msg::dds_::String_/{type_hash('std_msgs/String')}"
     subscriber = session.declare_subscriber(key, lambda sample: heard.append(str(sample.key_expr)))
     with running([*words, "--feedback"], tmp_path) as run:
         wait_until(lambda: "/robochoc/cancel" in run.errors(), "it does not serve")

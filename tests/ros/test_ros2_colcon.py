@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.ros.decide_service import DECIDE
-from robochoc.ros.live.rmw_zenoh_service import service_hash
+from robochoc.ros.type_hashes import service_hash
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 from tests.support.ros2_python import ros2_python

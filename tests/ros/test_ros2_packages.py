@@ -15,7 +15,8 @@ from click.testing import CliRunner
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from robochoc.cli.group import cli
-from robochoc.ros.message_types import DECIDE_REQUEST, DECIDE_RESPONSE, types_of
+from robochoc.ros.interfaces import DECIDE_SERVICE
+from robochoc.ros.message_types import types_of
 from tests.support.program import ROOT
 
 PACKAGES = ROOT / "docs" / "ros2"
@@ -113,7 +114,8 @@ def test_the_service_is_the_one_that_is_offered() -> None:
     text = (PACKAGES / "robochoc_msgs" / "srv" / "Decide.srv").read_text(encoding="utf-8")
     assert "srv/Decide.srv" in (PACKAGES / "robochoc_msgs" / "CMakeLists.txt").read_text(encoding="utf-8")
     halves = text.split("\n---\n")
-    for half, name, ours in zip(halves, ("Request", "Response"), (DECIDE_REQUEST, DECIDE_RESPONSE), strict=True):
+    ours_halves = DECIDE_SERVICE.split("---\n")
+    for half, name, ours in zip(halves, ("Request", "Response"), ours_halves, strict=True):
         full = f"robochoc_msgs/msg/Decide_{name}"
         theirs = get_types_from_msg(half, full)
         assert theirs == get_types_from_msg(ours, full)

@@ -15,6 +15,7 @@ from robochoc.robots.source import REPORTS
 from robochoc.ros.message_types import FieldType, types_of
 from robochoc.ros.names import TEAM_TOPICS
 from robochoc.ros.source_feedback import CLOCK_KIND
+from robochoc.ros.type_hashes import type_hash
 from robochoc.ros.waypoint_types import kinds
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
@@ -109,4 +110,4 @@ def test_a_ros_2_has_the_same_hashes() -> None:
         pytest.skip("this ROS 2 has no hashes of types: it is older than Iron")
     both = [kind for kind in KINDS if kind in theirs]
     assert {"geometry_msgs/PoseStamped", "std_msgs/String", "rosgraph_msgs/Clock"} <= {*both}
-    assert {kind: types_of(2).type_hash(kind) for kind in both} == {kind: theirs[kind] for kind in both}
+    assert {kind: type_hash(kind) for kind in both} == {kind: theirs[kind] for kind in both}

@@ -34,7 +34,8 @@ from cyclonedds.topic import Topic
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.dds_types import raw_service_type, raw_type, topic_name
 from robochoc.ros.live.transport import ErrorClass
-from robochoc.ros.message_types import UnknownTypeError, types_of
+from robochoc.ros.message_types import UnknownTypeError
+from robochoc.ros.type_hashes import type_hash
 
 END_S = 5.0
 """The longest wait for the end of a subscription's thread, in seconds."""
@@ -327,4 +328,4 @@ def _common(quality: Quality, kind: str) -> Iterator[Any]:
     yield blocked if quality.reliable else Policy.Reliability.BestEffort
     yield Policy.Durability.TransientLocal if quality.latched else Policy.Durability.Volatile
     yield Policy.DataRepresentation(use_cdrv0_representation=True)
-    yield Policy.Userdata(f"typehash={types_of(2).type_hash(kind)};".encode())
+    yield Policy.Userdata(f"typehash={type_hash(kind)};".encode())

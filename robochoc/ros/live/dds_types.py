@@ -58,7 +58,7 @@ def raw_service_type(kind: str) -> type[RawMessage]:
 
     In the middleware for Cyclone DDS, the first fields identify the request.
     """
-    name = dds_type_name(kind).replace("::msg::", "::srv::")
+    name = dds_type_name(kind)
     header = {"client_guid": _SCALARS["uint64"], "sequence_number": _SCALARS["int64"]}
     fields = {field: _field(what) for field, what in types_of(2).layout(kind)}
     return _raw(make_idl_struct(name.rpartition("::")[2], name, {**header, **fields}, dataclassify=True))

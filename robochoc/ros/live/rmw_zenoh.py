@@ -14,6 +14,7 @@ from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, ZenohTopic
 from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosSession
 from robochoc.ros.live.transport import LiveSink, LiveSource
 from robochoc.ros.message_types import FieldsError, UnknownTypeError, types_of
+from robochoc.ros.type_hashes import type_hash
 
 MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages are ignored: reports are short."""
@@ -36,10 +37,10 @@ class RmwZenohSink(LiveSink):
         """Declare publishers, which are then visible in ROS 2."""
         for topic, kind in topics.items():
             try:
-                type_hash = types_of(2).type_hash(kind)
+                hashed = type_hash(kind)
             except UnknownTypeError as error:
                 raise SinkError(on_one_line(f"{topic}: {error}")) from error
-            named = ZenohTopic.for_topic(topic, kind, NO_HASH if self._is_humble else type_hash)
+            named = ZenohTopic.for_topic(topic, kind, NO_HASH if self._is_humble else hashed)
             self._publishers[topic] = self._session.publisher(named)
 
     def _send(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
@@ -77,7 +78,7 @@ class RmwZenohSource(LiveSource):
         """Subscribe to `topics`."""
         for name, kind in topics.items():
             try:
-                topic = ZenohTopic.for_topic(name, kind, types_of(2).type_hash(kind))
+                topic = ZenohTopic.for_topic(name, kind, type_hash(kind))
             except UnknownTypeError as error:
                 raise SourceError(on_one_line(f"{name}: {error}")) from error
             self._session.subscribe(topic, partial(self._receive, topic, kind))

@@ -67,13 +67,8 @@ class ZenohTopic(NamedTuple):
 
     @classmethod
     def for_topic(cls, name: str, kind: str, type_hash: str) -> ZenohTopic:
-        """Return the topic with this name and ROS type."""
+        """Return the topic, or the service, with this name and ROS type."""
         return cls(name, dds_type_name(kind), type_hash)
-
-    @classmethod
-    def for_service(cls, name: str, kind: str, type_hash: str) -> ZenohTopic:
-        """Return the topic of a service with a type such as `std_srvs/Trigger`."""
-        return cls(name, dds_type_name(kind).replace("::msg::", "::srv::"), type_hash)
 
     def key(self, domain: int) -> str:
         """Return the key for messages on the topic."""

@@ -6,6 +6,7 @@ import os
 import re
 
 from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.ros.interfaces import full_name
 from robochoc.ros.live.transport import ErrorClass
 from robochoc.ros.waypoint_types import short_kind
 
@@ -26,6 +27,9 @@ def domain_id(failed: ErrorClass) -> int:
 
 
 def dds_type_name(kind: str) -> str:
-    """Return `geometry_msgs::msg::dds_::PoseStamped_` for `geometry_msgs/PoseStamped`, in either spelling."""
-    package, _, name = short_kind(kind).partition("/")
-    return f"{package}::msg::dds_::{name}_"
+    """Return `geometry_msgs::msg::dds_::PoseStamped_` for `geometry_msgs/PoseStamped`, in either spelling.
+
+    `kind` may also be a service, or a message of a service or an action.
+    """
+    package, namespace, name = full_name(short_kind(kind)).split("/")
+    return f"{package}::{namespace}::dds_::{name}_"
