@@ -32,7 +32,7 @@ from cyclonedds.sub import DataReader, Subscriber
 from cyclonedds.topic import Topic
 
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.dds_types import raw_service_type, raw_type, topic_name
+from robochoc.ros.live.dds_types import RawMessage, raw_service_type, raw_type, topic_name
 from robochoc.ros.live.transport import ErrorClass
 from robochoc.ros.message_types import UnknownTypeError
 from robochoc.ros.type_hashes import type_hash
@@ -50,6 +50,8 @@ BLOCKED_S = 0.2
 """The maximum duration of a blocking call, in seconds, so that signals are handled."""
 REQUESTS_MAX = 256
 """The number of unread requests, and the number of unread answers, that DDS stores per service."""
+_TOPIC_PREFIX = {"Request": "rq", "Reply": "rr"}
+"""The beginnings of the names of the two topics of a service, by their endings."""
 _SECOND_NS = 1_000_000_000
 _LIMIT = (
     "<CycloneDDS><Domain><Internal>"
@@ -128,31 +130,46 @@ class Participant:
 
     def serve(self, name: str, kind: str) -> ServiceEnd:
         """Return the server's end of a service with the type `kind`, such as `std_srvs/Trigger`."""
-        # Clients match the two topics of a service by this common identifier.
+        with self._reported(f"the service {name} cannot be offered in DDS"):
+            return self._service_end(name, kind, "serviceid", ("Reply", "Response"), ("Request", "Request"))
+
+    def call(self, name: str, kind: str) -> ServiceEnd:
+        """Return the client's end of a service with the type `kind`."""
+        with self._reported(f"the service {name} cannot be called in DDS"):
+            return self._service_end(name, kind, "clientid", ("Request", "Request"), ("Reply", "Response"))
+
+    def _service_end(
+        self, name: str, kind: str, role: str, written: tuple[str, str], read: tuple[str, str]
+    ) -> ServiceEnd:
+        """Return one end of a service. `written` and `read` are the endings of a topic and of its type."""
+        # The other end matches the two topics of this one by this common identifier.
         mark = ".".join(f"{byte:x}" for byte in secrets.token_bytes(16))
         quality = Qos(
             Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS)),
             Policy.Durability.Volatile,
             Policy.History.KeepLast(REQUESTS_MAX),
             Policy.DataRepresentation(use_cdrv0_representation=True),
-            Policy.Userdata(f"serviceid= {mark};".encode()),
+            Policy.Userdata(f"{role}= {mark};".encode()),
         )
-        with self._reported(f"the service {name} cannot be offered in DDS"):
-            request: Any = raw_service_type(f"{kind}_Request")
-            response: Any = raw_service_type(f"{kind}_Response")
-            asked: Any = Topic(self._participant, f"rq{name}Request", request)
-            told: Any = Topic(self._participant, f"rr{name}Reply", response)
-            partitions = _partitions(self._quality)
-            writer = DataWriter(Publisher(self._participant, qos=partitions), told, qos=quality)
-            # A later request never replaces an earlier one: its writer waits until there is room.
-            others = Qos(
-                Policy.History.KeepAll,
-                Policy.ResourceLimits(REQUESTS_MAX, REQUESTS_MAX, REQUESTS_MAX),
-                Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
-                base=quality,
-            )
-            reader = DataReader(Subscriber(self._participant, qos=partitions), asked, qos=others)
-        return ServiceEnd(self._participant, name, kind, reader, writer)
+        sent_type: Any = raw_service_type(f"{kind}_{written[1]}")
+        sent: Any = Topic(self._participant, f"{_TOPIC_PREFIX[written[0]]}{name}{written[0]}", sent_type)
+        received_type: Any = raw_service_type(f"{kind}_{read[1]}")
+        received: Any = Topic(self._participant, f"{_TOPIC_PREFIX[read[0]]}{name}{read[0]}", received_type)
+        partitions = _partitions(self._quality)
+        writer = DataWriter(Publisher(self._participant, qos=partitions), sent, qos=quality)
+        # A later request never replaces an earlier one: its writer waits until there is room.
+        others = Qos(
+            Policy.History.KeepAll,
+            Policy.ResourceLimits(REQUESTS_MAX, REQUESTS_MAX, REQUESTS_MAX),
+            Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
+            base=quality,
+        )
+        reader = DataReader(Subscriber(self._participant, qos=partitions), received, qos=others)
+        return ServiceEnd(name, sent_type, reader, writer)
+
+    def listen(self, ends: Sequence[ServiceEnd], receive: Callable[[str, str, bytes], None]) -> Subscription:
+        """Call `receive` in a separate thread with the name of the service, "", and the bytes of each message."""
+        return Subscription(self._participant, [(end.reader, end.name, "") for end in ends], receive)
 
     def _topic(self, topic: str, kind: str) -> Any:  # noqa: ANN401 - types are made at run time
         return Topic(self._participant, topic_name(topic), raw_type(kind))
@@ -209,37 +226,38 @@ class Participant:
 
 
 class ServiceEnd:
-    """The server's end of a service: it receives the bytes of requests and sends the bytes of answers."""
+    """One end of a service: the server's, which reads requests and writes answers, or the client's.
 
-    def __init__(self, participant: Any, name: str, kind: str, reader: Any, writer: Any) -> None:  # noqa: ANN401 - the library's
-        self._participant, self._name, self._kind = participant, name, kind
-        self._reader, self._writer = reader, writer
-        self._subscription: Subscription | None = None
+    Args:
+        name: The name of the service.
+        sent: The DDS type of the messages that this end writes.
+        reader: The library's reader.
+        writer: The library's writer.
+    """
 
-    def listen(self, receive: Callable[[str, str, bytes], None]) -> None:
-        """Call `receive` in a separate thread with the service's name, its type and the bytes of each request."""
-        self._subscription = Subscription(self._participant, [(self._reader, self._name, self._kind)], receive)
+    def __init__(self, name: str, sent: type[RawMessage], reader: Any, writer: Any) -> None:  # noqa: ANN401 - the library's
+        self.name, self.reader = name, reader
+        self._sent, self._writer = sent, writer
 
     def write(self, content: bytes) -> None:
-        """Send an answer. It is lost if no client reads it."""
+        """Send a message. It is lost if nobody reads it."""
         with suppress(DDSException):
-            self._writer.write(raw_service_type(f"{self._kind}_Response")(content))
+            self._writer.write(self._sent(content))
 
-    def has_clients(self) -> bool:
-        """Return whether a client listens for answers."""
+    def has_readers(self) -> bool:
+        """Return whether the other end, or one of them, reads what this end writes."""
         return bool(self._writer.get_publication_matched_status().current_count)
 
+    def has_writers(self) -> bool:
+        """Return whether this end reads what the other end, or one of them, writes."""
+        return bool(self.reader.get_subscription_matched_status().current_count)
+
     def is_acknowledged(self) -> bool:
-        """Return whether all clients acknowledge their answers within `BLOCKED_S`."""
+        """Return whether all readers acknowledge the messages within `BLOCKED_S`."""
         try:
             return bool(self._writer.wait_for_acks(round(BLOCKED_S * _SECOND_NS)))
         except (AttributeError, DDSException):  # cyclonedds 11.0.1 does not find its own constant when the time is over
             return False
-
-    def stop(self) -> None:
-        """Stop accepting requests."""
-        if self._subscription is not None:
-            self._subscription.close()
 
 
 class Subscription:

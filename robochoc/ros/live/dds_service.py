@@ -12,7 +12,7 @@ import time
 from collections.abc import Mapping
 
 from robochoc.robots.sink import Fields, SinkError
-from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant, ServiceEnd
+from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant, ServiceEnd, Subscription
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.services import WAITING_MAX, ImmediateServices, Refuse, ServiceRequest, Services, known_fields
 from robochoc.ros.message_types import FieldsError, types_of
@@ -47,11 +47,11 @@ class DdsServices(Services):
         self.where = f"domain {found.domain} of DDS"
         self._ends: dict[str, ServiceEnd] = {}
         self._participant = Participant(found, SinkError)
+        self._subscription: Subscription | None = None
         try:
             for name, kind in services.items():
                 self._ends[name] = self._participant.serve(name, kind)
-            for end in self._ends.values():
-                end.listen(self._receive)
+            self._subscription = self._participant.listen([*self._ends.values()], self._receive)
         except BaseException:
             self.close()
             raise
@@ -60,7 +60,7 @@ class DdsServices(Services):
         """Answer `request`."""
         end = self._ends[request.name]
         until = time.monotonic() + MATCH_S
-        while not end.has_clients() and time.monotonic() < until:
+        while not end.has_readers() and time.monotonic() < until:
             time.sleep(0.01)
         self._write(request.name, request.client, fields)
 
@@ -74,8 +74,8 @@ class DdsServices(Services):
 
     def close(self) -> None:
         """Refuse the waiting requests, and leave the domain."""
-        for end in self._ends.values():
-            end.stop()
+        if self._subscription is not None:
+            self._subscription.close()
         self._refuse_waiting()
         until = time.monotonic() + END_S
         for end in self._ends.values():
@@ -104,11 +104,16 @@ class DdsServices(Services):
     def _write(self, name: str, header: bytes, fields: Fields) -> None:
         kind = self._kinds[name]
         content = types_of(2).encode(f"{kind}_Response", known_fields(kind, fields))
-        self._ends[name].write(content[:_ENCAPSULATION] + header + content[_ENCAPSULATION:])
+        self._ends[name].write(with_header(content, header))
+
+
+def with_header(content: bytes, header: bytes) -> bytes:
+    """Return the bytes of a request or an answer with the header that identifies the request."""
+    return content[:_ENCAPSULATION] + header + content[_ENCAPSULATION:]
 
 
 def split_request(content: bytes) -> tuple[bytes, bytes] | None:
-    """Return the header of a request, in little-endian order, and the message; None if it is too short or too long."""
+    """Return the header of a request or an answer, in little-endian order, and the message; None if the size is wrong."""
     order = _ORDERS.get(content[:2])
     begin, end = _ENCAPSULATION, _ENCAPSULATION + _HEADER
     if order is None or not end <= len(content) <= MESSAGE_BYTES_MAX:

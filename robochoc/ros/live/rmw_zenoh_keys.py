@@ -28,8 +28,8 @@ SERVICES_QOS = "1:2:1,10:,:,:,,"
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_SIZE = 16
 
-EntityKind = Literal["MP", "MS", "SS"]
-"""A publisher, a subscription or a service server."""
+EntityKind = Literal["MP", "MS", "SS", "SC"]
+"""A publisher, a subscription, a server or a client of a service."""
 
 
 class RosNode(NamedTuple):
@@ -50,7 +50,7 @@ class RosNode(NamedTuple):
 
     def entity_token(self, number: int, kind: EntityKind, topic: ZenohTopic) -> str:
         """Return the token of an entity. Each entity of the node has its own number."""
-        quality = SERVICES_QOS if kind == "SS" else LATCHED
+        quality = SERVICES_QOS if kind in {"SS", "SC"} else LATCHED
         return f"{self._token(number, kind)}/{topic.name.replace('/', '%')}/{topic.type}/{topic.hash}/{quality}"
 
     def _token(self, number: int, kind: str) -> str:
@@ -77,6 +77,10 @@ class ZenohTopic(NamedTuple):
     def any_key(self, domain: int) -> str:
         """Return the key expression for messages on the topic with any type hash."""
         return f"{domain}/{self.name.strip('/')}/{self.type}/*"
+
+    def any_server_token(self, domain: int) -> str:
+        """Return the key expression for the tokens of all servers of this service."""
+        return f"@ros2_lv/{domain}/*/*/*/SS/*/*/*/{self.name.replace('/', '%')}/{self.type}/{self.hash}/**"
 
 
 def gid_of(token: str) -> bytes:

@@ -38,6 +38,8 @@ CLOSE_S = 10.0
 """The longest time for closing a session, in seconds."""
 CONFIG_FILE = "ZENOH_SESSION_CONFIG_URI"
 """The environment variable with the path of a zenoh configuration (certificates, an endpoint), as in ROS 2 itself."""
+_SERVERS_MAX = 100
+"""The maximum number of servers of one service that are counted."""
 _HEARTBEAT_S = 0.5
 """The time after which a subscriber detects that it has missed the last message, in seconds."""
 _START = "start one: `ros2 run rmw_zenoh_cpp rmw_zenohd`"
@@ -111,6 +113,51 @@ class RosQuery:
         self._query.drop()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
 
+class RosClient:
+    """Calls one service, and counts the servers that offer it."""
+
+    def __init__(self, session: zenoh.Session, node: RosNode, service: ZenohTopic, number: int) -> None:
+        token = node.entity_token(number, "SC", service)
+        self._session, self._gid = session, gid_of(token)
+        self._key = service.key(node.domain)
+        self._servers: set[str] = set()
+        self._token = session.liveliness().declare_token(token)
+        self._watch = session.liveliness().declare_subscriber(
+            service.any_server_token(node.domain), zenoh.handlers.Callback(self._on_token, indirect=False), history=True
+        )
+
+    def has_server(self) -> bool:
+        """Return whether a server offers the service."""
+        return bool(self._servers)
+
+    def call(self, number: int, content: bytes, wait_s: float, receive: Callable[[bytes | None], None]) -> None:
+        """Send the request `number`, and pass its answers to `receive`, then None when no more will arrive.
+
+        zenoh ends the query after `wait_s` seconds, or when the server is gone.
+        """
+
+        def on_reply(reply: zenoh.Reply) -> None:
+            if reply.ok is not None:
+                receive(reply.ok.payload.to_bytes())
+
+        self._session.get(
+            self._key,
+            zenoh.handlers.Callback(on_reply, drop=lambda: receive(None), indirect=False),
+            target=zenoh.QueryTarget.ALL_COMPLETE,
+            consolidation=zenoh.ConsolidationMode.NONE,
+            timeout=wait_s,
+            payload=content,
+            attachment=attachment(number, time.time_ns(), self._gid),
+        )
+
+    def _on_token(self, sample: zenoh.Sample) -> None:
+        token = str(sample.key_expr)
+        if sample.kind == zenoh.SampleKind.DELETE:
+            self._servers.discard(token)
+        elif len(self._servers) < _SERVERS_MAX:
+            self._servers.add(token)
+
+
 class RosSession:
     """A ROS 2 node, connected to the router at `place`. Raises `failed` if the router is missing or lost."""
 
@@ -153,6 +200,11 @@ class RosSession:
         )
         token = self._session.liveliness().declare_token(self._node.entity_token(self._entities, "MS", topic))
         self._declared += [subscriber, token]
+
+    def client(self, service: ZenohTopic) -> RosClient:
+        """Return a client of `service`."""
+        self._entities += 1
+        return RosClient(self._session, self._node, service, self._entities)
 
     def serve(self, service: ZenohTopic, receive: ReceiveQuery) -> None:
         """Offer `service`, and pass its requests to `receive`. Requests without a client's id get an error."""

@@ -138,9 +138,27 @@ class Connection:
         for name in names:
             self._send_operation(op="unadvertise_service", service=name)
 
-    def _send_operation(self, **fields: object) -> None:
+    def send(self, operation: Mapping[str, object]) -> None:
+        """Send an operation of the protocol in the background. Without a connection, it is dropped."""
         if not self.ended.is_set():
-            self.ros.send_on_ready(self.roslibpy.Message(fields))
+            self.ros.send_on_ready(self.roslibpy.Message(dict(operation)))
+
+    def intercept(self, operation: str, receive: Callable[[Mapping[str, object]], bool]) -> None:
+        """Pass messages of the type `operation` to `receive`, in the connection's thread.
+
+        Messages for which it returns False are handled by roslibpy.
+        """
+        handlers = self._protocol._message_handlers  # noqa: SLF001 - roslibpy has no public way
+        usual = handlers.get(operation)
+
+        def handle(message: Mapping[str, object]) -> None:
+            if not receive(message) and usual is not None:
+                usual(message)
+
+        handlers[operation] = handle
+
+    def _send_operation(self, **fields: object) -> None:
+        self.send(fields)
 
     def check(self) -> None:
         """Raise `failed` if the connection is lost."""
