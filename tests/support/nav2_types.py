@@ -4,7 +4,6 @@ A request or response over DDS begins with the id of the client and the number o
 """
 
 from dataclasses import dataclass, field, fields
-from functools import cache
 from typing import Any
 
 from cyclonedds.idl import IdlStruct, make_idl_struct
@@ -92,6 +91,7 @@ class CancelResponse(IdlStruct, typename="action_msgs.srv.dds_.CancelGoal_Respon
     goals_canceling: sequence[GoalInfo] = field(default_factory=list)  # type: ignore[type-arg, assignment]
 
 
+_WITH_HEADER: dict[str, type[Any]] = {}
 SERVICES: dict[str, tuple[type[Any], type[Any]]] = {
     "send_goal": (SendGoalRequest, SendGoalResponse),
     "cancel_goal": (CancelRequest, CancelResponse),
@@ -99,11 +99,12 @@ SERVICES: dict[str, tuple[type[Any], type[Any]]] = {
 }
 
 
-@cache
 def with_header(kind: type[Any]) -> type[Any]:
-    """Return the type of the same fields after a header, as rmw_cyclonedds has it."""
+    """Return the type of the same fields after a header, as rmw_cyclonedds has it; once for each type."""
+    name = kind.__idl_typename__.replace(".", "::")
+    if name in _WITH_HEADER:
+        return _WITH_HEADER[name]
     types = {one.name: kind.__annotations__[one.name] for one in fields(kind)}
     both = {"guid": uint64, "seq": int64, **types}
-    name = kind.__idl_typename__.replace(".", "::")
-    made: type[Any] = make_idl_struct(name.rpartition("::")[2], name, both, dataclassify=True)
-    return made
+    _WITH_HEADER[name] = make_idl_struct(name.rpartition("::")[2], name, both, dataclassify=True)
+    return _WITH_HEADER[name]

@@ -52,6 +52,10 @@ _STEP_S = 0.02
 Reply = Callable[[Any], None]
 
 
+def uuid_of(goal: bytes) -> UUID:
+    return UUID(uuid=[*goal])  # type: ignore[arg-type]  # the library's arrays are lists
+
+
 def say(*what: object) -> None:
     sys.stdout.write(json.dumps(what if len(what) > 1 else what[0]) + "\n")
     sys.stdout.flush()
@@ -87,9 +91,11 @@ class Robot:
             case "cancel_goal":
                 goal = bytes(request.goal_info.goal_id.uuid)
                 say(self.name, "cancel", goal.hex())
-                reply(CancelResponse(goals_canceling=[GoalInfo(goal_id=UUID(uuid=[*goal]))]))
+                reply(CancelResponse(goals_canceling=[GoalInfo(goal_id=uuid_of(goal))]))  # type: ignore[arg-type]  # a list
                 if goal == self.goal:
                     self._end(goal, CANCELED)
+            case _:
+                raise AssertionError(service)
 
     def _begin(self, request: Any, reply: Reply) -> None:  # noqa: ANN401 - made at run time
         place = request.goal.pose.pose.position
@@ -111,9 +117,9 @@ class Robot:
         here = Point(*(a + (b - a) * share for a, b in zip(self._xyz(self.at), self._xyz(self.to), strict=True)))
         pose = PoseStamped(header=Header(frame_id="map"), pose=Pose(position=here))
         if self.manner == "others":
-            self.publish(FeedbackMessage(goal_id=UUID(uuid=[7] * 16), feedback=Feedback(current_pose=pose)))
+            self.publish(FeedbackMessage(goal_id=uuid_of(bytes([7] * 16)), feedback=Feedback(current_pose=pose)))
         for _ in range(1 + (self.manner == "twice")):
-            message = FeedbackMessage(goal_id=UUID(uuid=[*self.goal]), feedback=Feedback(current_pose=pose))
+            message = FeedbackMessage(goal_id=uuid_of(self.goal), feedback=Feedback(current_pose=pose))
             self.publish(message)
         if self.steps < STEPS:
             return
@@ -128,6 +134,8 @@ class Robot:
             case "drives" | "twice" | "others" | "garbage":
                 self.at = self.to
                 self._end(self.goal, SUCCEEDED)
+            case _:
+                pass
 
     def _end(self, goal: bytes, status: int) -> None:
         self.results[goal] = status
@@ -165,7 +173,7 @@ class DdsEnd:
         for name, manner in manners.items():
             action = f"{name}/navigate_to_pose/_action"
             for service, kinds in SERVICES.items():
-                asked, told = map(with_header, kinds)
+                asked, told = (with_header(kind) for kind in kinds)
                 reader = DataReader(participant, Topic(participant, f"rq{action}/{service}Request", asked), qos=quality)
                 writer = DataWriter(participant, Topic(participant, f"rr{action}/{service}Reply", told), qos=quality)
                 self.ends[name, service] = reader, writer, told
@@ -288,5 +296,5 @@ if __name__ == "__main__":
     asked = parser.parse_args()
     middleware, _, where = asked.place.partition(":")
     with suppress(KeyboardInterrupt, BrokenPipeError):
-        run({"dds": DdsEnd, "rmw_zenoh": ZenohEnd}[middleware](where, asked.robots))
+        run(DdsEnd(where, asked.robots) if middleware == "dds" else ZenohEnd(where, asked.robots))
     os._exit(0)  # zenoh's threads would keep it

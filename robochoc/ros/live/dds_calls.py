@@ -54,6 +54,7 @@ class DdsCalls(ServiceCalls):
         """Leave the domain."""
         if self._subscription is not None:
             self._subscription.close()
+            self._subscription = None
         self._ends.clear()
         self._participant.close()
 

@@ -76,6 +76,7 @@ class DdsServices(Services):
         """Refuse the waiting requests, and leave the domain."""
         if self._subscription is not None:
             self._subscription.close()
+            self._subscription = None
         self._refuse_waiting()
         until = time.monotonic() + END_S
         for end in self._ends.values():
