@@ -114,7 +114,7 @@ def with_header(content: bytes, header: bytes) -> bytes:
 
 
 def split_request(content: bytes) -> tuple[bytes, bytes] | None:
-    """Return the header of a request or an answer, in little-endian order, and the message; None if the size is wrong."""
+    """Return the header of a request or answer, in little-endian order, and the message; None if the size is wrong."""
     order = _ORDERS.get(content[:2])
     begin, end = _ENCAPSULATION, _ENCAPSULATION + _HEADER
     if order is None or not end <= len(content) <= MESSAGE_BYTES_MAX:
