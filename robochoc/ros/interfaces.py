@@ -83,6 +83,11 @@ def part_definition(kind: str) -> str:
     return part.text if part else ""
 
 
+def part_kinds() -> tuple[str, ...]:
+    """Return the names of all messages that services and actions consist of."""
+    return tuple(_parts(distribution()))
+
+
 def namespace_of(kind: str) -> Namespace:
     """Return the namespace of a type, a service, an action, or one of their messages, named `package/Type`."""
     parts = _parts(distribution())

@@ -21,10 +21,11 @@ from robochoc.robots.inbox import weight_of
 from robochoc.robots.situation import Situation
 from robochoc.robots.source import REPORTS, ReceivedMessage, SourceError
 from robochoc.ros.decide_service import DECIDE, DecideService
+from robochoc.ros.interfaces import EMPTY, part_definition, part_kinds
 from robochoc.ros.live.dds_service import split_request
 from robochoc.ros.live.rmw_zenoh_keys import attachment, sender
 from robochoc.ros.live.rosbridge_connection import MalformedMessageError, incoming, outgoing
-from robochoc.ros.message_types import SERVICE_TYPES, FieldsError, Version, types_of
+from robochoc.ros.message_types import FieldsError, Version, types_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.run import Options, Runtime, solve
 from robochoc.vehicles.fleet import FleetError, read_fleet
@@ -203,7 +204,7 @@ def check_bag(content: bytes) -> bool:
 
 KINDS: tuple[str, ...] = (
     *sorted({*TOPICS.values(), *REPORTS.values()}),
-    *(kind for kind in SERVICE_TYPES if "Trigger_Request" not in kind),
+    *(kind for kind in part_kinds() if part_definition(kind) != EMPTY),
     "nav_msgs/Odometry",
     "sensor_msgs/PointCloud2",
     "diagnostic_msgs/DiagnosticArray",
