@@ -25,7 +25,7 @@ from robochoc.ros.interfaces import EMPTY, part_definition, part_kinds
 from robochoc.ros.live.dds_service import split_request
 from robochoc.ros.live.rmw_zenoh_keys import attachment, sender
 from robochoc.ros.live.rosbridge_connection import MalformedMessageError, incoming, outgoing
-from robochoc.ros.message_types import FieldsError, Version, types_of
+from robochoc.ros.message_types import FieldsError, UnknownTypeError, Version, types_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.run import Options, Runtime, solve
 from robochoc.vehicles.fleet import FleetError, read_fleet
@@ -202,9 +202,18 @@ def check_bag(content: bytes) -> bool:
 
 # Messages of ROS
 
+
+def has_fields_in_both(kind: str) -> bool:
+    """Whether ROS 1 and ROS 2 know a message, and it has fields."""
+    try:
+        return part_definition(kind) != EMPTY and bool(types_of(1).layout(kind))
+    except UnknownTypeError:
+        return False
+
+
 KINDS: tuple[str, ...] = (
     *sorted({*TOPICS.values(), *REPORTS.values()}),
-    *(kind for kind in part_kinds() if part_definition(kind) != EMPTY),
+    *filter(has_fields_in_both, part_kinds()),
     "nav_msgs/Odometry",
     "sensor_msgs/PointCloud2",
     "diagnostic_msgs/DiagnosticArray",
