@@ -12,10 +12,10 @@ from tests.support.program import ROOT
 
 PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 _SUBJECTS = {
-    "people": ("#dbe9fb", ("cli", "app", "experiments", "api", "testing", "modelling")),
+    "people": ("#dbe9fb", ("cli", "app", "experiments", "api", "testing", "environments", "modelling")),
     "around a run": (
         "#e3f3e1",
-        ("privacy", "sniffer", "exploration", "view", "replay", "ros", "vehicles", "robots", "generators"),
+        ("privacy", "sniffer", "exploration", "view", "replay", "ros", "vehicles", "robots", "rounds", "generators"),
     ),
     "a run": ("#fdeccb", ("run", "flight", "communication", "authority", "services", "journal")),
     "data": ("#efe5f7", ("formats", "maps", "tasks", "verification", "model", "system")),
