@@ -11,7 +11,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from operator import attrgetter
 
 import msgspec
 from msgspec import UNSET
@@ -56,15 +55,16 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 class ReplayedRun:
     """A replayed run of `team` with its answer; the answer is None if the journal does not contain enough data.
 
-    `any_time`: the answer may be any assignment that the robots had, because nothing is proven. `improved`: it may be
-    any assignment that was found at a snapshot, even if it was not published. `limited`: the reports that prove it may
-    have been too late.
+    `any_time`: the answer may be any assignment that the robots had, because nothing is proven. `in_order`: decisions
+    were reported one by one. `improved`: the answer may be any assignment that was found at a snapshot, even if it was
+    not published. `limited`: the reports that prove it may have been too late.
     """
 
     run: RecordedRun
     team: Team
     answer: PhaseAnswer | None = None
     any_time: bool = False
+    in_order: bool = True
     improved: bool = False
     limited: bool = False
 
@@ -72,8 +72,9 @@ class ReplayedRun:
 def with_answer(run: RecordedRun, robots: RebuiltRobots, journal: Journal) -> ReplayedRun:
     """Return a replayed run with its answer."""
     improved = journal.header.improve is not UNSET
-    limited = journal.header.limit_s is not UNSET and journal.header.runtime != "simulator"
-    replayed = ReplayedRun(run, robots.compiled.team, improved=improved, limited=limited)
+    in_order = journal.header.runtime == "simulator"
+    limited = journal.header.limit_s is not UNSET and not in_order
+    replayed = ReplayedRun(run, robots.compiled.team, in_order=in_order, improved=improved, limited=limited)
     final = journal.header.answer == "final"
     return replayed if journal.outcome is None else _answered(replayed, robots, journal.outcome, final=final)
 
@@ -217,22 +218,26 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
 
 
 def _was_decided(recorded: Answer, replayed: ReplayedRun) -> bool:
-    """Return whether the robots had the recorded assignment together at some time of the run."""
+    """Return whether the robots had the recorded assignment together at some time of the run.
+
+    Robots in processes report their decisions in bundles, and a journal does not contain the order of the bundles. So
+    any combination of their values may have been reported together (`DecidedValues`).
+    """
     values = recorded.assignment
     own = {
         robot.name: {one.name: values[one.name] for one in robot.variables if one.name in values}
         for robot in replayed.team.robots
     }
-    decisions = [event for event in replayed.run.events if isinstance(event, Decided)]
-    for events in (decisions, sorted(decisions, key=attrgetter("t"))):  # see `DecidedValues`
-        others = {*own}
-        for event in events:
-            if event.assignment == own.get(event.robot):
-                others.discard(event.robot)
-            else:
-                others.add(event.robot)
-            if not others:
-                return True
+    others = {*own}
+    for event in replayed.run.events:
+        if not isinstance(event, Decided):
+            continue
+        if event.assignment == own.get(event.robot):
+            others.discard(event.robot)
+        elif replayed.in_order:
+            others.add(event.robot)
+        if not others:
+            return True
     return False
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import replace
 from random import Random
 from typing import Any
@@ -17,10 +19,10 @@ from robochoc.journal.journal import Journal
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Variable
+from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 from robochoc.replay import replay
 from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
-from robochoc.verification.checker import assignment_cost
+from robochoc.verification.checker import assignment_cost, violations
 from tests.support.compiled import plain_python_only
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
@@ -226,6 +228,47 @@ def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> 
             forged = replace(journal, outcome=replace(outcome, cost=(outcome.cost or 0) - 1))
             assert [one.what for one in replay(forged).contradictions] == ["the outcome's cost"]
     assert earlier
+
+
+def test_decisions_of_processes_are_known_in_bundles_only() -> None:
+    """Found by `make simulate`: the answer was an assignment that the robots had, in the order of their reports."""
+    found = 0
+    for seed in range(16):
+        team = random_csp(4, 3, 0.7, 0.1, seed=seed, max_cost=9)
+        settings = {"cycles": "5"}
+        options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings=settings, seed=seed, repair=False)
+        journal = recorded(team, options)
+        outcome = journal.outcome
+        assert outcome is not None
+        cheaper = next(cheaper_combinations(team, journal), None)
+        if cheaper is None:
+            continue
+        found += 1
+        cost = assignment_cost(team, cheaper)
+        in_thread = replace(journal, outcome=replace(outcome, assignment=cheaper, cost=cost))
+        assert [one.what for one in replay(in_thread).contradictions] == [
+            "the outcome's assignment",
+            "the outcome's cost",
+        ]
+        header = msgspec.structs.replace(journal.header, runtime=Runtime.PROCESSES)
+        ours = replace(in_thread.outcome or outcome, runtime=Runtime.PROCESSES)
+        assert identical(replay(replace(journal, header=header, outcome=ours)))
+        false = replace(journal, header=header, outcome=replace(ours, cost=cost - 1))
+        assert [one.what for one in replay(false).contradictions] == ["the outcome's cost"]
+    assert found
+
+
+def cheaper_combinations(team: Team, journal: Journal) -> Iterator[dict[str, int]]:
+    """Yield valid combinations of the robots' values that cost less than the answer."""
+    decided: dict[str, list[dict[str, int]]] = {name: [] for name in team.order}
+    for event in journal.events:
+        if isinstance(event, Decided) and event.assignment not in decided[event.robot]:
+            decided[event.robot].append(event.assignment)
+    assert journal.outcome is not None
+    for parts in itertools.product(*decided.values()):
+        values = {name: value for part in parts for name, value in part.items()}
+        if not [*violations(team, values)] and (assignment_cost(team, values) or 0) < (journal.outcome.cost or 0):
+            yield values
 
 
 @plain_python_only
