@@ -1,7 +1,7 @@
 """`make simulate`: runs in virtual time, each decided by its seed.
 
-Exit status 1: a property does not hold. 2: invalid options, or a file that cannot be repeated. 130, 143: Ctrl-C or
-SIGTERM; findings so far have been saved.
+Exit status 1: a property does not hold. 2: invalid options, or a file that cannot be repeated. 130: Ctrl-C or SIGTERM;
+the findings and sums so far are reported.
 """
 
 from __future__ import annotations
@@ -31,6 +31,7 @@ class Tally:
         self.combined = Counter[str]()
         self.findings = Counter[str]()
         self.robot_s = self.cpu_s = 0.0
+        self.interrupted = 0
 
     def add(self, plan: Plan, report: Report) -> None:
         """Add a plan."""
@@ -74,15 +75,12 @@ def main() -> int:
         return _repeat(plan)
     if options.seed is None:
         options.seed = secrets.randbelow(10**9)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.default_int_handler)
     if options.inside is not None:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # the parent reports the end
         sys.stdout.write(_work(options).as_json() + "\n")
         return 0
-    try:
-        return _all(options)
-    except KeyboardInterrupt:
-        sys.stdout.write("interrupted\n")
-        return 130
+    return _all(options)
 
 
 def _all(options: argparse.Namespace) -> int:
@@ -100,7 +98,7 @@ def _all(options: argparse.Namespace) -> int:
             sys.stdout.write(f"{failed} workers failed\n")
             return 1
     _report(total, time.monotonic() - began)
-    return int(bool(total.findings))
+    return 130 if total.interrupted else int(bool(total.findings))
 
 
 def _join_workers(options: argparse.Namespace, total: Tally) -> int:
@@ -113,13 +111,9 @@ def _join_workers(options: argparse.Namespace, total: Tally) -> int:
         for number in range(options.jobs)
     ]
     failed = 0
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))  # no worker is left
     try:
         for worker in workers:
-            text, _ = worker.communicate()
-            failed += worker.returncode != 0
-            if text.strip():
-                total.join(text.strip().splitlines()[-1])
+            failed += _join_worker(worker, workers, total)
     finally:
         for worker in workers:
             worker.kill()
@@ -127,23 +121,46 @@ def _join_workers(options: argparse.Namespace, total: Tally) -> int:
     return failed
 
 
+def _join_worker(worker: subprocess.Popen[str], workers: list[subprocess.Popen[str]], total: Tally) -> bool:
+    """Join the sums of a process; after Ctrl-C or SIGTERM, all end early. Return whether it has failed."""
+    try:
+        text, _ = worker.communicate()
+    except KeyboardInterrupt:
+        for one in workers:
+            one.terminate()
+        text, _ = worker.communicate()
+        total.interrupted = 1
+    if text.strip():
+        total.join(text.strip().splitlines()[-1])
+    return worker.returncode != 0
+
+
 def _work(options: argparse.Namespace) -> Tally:
     """Examine every `jobs`-th seed, and write the first finding of each kind."""
     tally, began, cpu_s = Tally(), time.monotonic(), time.process_time()
     number = options.inside
-    while number < options.count if options.count else time.monotonic() - began < options.seconds:
-        plan = drawn_plan(options.seed + number)
-        report = examine(plan)
-        for finding in report.findings:
-            if not tally.findings[finding.kind]:
-                smaller = minimised(plan, finding.kind, lambda plan: examine(plan).findings)
-                last = [one for one in examine(smaller).findings if one.kind == finding.kind]
-                path = written(options.out, smaller, last[0] if last else finding)
-                sys.stderr.write(f"seed {plan.seed}: {finding.kind}: {finding.detail[-300:]!a}: {path}\n")
-        tally.add(plan, report)
-        number += options.jobs
+    try:
+        while number < options.count if options.count else time.monotonic() - began < options.seconds:
+            _examine_seed(options.seed + number, options.out, tally)
+            number += options.jobs
+    except KeyboardInterrupt:
+        tally.interrupted = 1
     tally.cpu_s = time.process_time() - cpu_s
     return tally
+
+
+def _examine_seed(seed: int, out: Path, tally: Tally) -> None:
+    """Examine a seed, report its findings, and minimise those that are the first of their kinds."""
+    plan = drawn_plan(seed)
+    report = examine(plan)
+    for finding in report.findings:
+        place = ""
+        if not tally.findings[finding.kind]:
+            smaller = minimised(plan, finding.kind, lambda plan: examine(plan).findings)
+            last = [one for one in examine(smaller).findings if one.kind == finding.kind]
+            place = f": {written(out, smaller, last[0] if last else finding)}"
+        sys.stderr.write(f"seed {plan.seed}: {finding.kind}: {finding.detail[-300:]!a}{place}\n")
+    tally.add(plan, report)
 
 
 def _per_hour(number: float, seconds: float) -> str:

@@ -244,7 +244,8 @@ def test_decisions_of_processes_are_known_in_bundles_only() -> None:
         if cheaper is None:
             continue
         found += 1
-        cost = assignment_cost(team, cheaper)
+        cost = user_cost(team, assignment_cost(team, cheaper))
+        assert cost is not None
         in_thread = replace(journal, outcome=replace(outcome, assignment=cheaper, cost=cost))
         assert [one.what for one in replay(in_thread).contradictions] == [
             "the outcome's assignment",
