@@ -18,7 +18,7 @@ from dataclasses import field
 from enum import StrEnum
 from fractions import Fraction
 from math import floor, isqrt
-from typing import cast
+from typing import NamedTuple, cast
 
 from robochoc.model.constraint import Constraint, Domain, Predicate, Relation, Semantics, Variable
 from robochoc.model.expression import Apply, Constant, Expression, Name, Type, parse, total
@@ -28,6 +28,10 @@ NOT_THE_SAME = Predicate("notSame", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", 
 """Two robots do not do the same task. 0 means no task."""
 NOT_BOTH = Predicate("notBoth", ("X", "Y"), parse("or(eq(X, 0), eq(Y, 0))", ("X", "Y"), Type.BOOLEAN))
 _DONE = Domain("Done", (range(2),))
+START = "start"
+"""The last part of the name of the variable with the start of a task."""
+NOT_DONE = -1
+"""The start of an ordered task that the robot does not do."""
 
 Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
 """The variables of each robot, and the constraints."""
@@ -47,6 +51,26 @@ class Distance(StrEnum):
     STRAIGHT = "straight"
 
 
+class Schedule(NamedTuple):
+    """Tasks that a robot can do together.
+
+    Attributes:
+        tasks: The numbers of the tasks, in ascending order.
+        starts: The starts of those tasks that are ordered (`Order`), with their numbers, in ascending order.
+    """
+
+    tasks: tuple[int, ...]
+    starts: tuple[tuple[int, int], ...] = ()
+
+
+class Order(NamedTuple):
+    """Two ordered tasks: `after` is done only if `before` is done, and starts at least `gap` later."""
+
+    before: int
+    after: int
+    gap: int
+
+
 @dataclass(frozen=True)
 class Worker:
     """A robot to which tasks are allocated.
@@ -59,9 +83,9 @@ class Worker:
         capacity: Its maximum load. None: unlimited.
         most: The maximum number of tasks. None: unlimited.
         together: The additional profit of pairs of tasks if the robot does both.
-        tours: The length of the tour for each set of tasks that the robot can do together, by task numbers. With tours,
-            `profit` does not include distances; tasks in no tour have no location.
-        has_deadlines: True if the robot can do only these sets of tasks, because the tasks have deadlines.
+        tours: The length of the tour for each schedule of the robot. With tours, `profit` does not include distances;
+            tasks in no tour have no location and no times.
+        has_deadlines: True if the robot can do only the sets of tasks in `tours`, because tasks have times.
     """
 
     name: str
@@ -71,7 +95,7 @@ class Worker:
     capacity: int | None = None
     most: int | None = None
     together: Mapping[tuple[int, int], int] = field(default_factory=dict)
-    tours: Mapping[tuple[int, ...], int] = field(default_factory=dict)
+    tours: Mapping[Schedule, int] = field(default_factory=dict)
     has_deadlines: bool = False
 
 
@@ -115,22 +139,35 @@ def assignment(workers: Sequence[Worker], symbols: tuple[str, ...] = ()) -> Part
     return variables, constraints()
 
 
-def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Parts:
-    """Return the model in which a robot does several tasks. Robots that can do no task are left out."""
+def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec], orders: Sequence[Order] = ()) -> Parts:
+    """Return the model in which a robot does several tasks. Robots that can do no task are left out.
+
+    Args:
+        workers: The robots.
+        jobs: The tasks, by number.
+        orders: The pairs of ordered tasks. A robot has another variable for each such task: its start, or `NOT_DONE`.
+    """
     able = [one for one in workers if one.profit]
-    variables = {one.name: [Variable(_does(one, jobs[task]), _DONE) for task in one.profit] for one in able}
+    starts = {one.name: _starts(one) for one in able}
+    variables = {
+        one.name: [Variable(_does(one, jobs[task]), _DONE) for task in one.profit]
+        + [Variable(_start(one, jobs[task]), domain) for task, domain in starts[one.name].items()]
+        for one in able
+    }
 
     def constraints() -> Iterator[Constraint]:
         for one in able:
             for task, worth in one.profit.items():
                 yield _worth(f"{one.label}.{jobs[task].name}", _does(one, jobs[task]), {1: worth})
             yield from _limits(one, jobs)
-            yield from _tours(one, jobs)
+            yield from _tours(one, jobs, [*starts[one.name]])
             for (first, second), worth in one.together.items():
                 scope = (_does(one, jobs[first]), _does(one, jobs[second]))
                 relation = Relation(f"S{'.'.join(scope)}", 2, Semantics.SOFT, ((1, 1),), (worth,))
                 yield Constraint(relation.name, relation, scope, scope)
         yield from _crews(able, jobs)
+        for order in orders:
+            yield from _order(order, able, jobs)
         for one, other in itertools.combinations(able, 2):
             for task in one.profit:
                 if task in other.profit and jobs[task].robots == 1:
@@ -157,6 +194,40 @@ def _does(one: Worker, job: TaskSpec) -> str:
     return f"{one.variable}.{job.name}"
 
 
+def _start(one: Worker, job: TaskSpec) -> str:
+    return f"{_does(one, job)}.{START}"
+
+
+def _starts(one: Worker) -> dict[int, Domain]:
+    """Return the domain of the start of each ordered task that the robot can do."""
+    found: dict[int, set[int]] = {}
+    for schedule in one.tours:
+        for task, start in schedule.starts:
+            found.setdefault(task, {NOT_DONE}).add(start)
+    return {
+        task: Domain(f"Starts{task}", tuple(range(start, start + 1) for start in sorted(found[task])))
+        for task in sorted(found)
+    }
+
+
+def _order(order: Order, able: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
+    """Yield the constraints on two ordered tasks: the first one is done if the second one is, and ends before it."""
+    first, last = jobs[order.before], jobs[order.after]
+    before = [one for one in able if order.before in one.profit]
+    after = [one for one in able if order.after in one.profit]
+    scope = (*(_does(one, first) for one in before), *(_does(one, last) for one in after))
+    names = _parameters(len(scope))
+    sums = [total(map(Name, some)) for some in (names[: len(before)], names[len(before) :])]
+    body = Apply("or", (Apply("eq", (sums[1], Constant(0))), Apply("gt", (sums[0], Constant(0)))))
+    label = f"{first.name}.{last.name}"
+    yield Constraint("needs", Predicate(f"needs{label}", names, body), scope, scope)
+    ends = parse(f"or(or(eq(X, {NOT_DONE}), eq(Y, {NOT_DONE})), ge(Y, add(X, {order.gap})))", ("X", "Y"), Type.BOOLEAN)
+    follows = Predicate(f"follows{order.gap}", ("X", "Y"), ends)
+    for one, other in itertools.product(before, after):
+        pair = (_start(one, first), _start(other, last))
+        yield Constraint("follows", follows, pair, pair)
+
+
 def _limits(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
     """Yield the constraints on a robot's load and number of tasks, as far as they restrict the robot."""
     scope = tuple(_does(one, jobs[task]) for task in one.profit)
@@ -167,17 +238,31 @@ def _limits(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
         yield Constraint("most", _at_most(f"most{one.label}", [1] * len(scope), one.most), scope, scope)
 
 
-def _tours(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
-    """Yield the costs of tours, and the constraint on the sets of tasks for which a robot has time."""
-    placed = [task for task in one.profit if (task,) in one.tours]
-    scope = tuple(_does(one, jobs[task]) for task in placed)
+def _tours(one: Worker, jobs: Mapping[int, TaskSpec], ordered: Sequence[int]) -> Iterator[Constraint]:
+    """Yield the costs of tours, and the constraint on the schedules for which a robot has time.
+
+    Args:
+        one: The robot.
+        jobs: The tasks, by number.
+        ordered: The tasks with a start.
+    """
+    single = {schedule.tasks for schedule in one.tours if len(schedule.tasks) == 1}
+    placed = [task for task in one.profit if (task,) in single]
+    scope = (*(_does(one, jobs[task]) for task in placed), *(_start(one, jobs[task]) for task in ordered))
     if not scope:
         return
-    rows = {tuple([int(task in tour) for task in placed]): -length for tour, length in one.tours.items()}
+    rows = {}
+    for schedule, length in one.tours.items():
+        starts = dict(schedule.starts)
+        row = (
+            *[int(task in schedule.tasks) for task in placed],
+            *[starts.get(task, NOT_DONE) for task in ordered],
+        )
+        rows[row] = -length
     cost = Relation(f"tour{one.label}", len(scope), Semantics.SOFT, tuple(rows), tuple(rows.values()))
     yield Constraint("tour", cost, scope, scope)
-    if one.has_deadlines:
-        able = ((0,) * len(scope), *rows)
+    if one.has_deadlines or ordered:
+        able = ((0,) * len(placed) + (NOT_DONE,) * len(ordered), *rows)
         yield Constraint("time", Relation(f"time{one.label}", len(scope), Semantics.SUPPORTS, able), scope, scope)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
 from robochoc.formats.definitions import check_topic
@@ -13,15 +13,25 @@ from robochoc.formats.dialects.dialect import ConversionNote, ImportOptions, Imp
 from robochoc.formats.dialects.exact_costs import Scale
 from robochoc.formats.symbols import check_symbol
 from robochoc.formats.team_reader import GROUND_FILE
-from robochoc.model.allocation import TasksModel, TaskSpec, Worker, assignment, several_tasks
+from robochoc.model.allocation import (
+    START,
+    Order,
+    Schedule,
+    TasksModel,
+    TaskSpec,
+    Worker,
+    assignment,
+    several_tasks,
+)
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Expression
 from robochoc.model.problem import ProblemKind, Team, Topic, Variable
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.tasks.entries import MAX_PLACES, Point, RobotEntry, Synergy, TaskEntry
+from robochoc.tasks.precedence import orders_of, precedence_of
 from robochoc.tasks.tours import TaskSet, Tour, TourSearch, round_length
-from robochoc.tasks.waypoints import in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
+from robochoc.tasks.waypoints import Cells, in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
 from robochoc.tasks.ways import MapWays, Ways
 
 MAX_CONSTRAINTS = 200_000
@@ -46,6 +56,7 @@ class TaskList:
     tasks: Mapping[str, TaskEntry]
     synergies: Sequence[Synergy]
     tours: bool
+    step: Fraction
 
     @property
     def points(self) -> list[Point]:
@@ -83,7 +94,9 @@ class TaskTeamBuilder:
         self._number = {name: number for number, name in enumerate(read.tasks, start=1)}
         self._notes: list[ConversionNote] = []
         self._sets = 0
-        self._tours_of: dict[str, dict[TaskSet, Tour]] = {}
+        self._tours_of: dict[str, dict[TaskSet, list[Tour]]] = {}
+        self._precedence = precedence_of(read.tasks, read.step)
+        self._impossible: set[str] = set()
         self._names = list(read.tasks)
         self._unit = unit_of(read.points)
         self._robot_names, self._task_names = NameMap(), NameMap()
@@ -96,14 +109,18 @@ class TaskTeamBuilder:
     def imported(self, options: ImportOptions) -> ImportResult:
         """Return the team. Raises `MistakeError`."""
         read = self._read
-        workers = [self._worker(name, robot) for name, robot in read.robots.items()]
-        self._note_impossible_tasks(workers)
+        workers = self._workers()
+        self._note_impossible(workers)
         if read.model == TasksModel.ASSIGNMENT:
             _check_symbols(read.tasks)
             variables, constraints = assignment(workers, (NONE, *read.tasks))
         else:
             jobs = {self._number[name]: self._job(name, task, workers) for name, task in read.tasks.items()}
-            variables, constraints = several_tasks(workers, jobs)
+            orders = [
+                one for one in orders_of(read.tasks, read.step) if self._names[one.after - 1] not in self._impossible
+            ]
+            self._check_orders(orders, workers)
+            variables, constraints = several_tasks(workers, jobs, orders)
         if not variables:
             raise MistakeError("no robot can do any of the tasks", "check skills, needs, loads and deadlines")
         _check_names(variables)
@@ -122,12 +139,38 @@ class TaskTeamBuilder:
         notes = (*self._notes, *notes_on_names(list(changed.items())))
         return ImportResult(team, "tasks", changed, notes, files={GROUND_FILE: ground} if ground else {})
 
+    def _workers(self) -> list[Worker]:
+        """Return the robots with the tasks that they can do.
+
+        A task that follows one that no robot can do is impossible.
+        """
+        while True:
+            self._sets = 0
+            workers = [self._worker(name, robot) for name, robot in self._read.robots.items()]
+            able = {self._names[task - 1] for one in workers for task in one.profit}
+            more = {name for name, task in self._read.tasks.items() if name in able and not able.issuperset(task.after)}
+            self._impossible |= {*self._names} - able
+            if not more:
+                return workers
+            self._impossible |= more
+
+    def _check_orders(self, orders: Sequence[Order], workers: Sequence[Worker]) -> None:
+        """Raise `MistakeError` if the constraint on two ordered tasks would have too many variables."""
+        for one in orders:
+            able = sum((one.before in worker.profit) + (one.after in worker.profit) for worker in workers)
+            if able > MAX_CREW:
+                before, after = (shortened(self._names[task - 1]) for task in (one.before, one.after))
+                line = self._read.tasks[self._names[one.after - 1]].line
+                what = f"the task '{after}' follows '{before}', and {able} robots can do one of them, counted for each"
+                raise MistakeError(what, f"restrict both by needs: to at most {MAX_CREW} robots in all", line)
+
     def _worker(self, name: str, robot: RobotEntry) -> Worker:
         profit = {
             self._number[task]: profit_of_task
             for task, entry in self._read.tasks.items()
-            if (profit_of_task := self._profit(robot, task, entry)) is not None
+            if task not in self._impossible and (profit_of_task := self._profit(robot, task, entry)) is not None
         }
+        tours, is_limited = self._tours(name, robot, profit)
         together: dict[tuple[int, int], int] = {}
         for one in self._read.synergies:
             first, second = sorted(self._number[task] for task in one.tasks)
@@ -136,26 +179,37 @@ class TaskTeamBuilder:
         own = self._robot_names.allowed(name)
         if self._read.model == TasksModel.ASSIGNMENT:
             return Worker(own, own, f"{own}.{_ONLY}", profit)
-        if not profit:
-            self._notes.append(
-                ConversionNote("left out", f"the robot {shortened(name)}, which can do none of the tasks")
-            )
-        return Worker(own, own, own, profit, robot.capacity, robot.most, together, *self._tours(name, robot, profit))
+        return Worker(own, own, own, profit, robot.capacity, robot.most, together, tours, is_limited)
 
-    def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[TaskSet, int], bool]:
-        """Return the lengths of the robot's tours, and whether times exclude other sets of tasks."""
-        if not self._read.tours or not robot.at:  # for a robot without a position, all ways have length 0
+    def _tours(self, name: str, robot: RobotEntry, able: dict[int, int]) -> tuple[dict[Schedule, int], bool]:
+        """Return the lengths of the robot's tours, and whether times exclude other sets of tasks.
+
+        Tasks that the robot cannot even do alone are removed from `able`.
+        """
+        if not self._read.tours:
             return {}, False
+        ordered = {*self._precedence.first, *self._precedence.last}
         numbered = enumerate(self._read.tasks.values(), start=1)
-        placed = {number: entry for number, entry in numbered if number in able and entry.at}
-        found = TourSearch(name, robot, placed, lambda start, end: self._way(robot, start, end, MAX_PLACES)).tours()
+        placed = {
+            number: entry
+            for number, entry in numbered
+            if number in able and ((robot.at and entry.at) or entry.is_timed or number in ordered)
+        }
+        search = TourSearch(
+            name, robot, placed, lambda start, end: self._way(robot, start, end, MAX_PLACES), self._precedence
+        )
+        found = search.tours()
+        for task in placed:
+            if (task,) not in found:
+                del able[task]
         self._tours_of[self._robot_names.allowed(name)] = found
-        self._sets += len(found)
+        self._sets += sum(map(len, found.values()))
         if self._sets > MAX_CONSTRAINTS:
             what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} tours"
             raise MistakeError(what, "use fewer robots, or a smaller number in most:")
         is_limited = any(entry.latest is not None for entry in placed.values())
-        return {tasks: round_length(tour.length, self._scale.places) for tasks, tour in found.items()}, is_limited
+        schedules = {Schedule(tasks, one.starts): one.length for tasks, some in found.items() for one in some}
+        return {one: round_length(length, self._scale.places) for one, length in schedules.items()}, is_limited
 
     def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> TaskSpec:
         able = sum(self._number[name] in one.profit for one in workers)
@@ -200,12 +254,22 @@ class TaskTeamBuilder:
             return of_choice(worker.variable, places, home)
         names = {task: self._variable(worker, task) for task in places}
         if self._read.tours:
-            tours = self._tours_of.get(worker.name, {})
-            first = {frozenset(names[task] for task in tasks): places[one.order[0]] for tasks, one in tours.items()}
+            tours = [(tasks, one) for tasks, some in self._tours_of[worker.name].items() for one in some]
+            first = {self._facts(worker, tasks, one.starts): self._first(one, home) for tasks, one in tours}
             return of_tours({frozenset(): home, **first}, len(home))
         tasks = list(self._read.tasks.values())
         nearest = sorted(places, key=lambda task: self._way(entry, entry.at, tasks[task - 1].at, MAX_PLACES) or 0)
         return of_nearest([(names[task], places[task]) for task in nearest], home)
+
+    def _facts(self, worker: Worker, tasks: TaskSet, starts: Iterable[tuple[int, int]]) -> frozenset[tuple[str, int]]:
+        """Return the values of the robot's variables that differ from those of a robot without tasks."""
+        done = [(self._variable(worker, task), 1) for task in tasks]
+        return frozenset([*done, *((f"{self._variable(worker, task)}.{START}", start) for task, start in starts)])
+
+    def _first(self, tour: Tour, home: Cells) -> Cells:
+        """Return the first place of a tour."""
+        entries = [self._read.tasks[self._names[task - 1]] for task in tour.order]
+        return next((in_units(one.at, self._unit) for one in entries if one.at), home)
 
     def _ground(self) -> bytes:
         """Return the content of `map.json`; empty if no robot has a position, or a position is too far away."""
@@ -235,13 +299,18 @@ class TaskTeamBuilder:
                 found[one.variable] = f"{name}.{_ONLY}"
             else:
                 own = {self._variable(one, task): self._names[task - 1] for task in one.profit}
+                starts = {task for schedule in one.tours for task, _ in schedule.starts}
+                own |= {f"{self._variable(one, task)}.{START}": f"{self._names[task - 1]}.{START}" for task in starts}
                 found |= {variable: f"{name}.{task}" for variable, task in own.items()}
         return {name: original for name, original in found.items() if name != original}
 
-    def _note_impossible_tasks(self, workers: Sequence[Worker]) -> None:
-        able = {task for one in workers for task in one.profit}
-        for name, number in self._number.items():
-            if number not in able:
+    def _note_impossible(self, workers: Sequence[Worker]) -> None:
+        for name, one in zip(self._read.robots, workers, strict=True):
+            if not one.profit and self._read.model == TasksModel.SEVERAL:
+                what = f"the robot {shortened(name)}, which can do none of the tasks"
+                self._notes.append(ConversionNote("left out", what))
+        for name in self._names:
+            if name in self._impossible:
                 self._notes.append(ConversionNote("left out", f"the task {shortened(name)}, which no robot can do"))
 
     def _profit(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:

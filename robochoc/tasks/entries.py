@@ -60,6 +60,7 @@ class TaskEntry:
         window: The earliest and the latest beginning; a robot that arrives earlier waits. None: no latest beginning.
         duration: The time for which the task occupies each of its robots.
         robots: The number of robots required.
+        after: The tasks that end before this one begins, of which each must be done.
     """
 
     line: int
@@ -71,6 +72,13 @@ class TaskEntry:
     window: tuple[Fraction, Fraction | None]
     duration: Fraction
     robots: int
+    after: tuple[str, ...]
+
+    @property
+    def is_timed(self) -> bool:
+        """True if the task occupies a robot, or can only begin at certain times."""
+        earliest, latest = self.window
+        return bool(self.duration or earliest or latest is not None or self.after)
 
     @property
     def latest(self) -> Fraction | None:
@@ -226,7 +234,8 @@ def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry
             load, robots = entry.integer("load", 1) or 0, entry.integer("robots", 1, 1) or 1
             deadline, duration = entry.number("deadline", None), entry.number("duration", None) or Fraction(0)
             at, window = entry.point("at"), entry.window("window")
-            found[name] = TaskEntry(one.line, at, needs, worth, load, deadline, window, duration, robots)
+            after = entry.words("after")
+            found[name] = TaskEntry(one.line, at, needs, worth, load, deadline, window, duration, robots, after)
     return found
 
 

@@ -24,6 +24,7 @@ from robochoc.tasks.entries import (
     read_synergies,
     read_tasks,
 )
+from robochoc.tasks.precedence import check_order
 from robochoc.tasks.ways import MapWays, PlainWays, Ways, map_at
 
 RADIUS_M = Fraction(1, 5)
@@ -99,7 +100,10 @@ def _list(head: EntryReader, path: Path, mistakes: DiagnosticCollector) -> TaskL
     name = " ".join(head.words("name")) or path.stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
     ways = _ways(head, path.parent, robots, tasks, mistakes)
-    return TaskList(name, model, ways, places, robots, tasks, synergies, tours)
+    step = head.number("step", Fraction(1)) or Fraction(0)
+    if not step:
+        raise MistakeError("has the step 0", "write a number above 0", head.required_node("step").line)
+    return TaskList(name, model, ways, places, robots, tasks, synergies, tours, step)
 
 
 def _ways(
@@ -131,9 +135,22 @@ def _ways(
 
 
 def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:
-    """Return `assignment` if each robot does at most one task, and each task requires one robot; else `several`."""
-    alone = all(one.most == 1 for one in robots.values()) and all(one.robots == 1 for one in tasks.values())
+    """Return `assignment` if each robot does at most one task, which requires one robot and no other task."""
+    alone = all(one.robots == 1 and not one.after for one in tasks.values())
+    alone = alone and all(one.most == 1 for one in robots.values())
     return TasksModel.ASSIGNMENT if alone else TasksModel.SEVERAL
+
+
+def _check_times(name: str, task: TaskEntry, read: TaskList) -> None:
+    """Raise `MistakeError` for times that the model cannot express."""
+    if task.after and read.model == TasksModel.ASSIGNMENT:
+        what = f"the task '{shortened(name)}' has after:, which the model assignment does not support"
+        raise MistakeError(what, "write model: several and tours: yes", task.line)
+    if read.model == TasksModel.SEVERAL and not read.tours:
+        for key, is_given in (("after", task.after), ("duration", task.duration), ("window", task.window[0])):
+            if is_given:
+                what = f"the task '{shortened(name)}' has {key}:, but robots that do several tasks have no tours"
+                raise MistakeError(what, "write tours: yes", task.line)
 
 
 def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: DiagnosticCollector) -> None:
@@ -154,4 +171,9 @@ def _check_model(read: TaskList, mistakes: DiagnosticCollector) -> None:
             if task.robots > 1:
                 what = f"the task '{shortened(name)}' requires {task.robots} robots; the model assignment allows one"
                 mistakes.add(task.line, what, "write model: several")
+    for name, task in read.tasks.items():
+        with mistakes.at(task.line):
+            _check_times(name, task, read)
+    mistakes.finish()
+    check_order(read.tasks, mistakes)
     mistakes.finish()

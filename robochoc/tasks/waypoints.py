@@ -20,7 +20,7 @@ LEAVES_MAX = 1_000
 
 Cells = tuple[int, ...]
 """A place, in units."""
-_Cases = Mapping[frozenset[str], Cells]
+_Cases = Mapping[frozenset[tuple[str, int]], Cells]
 
 
 def unit_of(points: Iterable[Point]) -> Fraction:
@@ -89,8 +89,8 @@ def of_tours(first: _Cases, dimensions: int) -> tuple[Expression, ...] | None:
     """Return the formulas of the first place of a tour; None if they would be too long.
 
     Args:
-        first: The first place of each possible tour, by the variables that are 1 if its tasks are done. The set without
-            tasks has the place of the robot.
+        first: The first place of each possible tour, by the variables and values that say that its tasks are done, and
+            when they start. The empty set has the place of the robot.
         dimensions: The number of coordinates.
     """
     leaves = 0
@@ -102,12 +102,15 @@ def of_tours(first: _Cases, dimensions: int) -> tuple[Expression, ...] | None:
             leaves += 1
             return Constant(found.pop())
         # The task that most often decides, so that the formula stays short.
-        places = Counter((name, place[axis]) for names, place in cases.items() for name in names)
-        number = {name: sum(name in names for names in cases) for name, _ in places}
-        name, _ = max((one for one in places if number[one[0]] < len(cases)), key=lambda one: (places[one], one))
-        done = {names: place for names, place in cases.items() if name in names}
-        left = {names: place for names, place in cases.items() if name not in names}
-        return Apply("if", (Apply("eq", (Name(name), Constant(1))), tree(done, axis), tree(left, axis)))
+        places = Counter((fact, place[axis]) for facts, place in cases.items() for fact in facts)
+        number = Counter(fact for facts in cases for fact in facts)
+        fact, _ = max(
+            (one for one in places if number[one[0]] < len(cases)), key=lambda one: (places[one], -len(one[0][0]), one)
+        )
+        done = {facts: place for facts, place in cases.items() if fact in facts}
+        left = {facts: place for facts, place in cases.items() if fact not in facts}
+        name, value = fact
+        return Apply("if", (Apply("eq", (Name(name), Constant(value))), tree(done, axis), tree(left, axis)))
 
     found = tuple(tree(first, axis) for axis in range(dimensions))
     return found if leaves <= LEAVES_MAX else None

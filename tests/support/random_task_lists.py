@@ -115,7 +115,7 @@ class Meaning:
             times = list(itertools.accumulate(self.length(*leg, 9) for leg in itertools.pairwise(stops)))
             if all(time <= self.time(robot, task) for time, task in zip(times, order, strict=True)):
                 found.append(times[-1] if times else Fraction())
-        return rounded(Decimal(min(found).numerator) / Decimal(min(found).denominator), self.places) if found else None
+        return rounded_fraction(min(found), self.places) if found else None
 
     def length(self, start: Sequence[object] | None, end: Sequence[object] | None, places: int) -> Fraction:
         if not start or not end:
@@ -129,6 +129,10 @@ class Meaning:
 
 def rounded(number: Decimal, places: int) -> Fraction:
     return Fraction(number.quantize(Decimal(1).scaleb(-places), ROUND_HALF_UP))
+
+
+def rounded_fraction(number: Fraction, places: int) -> Fraction:
+    return rounded(Decimal(number.numerator) / Decimal(number.denominator), places)
 
 
 def random_list(chance: Random) -> dict[str, Any]:

@@ -29,7 +29,7 @@ _LARGE = 1 << 16
 _MOST_DROPPED = 3
 """The maximum number of dropped constraints listed in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
-_ONLY, _NONE = "task", "none"
+_ONLY, _NONE, _START = "task", "none", ".start"
 """A robot with at most one task has one variable, whose first value means no task (`tasks/builder.py`)."""
 
 
@@ -348,8 +348,15 @@ def task_table(team: Team, values: Mapping[str, int | str]) -> list[str]:
         robot: [task for task, (variable, value) in tasks.items() if values.get(variable) == value]
         for robot, tasks in could.items()
     }
+    starts = {
+        (robot, task): f" (starts at {values[own + _START]})"
+        for robot, tasks in could.items()
+        for task, (own, _) in tasks.items()
+        if own + _START in values
+    }
     rows = [
-        (robot, ", ".join(tasks) or "-") for robot, tasks in sorted(done.items(), key=lambda row: natural_key(row[0]))
+        (robot, ", ".join(task + starts.get((robot, task), "") for task in tasks) or "-")
+        for robot, tasks in sorted(done.items(), key=lambda row: natural_key(row[0]))
     ]
     assigned = {task for tasks in done.values() for task in tasks}
     left = sorted({task for tasks in could.values() for task in tasks} - assigned, key=natural_key)
@@ -367,9 +374,11 @@ def _tasks_of(robot: Robot) -> dict[str, tuple[str, int | str]]:
         labels = [only.domain.label(value) for value in only.domain]
         if labels[:1] == [_NONE]:
             return {str(label): (only.name, label) for label in labels[1:]} or {_NONE: (only.name, 0)}
-    binary = (not one.domain.symbols and set(one.domain) == {0, 1} for one in robot.variables)
+    names = {one.name for one in robot.variables}
+    does = [one for one in robot.variables if one.name.removesuffix(_START) not in names - {one.name}]
+    binary = (not one.domain.symbols and set(one.domain) == {0, 1} for one in does)
     if all(one.name.startswith(first) for one in robot.variables) and all(binary):
-        return {one.name.removeprefix(first): (one.name, 1) for one in robot.variables}
+        return {one.name.removeprefix(first): (one.name, 1) for one in does}
     return {}
 
 

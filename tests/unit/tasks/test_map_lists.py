@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from decimal import Decimal
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -18,7 +17,7 @@ from robochoc.maps.ground_map import read_ground_map
 from robochoc.run import Options, Runtime, solve
 from tests.support.foreign_problems import optimum
 from tests.support.program import ROOT
-from tests.support.random_task_lists import Meaning, random_list, read_or_refused, rounded, written
+from tests.support.random_task_lists import Meaning, random_list, read_or_refused, rounded_fraction, written
 from tests.support.small_maps import SmallMap
 from tests.support.task_lists import imported, mistakes
 
@@ -49,7 +48,7 @@ class MapMeaning(Meaning):
         found = self.small.length(first, last)
         if found is None:
             return _UNREACHED
-        return rounded(Decimal(found.numerator) / Decimal(found.denominator), places)
+        return rounded_fraction(found, places)
 
 
 @pytest.mark.usefixtures("shared_solvers")
