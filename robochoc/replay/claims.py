@@ -177,7 +177,8 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
         return
     began = last.run.began
     earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
-    decided = recorded.assignment and (last.improved or (last.any_time and _was_decided(recorded, last)))
+    has_answer = bool(recorded.assignment or recorded.withdrawn)
+    decided = has_answer and (last.improved or (last.any_time and _was_decided(recorded, last)))
     if recorded.verdict != Verdict.NO_SOLUTION and (earlier or decided):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
@@ -228,7 +229,7 @@ def _was_decided(recorded: Answer, replayed: ReplayedRun) -> bool:
         robot.name: {one.name: values[one.name] for one in robot.variables if one.name in values}
         for robot in replayed.team.robots
     }
-    others = {*own}
+    others = {name for name, given in own.items() if given}  # at first, no robot has values
     for event in replayed.run.events:
         if not isinstance(event, Decided):
             continue

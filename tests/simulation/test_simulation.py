@@ -6,6 +6,7 @@ import itertools
 import json
 import sys
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.message import Message
 from robochoc.protocols.satisfaction.abt import ABT
-from robochoc.run import Options, Runtime
+from robochoc.run import Options, Runtime, Withdrawal
 from tests.simulation.__main__ import main
 from tests.simulation.clock import HangError, VirtualClock
 from tests.simulation.drawing import drawn_plan
@@ -53,6 +54,18 @@ def test_a_stopped_robot_delays_an_answer_by_a_few_seconds_only() -> None:
         assert report.verdict in {"optimal", "solution", "unknown"}
         latest.append(report.robot_s / 3)
     assert 14 < max(latest) < 16
+
+
+def test_answers_of_processes_at_a_deadline_replay_if_robots_have_no_values_yet() -> None:
+    """Found by `make simulate`: robots that had decided on nothing counted as withdrawn, and `replay` disagreed."""
+    options = Options(protocol="asym-pt-fb", runtime=Runtime.PROCESSES, cache=False, withdraw=Withdrawal.MINIMUM)
+    verdicts = Counter[str]()
+    for seed in range(40):
+        team = random_csp(4, 3, 0.7, 0.3, seed=seed, max_cost=9)
+        report = examine(Plan(seed, team, replace(options, deadline=1 + seed / 40), tick_s=1e-6, delay_s=0.1))
+        assert not report.findings, seed
+        verdicts[report.verdict] += 1
+    assert verdicts["solution"] > 20
 
 
 @pytest.fixture
