@@ -8,24 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
-from fractions import Fraction
 from pathlib import Path
 
 import msgspec
 
 from robochoc.flight.layout import Point
-from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
-from robochoc.formats.yaml_tree import Node, read_yaml, scalar_text
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.settings_file import check_mapping, decimal, number_at, read_settings
+from robochoc.formats.yaml_tree import Node, scalar_text
 from robochoc.system.errors import RobochocError
 from robochoc.vehicles.frames import FAR_M, LATITUDE_MAX, GpsPlace
 from robochoc.vehicles.kinds import VehicleKind, address_of, shared_port
 
-BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
 _PORTS = range(1, 65_536)
 _EXPECTED = "see the page Autopilots of the documentation for the entries of a fleet file"
 _CORNERS, _AXES = 2, 3
-_LARGE = 10**9
 
 
 class FleetError(RobochocError):
@@ -107,30 +105,12 @@ def read_fleet(path: Path, kind: VehicleKind = VehicleKind.MAVLINK) -> Fleet:
     hint = f"name a fleet file, as in {kind}:fleet.yaml"
     if path == Path():  # --ros mavlink, without a place
         raise FleetError(f"{kind}: the fleet file is missing; {hint}")
-    try:
-        if path.is_fifo():  # opening a pipe would wait for a writer
-            content = None
-        else:
-            with path.open("rb") as file:
-                content = file.read(BYTES_MAX + 1)
-    except OSError as error:
-        raise FleetError(on_one_line(f"{path}: {error.strerror}; {hint}")) from None
-    if content is None:
-        raise FleetError(on_one_line(f"{path}: is not a file; {hint}"))
-    if len(content) > BYTES_MAX:
-        raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
-    try:
-        return read_yaml(content.decode(), lambda root: _fleet(root, kind), _EXPECTED)
-    except UnicodeDecodeError:
-        raise FleetError(on_one_line(f"{path}: is not UTF-8 text")) from None
-    except MistakeError as mistake:
-        where = f"{path}:{mistake.line}" if mistake.line else f"{path}"
-        raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
+    return read_settings(path, lambda root: _fleet(root, kind), "a fleet file", _EXPECTED, hint, FleetError)
 
 
 def _fleet(root: Node, kind: VehicleKind) -> Fleet:
     rules = kind.rules
-    _check_mapping(root, "a fleet file")
+    check_mapping(root, "a fleet file")
     vehicles, box = (root.needed(key, f"a fleet file of {kind}", _EXPECTED) for key in ("vehicles", "fence"))
     end, place = root.get("end"), root.get("origin") if "origin" in rules.entries else None
     origin = _origin(place) if place else None
@@ -138,15 +118,15 @@ def _fleet(root: Node, kind: VehicleKind) -> Fleet:
         _vehicles(vehicles, kind, origin),
         _fence(box),
         origin,
-        takeoff_m=_number(root, "takeoff", rules.takeoff_m, rules.least_takeoff_m, 100),
-        near_m=_number(root, "near", rules.near_m, 0.05, 10),
+        takeoff_m=number_at(root, "takeoff", rules.takeoff_m, rules.least_takeoff_m, 100),
+        near_m=number_at(root, "near", rules.near_m, 0.05, 10),
         end=_end(end) if end else AtEnd.LAND,
-        patience_s=_number(root, "patience", 10, 1, 600),
-        time_s=_number(root, "time", 120, 1, 3_600),
+        patience_s=number_at(root, "patience", 10, 1, 600),
+        time_s=number_at(root, "time", 120, 1, 3_600),
         kind=kind,
-        speed_ms=_number(root, "speed", 1.0, 0.1, 5) if "speed" in rules.entries else 1.0,
-        distance_m=_number(root, "distance", rules.distance_m, 0.1, 100),
-        downwash=_number(root, "downwash", 1, 1, 10),
+        speed_ms=number_at(root, "speed", 1.0, 0.1, 5) if "speed" in rules.entries else 1.0,
+        distance_m=number_at(root, "distance", rules.distance_m, 0.1, 100),
+        downwash=number_at(root, "downwash", 1, 1, 10),
     )
     low, high = fleet.fence.low[2], fleet.fence.high[2]
     if fleet.takeoff_m > high - low:
@@ -162,7 +142,7 @@ def _fleet(root: Node, kind: VehicleKind) -> Fleet:
 def _vehicles(node: Node, kind: VehicleKind, origin: GpsPlace | None) -> dict[str, VehicleLink]:
     found: dict[str, VehicleLink] = {}
     names: dict[str, str] = {}
-    _check_mapping(node, "'vehicles'")
+    check_mapping(node, "'vehicles'")
     for key, entry in node.named():
         name = scalar_text(key)
         link = _link(entry, name, kind, origin)
@@ -215,7 +195,7 @@ def _fence(node: Node) -> Fence:
 
 
 def _origin(node: Node) -> GpsPlace:
-    values = [_decimal(one) for one in node.items or ()]
+    values = [decimal(one) for one in node.items or ()]
     latitude, longitude, altitude = values if len(values) == _AXES else (None, None, None)
     if latitude is None or longitude is None or altitude is None:
         raise MistakeError(
@@ -235,34 +215,11 @@ def _end(node: Node) -> AtEnd:
 
 
 def _point(node: Node, what: str) -> Point:
-    values = [_decimal(one) for one in node.items or ()]
+    values = [decimal(one) for one in node.items or ()]
     x, y, z = values if len(values) == _AXES else (None, None, None)
     if x is None or y is None or z is None or max(abs(x), abs(y), abs(z)) > FAR_M:
         raise MistakeError(f"{what} is not a place", f"expected [x, y, z] in metres, within {FAR_M:,g}", node.line)
     return x, y, z
-
-
-def _number(root: Node, name: str, usual: float, least: float, most: float) -> float:
-    node = root.get(name)
-    if node is None:
-        return usual
-    found = _decimal(node)
-    if found is None or not least <= found <= most:
-        given = shortened(scalar_text(node.scalar))
-        raise MistakeError(f"'{name}' is {given!r}", f"expected {least:g} to {most:,g}", node.line)
-    return found
-
-
-def _decimal(node: Node) -> float | None:
-    value = node.scalar
-    if isinstance(value, bool) or not isinstance(value, int | Fraction):
-        return None
-    return float(value) if -_LARGE <= value <= _LARGE else None
-
-
-def _check_mapping(node: Node, what: str) -> None:
-    if not node.is_mapping:
-        raise MistakeError(f"{what} is not a mapping", "expected lines of NAME: VALUE", node.line)
 
 
 def point_text(place: Point) -> str:

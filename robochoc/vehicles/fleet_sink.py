@@ -16,8 +16,9 @@ from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.maps.routes.distances import SLACK_M
 from robochoc.robots.sink import Fields, Sink, SinkError, Waypoint
+from robochoc.system.files import resolved
 from robochoc.vehicles.fleet import AtEnd, FleetError, point_text, read_fleet
-from robochoc.vehicles.guard_client import START_S, GuardError, shared
+from robochoc.vehicles.guard_client import START_S, GuardClient, GuardError, shared
 from robochoc.vehicles.kinds import VehicleKind
 from robochoc.vehicles.messages import FlightPhase, VehicleState, VehicleTarget
 from robochoc.vehicles.route_planner import spacing
@@ -35,7 +36,7 @@ class FleetSink(Sink):
         self._path = Path(place)
         with _as_sink_errors():
             self._fleet = read_fleet(self._path, self.kind)
-            self._guard = shared.enter(self._path, self._fleet)
+            self._guard = shared.enter(resolved(self._path), lambda: GuardClient(self._fleet))
         self._names: dict[int, str] = {}
         self._may_arm = self._is_closed = False
         self._flown: set[str] = set()
@@ -125,7 +126,7 @@ class FleetSink(Sink):
     def _leave(self) -> None:
         if not self._is_closed:
             self._is_closed = True
-            shared.leave(self._path)
+            shared.leave(resolved(self._path))
 
     # Waiting
 

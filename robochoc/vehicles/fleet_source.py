@@ -14,8 +14,9 @@ from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.inbox import MessageInbox
 from robochoc.robots.sink import Fields
 from robochoc.robots.source import REPORTS, ReceivedMessage, Source, SourceError
+from robochoc.system.files import resolved
 from robochoc.vehicles.fleet import FleetError, read_fleet
-from robochoc.vehicles.guard_client import GuardError, shared
+from robochoc.vehicles.guard_client import GuardClient, GuardError, shared
 from robochoc.vehicles.kinds import VehicleKind
 from robochoc.vehicles.messages import FlightPhase, VehicleState
 
@@ -35,7 +36,7 @@ class FleetSource(Source):
         self._path = Path(place)
         try:
             self._fleet = read_fleet(self._path, self.kind)
-            self._guard = shared.enter(self._path, self._fleet)
+            self._guard = shared.enter(resolved(self._path), lambda: GuardClient(self._fleet))
         except (FleetError, GuardError) as error:
             raise SourceError(str(error)) from error
         self._namespaces: Mapping[str, str] = {}
@@ -84,7 +85,7 @@ class FleetSource(Source):
             self._is_closed = True
             if self._report_state in self._guard.observers:
                 self._guard.observers.remove(self._report_state)
-            shared.leave(self._path)
+            shared.leave(resolved(self._path))
 
     def _report_state(self, state: VehicleState) -> None:
         """Report a state; called in the thread that reads from the guard."""

@@ -18,7 +18,7 @@ from pathlib import Path
 import msgspec
 
 from robochoc.system.errors import RobochocError
-from robochoc.system.files import resolved
+from robochoc.system.shared import Shared
 from robochoc.system.signals import signals_delayed
 from robochoc.vehicles.fleet import AtEnd, Fleet
 from robochoc.vehicles.kinds import VehicleKind
@@ -252,28 +252,5 @@ def _environment(kind: VehicleKind) -> dict[str, str]:
     return {**os.environ, **nowhere}
 
 
-class _Shared:
-    """Shares the guards of this process by fleet file, and counts the users of each guard."""
-
-    def __init__(self) -> None:
-        self._open: dict[Path, tuple[GuardClient, int]] = {}
-
-    def enter(self, path: Path, fleet: Fleet) -> GuardClient:
-        """Return the guard for a fleet file; start the guard for the first user."""
-        key = resolved(path)
-        guard, users = self._open.get(key, (None, 0))
-        guard = guard or GuardClient(fleet)
-        self._open[key] = guard, users + 1
-        return guard
-
-    def leave(self, path: Path) -> None:
-        """Release the guard for a fleet file, and end it after its last user."""
-        key = resolved(path)
-        guard, users = self._open.pop(key)
-        if users > 1:
-            self._open[key] = guard, users - 1
-        else:
-            guard.close()
-
-
-shared = _Shared()
+shared: Shared[GuardClient] = Shared(GuardClient.close)
+"""The guards of this process, by resolved path of the fleet file."""

@@ -57,6 +57,8 @@ class Server:
     handlers: list[Handler] = field(default_factory=list)
     offered: dict[str, tuple[str, Handler]] = field(default_factory=dict)
     """The services that clients offer: the types, and who offers."""
+    goals: list[Message] = field(default_factory=list)
+    """The operations on goals of actions, which tests answer by `raw`."""
     calls: dict[str, tuple[str, Handler]] = field(default_factory=dict)
     """The calls of these that are not answered yet: how the caller has numbered them, and who calls."""
 
@@ -188,6 +190,8 @@ class Handler(WebSocketHandler):
             case "service_response":
                 number, caller = server.calls.pop(message["id"])
                 caller.send(json.dumps({**message, "id": number}))
+            case "send_action_goal" | "cancel_action_goal":
+                server.goals.append(message)
             case "call_service" if manner.answers_services:
                 answer = {"op": "service_response", "id": message["id"], "service": message["service"]}
                 self.send(json.dumps({**answer, "values": "there is no such service", "result": False}))

@@ -112,8 +112,8 @@ ros_options = _all_of(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish waypoints, repeatable: echo, mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, mavlink:FILE,"
-            " crazyflie:FILE, rosbridge://HOST:PORT, ..."
+            "Publish waypoints, repeatable: echo, mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, nav2,"
+            " mavlink:FILE, crazyflie:FILE, rosbridge://HOST:PORT, ..."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import queue
 import time
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.robots.inbox import MessageInbox
@@ -51,7 +52,8 @@ class RosbridgeActions(Actions):
     def close(self) -> None:
         """Send all messages, and end the connection."""
         try:
-            self._connection.drain()
+            with suppress(SinkError):  # a lost server needs no message
+                self._connection.drain()
         finally:
             self._connection.close()
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.vehicles.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, VehicleLink, read_fleet
+from robochoc.formats.settings_file import BYTES_MAX
+from robochoc.vehicles.fleet import AtEnd, Fence, Fleet, FleetError, VehicleLink, read_fleet
 from robochoc.vehicles.frames import GpsPlace
 from robochoc.vehicles.kinds import VehicleKind
 from tests.support.cases import looped
