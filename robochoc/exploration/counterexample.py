@@ -28,6 +28,7 @@ from robochoc.run.options import Options
 from robochoc.run.recording import journal_header
 from robochoc.run.scenario import NOT_SEARCHED
 from robochoc.run.this_machine import StartEvents
+from robochoc.system.termination import Terminated
 
 
 class Scripted(Schedule):
@@ -161,8 +162,12 @@ def write_counterexample(file: Path, case: Case, path: Sequence[Delivery], optio
     with recorded(file, journal_header(compiled.team, options)) as recorder:
         events = StartEvents(recorder)
         simulation = ScriptedSimulation(case, path, recorder)
-        with suppress(Exception, SystemExit):  # it may be the fault
-            epochs = run.epochs(simulation, partial(events.report, phase.protocol, session=simulation))
-            deque(itertools.islice(epochs, len(changes) + 1), 0)
+        with suppress(Exception):  # it may be the fault
+            try:
+                epochs = run.epochs(simulation, partial(events.report, phase.protocol, session=simulation))
+                deque(itertools.islice(epochs, len(changes) + 1), 0)
+            except SystemExit as end:  # as above
+                if isinstance(end, Terminated):
+                    raise
     for failure in recorder.failures:
         raise failure

@@ -17,6 +17,7 @@ from robochoc.exploration.state_key import state_key
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.message import Envelope
+from robochoc.system.termination import Terminated
 from robochoc.system.time_limit import TimeLimitError, computed_by
 
 LONGEST_STEP_S = 10.0
@@ -160,6 +161,8 @@ class LocalSteps:
             return before._replace(refusal=f"{self.name} {TOO_LONG} {LONGEST_STEP_S:g} seconds")
         except BadMessageError as refused:
             return before._replace(refusal=str(refused))
+        except Terminated:
+            raise
         except (Exception, SystemExit) as error:  # noqa: BLE001 - any error of a protocol is a fault that is reported
             return before._replace(refusal=f"{self.name} has failed: {type(error).__name__}: {error}")
 

@@ -13,6 +13,7 @@ from robochoc.exploration.local_steps import LocalSteps, Step
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.system.errors import RobochocError
+from robochoc.system.termination import Terminated
 
 
 class NotCreatedError(RobochocError):
@@ -113,7 +114,7 @@ def _host(name: str, protocol: type[Protocol], part: AgentProblem) -> Host:
     """Return a host that is not started. Raises `NotCreatedError`, or `UnsupportedError` as the protocol does."""
     try:
         return Host.create(protocol, part)
-    except RobochocError:
+    except (RobochocError, Terminated):
         raise
     except (Exception, SystemExit) as error:
         raise NotCreatedError(f"{name} cannot be created: {type(error).__name__}: {error}") from error

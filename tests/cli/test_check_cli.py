@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import json
 import signal
 from pathlib import Path
@@ -18,6 +19,7 @@ from robochoc.protocols.satisfaction.nogood_messages import Nogood
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from robochoc.system.stopping import STOP
+from robochoc.system.termination import Terminated
 from tests.support.compiled import plain_python_only
 from tests.support.faults import PROGRAM, running
 from tests.support.limits import wait_until
@@ -56,6 +58,39 @@ def test_a_signal_leaves_no_process(tmp_path: Path, signum: signal.Signals, stat
         run.end()
         assert run.status() == status, run.errors()
         assert run.left_behind() == []
+
+
+@pytest.mark.parametrize(("signal_of", "status"), [(KeyboardInterrupt(), 130), (Terminated(143), 143)])
+def test_an_interrupted_check_reports_the_teams_explored_so_far(
+    signal_of: BaseException, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    whole = robochoc_within("check", "abt", *SOME, "--jobs", 1)
+    receive, created = vars(ABT)["receive"], list[ABT]()
+
+    def interrupted(self: ABT, sender: str, message: Message) -> None:
+        if len(self.order.names) == 2 and self.problem.agent == "Robot2":
+            created.append(self)
+            raise signal_of
+        receive(self, sender, message)
+
+    monkeypatch.setattr(ABT, "receive", interrupted)
+    done = robochoc_within("check", "abt", *SOME, "--jobs", 1)
+    assert created
+    assert done.returncode == status
+    rows = done.stdout.splitlines()
+    assert [row.split() for row in rows] == [row.split() for row in whole.stdout.splitlines()[: len(rows)]]
+    assert f"{len(rows) - 1} of 4 teams explored\n" in done.stderr
+    assert 1 < len(rows) < 5
+    as_json = robochoc_within("check", "abt", *SOME, "--jobs", 1, "--json")
+    assert (as_json.returncode, as_json.stdout.count("\n")) == (status, len(rows) - 1)
+
+
+def test_a_fault_is_reported_if_its_reduction_is_interrupted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.exploration.judgement.TeamJudge.at_the_end", lambda *_: "it is a Sunday")
+    monkeypatch.setattr("robochoc.exploration.shrinking._checked", lambda *_: _thread.interrupt_main())
+    done = robochoc_within("check", "abt", *SOME, "--jobs", 1)
+    assert done.returncode == 130
+    assert "small-3-2-0-0: after 6 steps: it is a Sunday\n1. Robot" in done.stderr
 
 
 def test_progress_is_shown_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -90,3 +91,19 @@ def test_a_protocol_is_known_in_any_case(four: Path) -> None:
 def test_the_minimum_withdrawal_has_its_former_name_too(four: Path) -> None:
     for option in ("--withdraw=minimum", "--withdraw=fewest", "--withdraw"):
         assert robochoc_within("solve", four, "--runtime", "simulator", option).returncode == 0
+
+
+def test_every_number_option_rejects_other_words_in_the_same_way(every: dict[str, click.Command]) -> None:
+    numbers = [
+        (f"robochoc {name}", option)
+        for name, command in every.items()
+        for option in options_of(command)
+        if isinstance(option.type, click.types.IntParamType | click.types.FloatParamType)
+    ]
+    assert len(numbers) > 100
+    for name, option in numbers:
+        for word in ("nan", "five", ""):
+            with pytest.raises(click.BadParameter) as refused:
+                option.type.convert(word, option, None)
+            kinds = r"(a|a finite|a whole) number( of at least .+| greater than .+| from .+ to .+)?"
+            assert re.fullmatch(f"'{word}' is not {kinds}", refused.value.message), (name, option.name)

@@ -105,7 +105,7 @@ def _options(team: Team, protocol: str, traits: Traits, runtime: Runtime, chance
     chance.shuffle(wanted)
     for change in wanted:
         changed = replace(options, **change)
-        if not _is_refused(team, changed):
+        if not is_refused(team, changed):
             options = changed
     return options
 
@@ -146,7 +146,8 @@ def _wanted(team: Team, runtime: Runtime, chance: Random) -> Iterator[tuple[floa
         yield 0.3, {"kill": tuple(kills)}
 
 
-def _is_refused(team: Team, options: Options) -> bool:
+def is_refused(team: Team, options: Options) -> bool:
+    """Return whether the options cannot be combined with each other or with the team."""
     try:
         refuse_options(options)
         if options.protocol != AUTO:

@@ -6,6 +6,7 @@ from random import Random
 from statistics import median
 
 from graphs import soluble
+from printing import show
 
 from robochoc.model.outcome import Verdict
 from robochoc.run import solve
@@ -26,6 +27,6 @@ def row(protocol: str) -> str:
 
 
 if __name__ == "__main__":
-    print("protocol   solved     messages    NCCCs")
+    show("protocol   solved     messages    NCCCs")
     for name in ("breakout", "abt", "afc"):
-        print(row(name))
+        show(row(name))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from printing import show
 from robochoc_breakout import Breakout
 
 from robochoc.testing import check_protocol
@@ -20,7 +21,7 @@ def main() -> None:
     try:
         check_protocol(Forgetful, states=3000)
     except AssertionError as fault:
-        print(fault)
+        show(fault)
 
 
 if __name__ == "__main__":

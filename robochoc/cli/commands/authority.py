@@ -12,6 +12,7 @@ import click
 
 from robochoc.cli.options.network import authority_option
 from robochoc.cli.options.paths import TeamFolder
+from robochoc.cli.options.value_types import Number
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -19,12 +20,6 @@ if TYPE_CHECKING:
     from robochoc.authority.registry import EnrolledName
 
 _LONGEST_TTL_HOURS = 24 * 366
-
-
-def _checked_hours(_context: click.Context, _parameter: click.Parameter, hours: float) -> float:
-    if not 0 < hours <= _LONGEST_TTL_HOURS:  # also rejects NaN, which click's ranges accept
-        raise click.BadParameter(f"{hours:g} must be greater than 0 and at most {_LONGEST_TTL_HOURS} (a year).")
-    return hours
 
 
 @click.group()
@@ -76,9 +71,8 @@ def init(folder: Path | None) -> None:
 @click.option(
     "--token-ttl",
     "hours",
-    type=float,
+    type=Number(0, _LONGEST_TTL_HOURS, min_open=True),
     default=24,
-    callback=_checked_hours,
     show_default=True,
     metavar="HOURS",
     help="Lifetime of the tokens.",

@@ -7,6 +7,7 @@ import json
 import sys
 import time
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,9 +18,10 @@ from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.solve import protocol_settings, settings_option
 from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
+from robochoc.system.termination import Terminated
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator
+    from collections.abc import Callable, Iterable, Iterator
 
     from robochoc.exploration.check import CheckedTeam, CheckOptions
     from robochoc.model.problem import Team
@@ -115,7 +117,7 @@ def check(  # noqa: PLR0913 - options, by name
     robochoc check dynabt --crash 1 --event 1   any robot may crash, and the problem may change
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.exploration.changes import FaultPlan
-    from robochoc.exploration.check import CheckOptions, checked
+    from robochoc.exploration.check import CheckedTeam, CheckOptions, checked
     from robochoc.exploration.shrinking import reduced
     from robochoc.run.defaults import AUTO, CENTRAL
     from robochoc.run.options import Options, Runtime
@@ -132,18 +134,25 @@ def check(  # noqa: PLR0913 - options, by name
     if protocol in {AUTO, CENTRAL}:
         raise Failure(USAGE, f"{protocol} is not a protocol of robots; name one ('robochoc protocols')")
     with stop_handled():
-        with errors_as_failures(protocol), _progress_of(protocol, len(folders) or teams, as_json=as_json) as show:
+        found = list[CheckedTeam]()
+        count = len(folders) or teams
+        with (
+            _reported_if_interrupted(lambda: _print_found(found, count, as_json=as_json)),
+            errors_as_failures(protocol),
+            _progress_of(protocol, count, as_json=as_json) as show,
+        ):
             plan = FaultPlan(crash, rejoin, event)
             options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss, plan=plan)
             problems = _teams(folders, (teams, robots, values, seed), options)
             results = checked(problems, options, deadline, jobs=jobs or usable_processors(), show=show)
             with closing(results):
-                found = list(_printed(results) if as_json else results)
+                _collect(results, found, as_json=as_json)
         if not as_json:
             _print_table(found)
         fault = next((one for one in found if one.exploration.fault), None)
         if fault is not None and not folders:
-            fault = reduced(fault, options, lambda: stop_requested() or _is_past(deadline))
+            with _reported_if_interrupted(partial(_print_faults, found)):
+                fault = reduced(fault, options, lambda: stop_requested() or _is_past(deadline))
         if html is not None and found:
             _write_page(html, fault or found[0], options)
         if journal is not None and fault is not None:
@@ -179,11 +188,36 @@ def _teams(folders: tuple[Path, ...], sizes: tuple[int, int, int, int], options:
     return itertools.islice(small_teams(traits, robots, values, seed), count)
 
 
-def _printed(found: Iterator[CheckedTeam]) -> Iterator[CheckedTeam]:
-    """Yield `found`, and print each of them as JSON."""
+def _collect(results: Iterable[CheckedTeam], found: list[CheckedTeam], *, as_json: bool) -> None:
+    """Append the results to `found`, and print each of them as JSON."""
+    for one in results:
+        found.append(one)
+        if as_json:
+            click.echo(json.dumps(one.as_dict()))
+
+
+@contextmanager
+def _reported_if_interrupted(report: Callable[[], None]) -> Iterator[None]:
+    """Call `report` if Ctrl-C or SIGTERM ends the context."""
+    try:
+        yield
+    except (KeyboardInterrupt, Terminated):
+        report()
+        raise
+
+
+def _print_found(found: list[CheckedTeam], count: int, *, as_json: bool) -> None:
+    """Print the teams that were explored before an interruption. `count`: the number of all teams."""
+    if not as_json and found:
+        _print_table(found)
+    _print_faults(found)
+    click.echo(f"{len(found):,} of {count:,} teams explored", err=True)
+
+
+def _print_faults(found: list[CheckedTeam]) -> None:
     for one in found:
-        click.echo(json.dumps(one.as_dict()))
-        yield one
+        if one.exploration.fault:
+            click.echo(f"{one.team.name}: {one.report}", err=True)
 
 
 def _print_table(found: list[CheckedTeam]) -> None:

@@ -89,9 +89,18 @@ _SECTIONS: Sections = {
 @click.option("--private", is_flag=True, help="Robots report that they have values, but not the values.")
 @filter_option
 @click.option(
-    "--gather", "gather_s", type=float, metavar="SECONDS", help="Stop if the team is not complete after this time."
+    "--gather",
+    "gather_s",
+    type=Number(0, min_open=True),
+    metavar="SECONDS",
+    help="Stop if the team is not complete after this time.",
 )
-@click.option("--timeout", type=float, metavar="SECONDS", help="Stop this long after the team is complete (status 3).")
+@click.option(
+    "--timeout",
+    type=Number(0, min_open=True),
+    metavar="SECONDS",
+    help="Stop this long after the team is complete (status 3).",
+)
 @deadline_option
 @improve_option
 @messages_option
@@ -146,9 +155,6 @@ def master(
         from robochoc.run.compatibility.team_rules import scenario_refusal
 
         raise click.UsageError(scenario_refusal(team, "robochoc master"))
-    for option in ("gather_s", "timeout", "deadline"):
-        if given[option] is not None and not given[option] > 0:
-            raise click.UsageError(f"--{option.removesuffix('_s')} requires a number of seconds greater than 0")
     with network_errors_as_failures("master"), stop_handled():
         plan = _plan(folder, team, given)
         with (

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import click
 
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Finite, Number, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
 
@@ -146,7 +146,7 @@ def graph_options(command: Command) -> Command:
                 "--neighbours", type=WholeNumber(2), metavar="N", help="small-world: nearest nodes.  [default: 4]"
             ),
             click.option(
-                "--rewiring", type=float, metavar="P", help="small-world: share of edges moved.  [default: 0.1]"
+                "--rewiring", type=Finite(), metavar="P", help="small-world: share of edges moved.  [default: 0.1]"
             ),
             click.option(
                 "--rows", type=WholeNumber(1), metavar="N", help="grid: rows.  [default: nearest to a square]"

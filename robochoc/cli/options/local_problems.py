@@ -56,6 +56,4 @@ def limits(local_solutions: int, local_timeout: float, *, always_ace: bool) -> C
     """Return the limits set by the options."""
     from robochoc.solver.compile import CompileLimits
 
-    if not local_timeout > 0:
-        raise click.UsageError("--local-timeout requires a number of seconds greater than 0")
     return CompileLimits(local_solutions, local_timeout, always_ace)

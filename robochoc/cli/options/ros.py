@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import click
 
-from robochoc.cli.options.value_types import Number
+from robochoc.cli.options.value_types import Finite
 from robochoc.system.lazy_dataclass import dataclass
 
 Command = TypeVar("Command", bound=Callable[..., object])
@@ -85,15 +85,6 @@ class FailureType(click.ParamType["tuple[str, float]"]):
         if not name or not 0 <= at_s < math.inf:
             self.fail(f"{value!r} is not of the form ROBOT or ROBOT@SECONDS", param, ctx)
         return name, at_s
-
-
-class Finite(Number):
-    """A finite number within limits."""
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
-        """Return the number."""
-        number = super().convert(value, param, ctx)
-        return number if math.isfinite(number) else self.fail(f"{value} is not a finite number", param, ctx)
 
 
 def _all_of(*options: Callable[[Command], Command]) -> Callable[[Command], Command]:

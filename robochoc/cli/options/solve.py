@@ -272,9 +272,6 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
     from robochoc.run.compatibility.option_rules import refuse_options
     from robochoc.solver.errors import UnsupportedError
 
-    for name in ("timeout", "deadline"):
-        if arguments[name] is not None and not arguments[name] > 0:
-            raise click.UsageError(f"--{name} requires a number of seconds greater than 0")
     options = _pop_options(arguments)
     try:
         refuse_options(options, environment=environment)

@@ -40,7 +40,9 @@ class WholeNumber(click.IntRange):
 
 
 class Number(click.FloatRange):
-    """A number within limits."""
+    """A number within limits, which may be infinite."""
+
+    noun = "number"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
         """Return the number, or fail with a message in plain English."""
@@ -48,9 +50,23 @@ class Number(click.FloatRange):
             number = super().convert(value, param, ctx)
         except click.BadParameter:
             number = math.nan
-        if math.isnan(number):
-            self.fail(f"{value!r} is not a number{_limits(self)}", param, ctx)
+        if not self._is_allowed(number):
+            self.fail(f"{value!r} is not a {self.noun}{_limits(self)}", param, ctx)
         return number
+
+    @staticmethod
+    def _is_allowed(number: float) -> bool:
+        return not math.isnan(number)
+
+
+class Finite(Number):
+    """A finite number within limits."""
+
+    noun = "finite number"
+
+    @staticmethod
+    def _is_allowed(number: float) -> bool:
+        return math.isfinite(number)
 
 
 class ProtocolName(click.ParamType[str]):

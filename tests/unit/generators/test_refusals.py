@@ -281,7 +281,7 @@ def test_wrong_usage_writes_nothing(tmp_path: Path) -> None:
     with cases() as each:
         for words, said in (
             (f"{random} --tightness 0.3 --density 1.5", "density is 1.5"),
-            (f"{random} --tightness nan", "tightness is nan"),
+            (f"{random} --tightness nan", "'nan' is not a finite number"),
             (f"{random} --tightness 0.3 --agents 0", "--agents"),
             (f"{random} --tightness 0.3 --seed -1", "--seed"),
             (f"{random} --tightness 0.3 --density 0.1 --connected", "needs 4 constraints"),

@@ -16,7 +16,7 @@ from robochoc.cli.options.generate import (
     writes_team,
 )
 from robochoc.cli.options.sections import COMMON, SectionedCommand
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Finite, Number, WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
@@ -38,10 +38,10 @@ places_option = number_option("--places", "Decimal places of costs.", least=0, m
 )
 @graph_options
 @number_option("--domain", "Number of values of each variable.")
-@click.option("--density", type=float, metavar="P", help="random: fraction of pairs of robots with a constraint.")
+@click.option("--density", type=Finite(), metavar="P", help="random: fraction of pairs of robots with a constraint.")
 @click.option(
     "--tightness",
-    type=float,
+    type=Finite(),
     metavar="P",
     help="Fraction of pairs of values that a constraint forbids, 0 to 1.  [required; with --max-cost: default 0]",
 )
@@ -98,7 +98,7 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
 )
 @graph_options
 @number_option("--colors", "Number of values of each variable.", default=3)
-@click.option("--degree", type=float, metavar="D", help="random: average number of neighbours.")
+@click.option("--degree", type=Finite(), metavar="D", help="random: average number of neighbours.")
 @click.option(
     "--conflicts",
     type=click.Choice(["soft", "weighted", "hard"]),

@@ -19,7 +19,7 @@ from robochoc.cli.options.generate import (
 )
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.sections import COMMON, SectionedCommand
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Finite, Number, WholeNumber
 
 if TYPE_CHECKING:
     from robochoc.generators.maps.map_team import MapChoice
@@ -34,7 +34,7 @@ _MAP_PARAMETERS = ("map", "agents", "at", "radius", "speed", "within", "cell", "
 def measure_option(name: str, text: str, default: float | None = None, unit: str = "M") -> Callable[..., Any]:
     """Return an option whose value is a length or another non-negative measure."""
     return click.option(
-        name, default=default, show_default=default is not None, type=Number(0), metavar=unit, help=text
+        name, default=default, show_default=default is not None, type=Finite(0), metavar=unit, help=text
     )
 
 
