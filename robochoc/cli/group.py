@@ -42,6 +42,7 @@ COMMANDS = {
     "import": ("import_", "Convert files of FRODO, pyDCOP, XCSP3, ... to teams."),
     "journal": ("journal", "Summarise or export a journal."),
     "master": ("master", "Lead a team whose robots run on other machines."),
+    "play": ("play", "Play a team in rounds: programs, people and protocols."),
     "privacy": ("privacy", "Measure how much robots learned about each other in a run."),
     "protocols": ("protocols", "List the installed protocols, or explain one."),
     "replay": ("replay", "Replay a journal and compare it with the installed protocol."),
@@ -58,7 +59,7 @@ The lines are stored here so that `robochoc --help` need not import any command.
 
 
 POSIX_COMMANDS = frozenset(
-    ["app", "authority", "capacity", "compare", "directory", "experiment", "master", "robot", "serve", "sniff"]
+    ["app", "authority", "capacity", "compare", "directory", "experiment", "master", "play", "robot", "serve", "sniff"]
 )
 """The commands that start or signal other processes, lock files, or use a network."""
 

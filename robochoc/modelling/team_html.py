@@ -40,7 +40,7 @@ def team_html(team: Team, user_values: Mapping[str, Iterable[object]] = {}) -> s
         (
             robot.name,
             variable.name,
-            shown_values(user_values[variable.name]) if variable.name in user_values else _domain(variable.domain),
+            shown_values(user_values[variable.name]) if variable.name in user_values else domain_text(variable.domain),
         )
         for robot in team.robots
         for variable in robot.variables
@@ -97,7 +97,8 @@ def shown_values(values: Iterable[object]) -> str:
     return ", ".join(value.name if isinstance(value, Enum) else str(value) for value in values)
 
 
-def _domain(domain: Domain) -> str:
+def domain_text(domain: Domain) -> str:
+    """Return the values of a domain as text; of many ranges, the first ones."""
     if domain.symbols:
         return " ".join(str(domain.label(value)) for value in domain)
     shown = [f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0]) for part in domain.ranges[:_MAX_RANGES]]

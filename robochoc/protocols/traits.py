@@ -44,6 +44,7 @@ class Traits:
         encrypted_tables: Its tables have a ciphertext for each cell and each cost. It is for small problems only, and
             is not suggested as an alternative to other protocols.
         secret_keys: Its robots draw secret keys (`Protocol.secret`), so a run across machines cannot be replayed.
+        no_replay: The reason why its runs can never be replayed; empty if they can.
         needs: A required module of an extra, and the command to install it. A run is refused if the module is missing.
         counts: Its robots also count the optima, or the solutions if there are no costs (`--count`).
         arrays: It has an array implementation that runs a whole team at once (`communication/arrays`).
@@ -80,6 +81,7 @@ class Traits:
     wide_tables: bool = False
     encrypted_tables: bool = False
     secret_keys: bool = False
+    no_replay: str = ""
     needs: tuple[str, str] | None = None
     counts: bool = False
     arrays: bool = False

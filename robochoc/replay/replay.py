@@ -135,6 +135,8 @@ class _JournalReplay:
         for run in runs_of(self._journal.events):
             self._show(f"run {run.number + 1}: creating the robots")
             robots = self._rebuilder.robots_of(run)
+            if robots.protocol.traits.no_replay:
+                raise CannotReplayError(robots.protocol.traits.no_replay)
             if robots.protocol.traits.secret_keys and self._journal.header.runtime == "network":
                 raise CannotReplayError("its robots used random keys, which journals do not contain")
             self._runs += 1

@@ -14,5 +14,7 @@ REPAIR = "gdba"
 """The protocol that repairs an assignment that violates hard constraints (`run/phases.py`)."""
 FIRST_FIT = "first-fit"
 """The protocol of `--withdraw maximal`, which decides which robots withdraw. Users cannot choose it by name."""
+ROUNDS = "rounds"
+"""The messages of games in rounds (`robochoc play`), in journals. Users cannot choose it by name."""
 MOST_LOSS = 0.9
 """The largest allowed probability of message loss. Above it, hardly any message arrives."""

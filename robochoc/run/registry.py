@@ -8,12 +8,13 @@ from contextlib import suppress
 from typing import NamedTuple, cast
 
 from robochoc.protocols.dynamic import DynamicProtocol
+from robochoc.protocols.local_search.rounds import Rounds
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.settings import Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
+from robochoc.run.defaults import AUTO, CENTRAL, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING, ROUNDS
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.errors import OptionError, OptionTypeError, RobochocError
 from robochoc.system.installed import (
@@ -28,8 +29,8 @@ from robochoc.system.pydcop_words import PROTOCOLS
 
 GROUP = "robochoc.protocols"
 _NAME = re.compile(r"[A-Za-z0-9]+(-[A-Za-z0-9]+)*")
-_STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
-"""Protocols for single stages of a run. Users cannot choose them."""
+_STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC, ROUNDS: Rounds}
+"""Protocols for single stages of a run, and for journals of games. Users cannot choose them."""
 
 
 class UnknownProtocolError(RobochocError, LookupError):
@@ -182,7 +183,7 @@ def protocol_named(name: str) -> type[Protocol]:
 
 
 def protocol_or_stage(name: str) -> type[Protocol]:
-    """Return the protocol called `name`. It may be a stage that users cannot choose (`FIRST_FIT`, `PREPROCESSING`)."""
+    """Return the protocol called `name`. It may be a stage that users cannot choose (`_STAGES`)."""
     return _STAGES[name] if name in _STAGES else protocol_named(name)
 
 

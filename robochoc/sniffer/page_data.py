@@ -145,9 +145,12 @@ class PageData:
         """Return the reason why robots' states are unavailable, or an empty text if they are available."""
         if not self.trace.runs:
             return "no run has started"
-        for run in self.trace.runs:
+        for number, run in enumerate(self.trace.runs):
             if run.given is None or run.given.why:
                 return run.given.why if run.given else "the journal does not contain the robots' problems"
+            found = self.protocols.of_run(number)
+            if found and found[1].traits.no_replay:
+                return found[1].traits.no_replay
         return ""
 
     def columns(self, first: int, end: int) -> bytes:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
@@ -11,8 +11,7 @@ from robochoc.app.texts import say
 from robochoc.formats.robot_reader import read_robot
 from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Function, Predicate, Relation, Semantics
 from robochoc.model.cost_units import CostUnits, cost_shown
-from robochoc.model.expression import Apply, Constant, Expression, Name
-from robochoc.model.expression.tree import SYMBOLIC
+from robochoc.modelling.infix import Infix
 
 MOST_SENTENCES = 60
 MOST_SHOWN = 40_000
@@ -65,17 +64,6 @@ def _file_of(folder: Path, robot: str) -> Path:
 
 _MOST_ROWS = 6
 _LONGEST = 400
-_SIGNS = {
-    "add": "+", "sub": "-", "mul": "·", "div": "/", "mod": "mod", "pow": "^",
-    "eq": "=", "ne": "≠", "lt": "<", "le": "≤", "gt": ">", "ge": "≥", "and": "and", "or": "or", "xor": "xor",
-    "iff": "⇔",
-}  # fmt: skip
-"""Infix operators."""
-
-_FORMS = {"abs": "|{0}|", "dist": "|{0} - {1}|", "neg": "-{0}", "sqr": "{0}²"}
-_WORDED = frozenset({"not", "in"})
-_CLOSED = frozenset({"abs", "not", "min", "max", "imp", "if"})
-"""Operators whose arguments need no parentheses."""
 
 
 def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUnits | None = None) -> str:
@@ -134,36 +122,9 @@ def _priced(cost: float, units: CostUnits) -> str:
     return say("imported.costing", cost=cost_shown(CostUnits(places=units.places).in_user_units(cost)))
 
 
-class _Reading:
-    """Converts expressions to infix notation, with parameters replaced by arguments."""
+class _Reading(Infix):
+    """Infix notation, with `not` and `in` in the application's words."""
 
-    def __init__(self, given: Mapping[str, str | int], symbolic: Sequence[str], symbols: Sequence[str]) -> None:
-        self._given, self._symbolic, self._symbols = given, frozenset(symbolic), symbols
-
-    def text(self, expression: Expression, *, inner: bool = False) -> str:
-        """Return the text of an expression. An `inner` expression is in parentheses if necessary."""
-        match expression:
-            case Constant(value):
-                return str(value)
-            case Name(name):
-                actual = self._given.get(name, name)
-                return self._symbol(actual) if isinstance(actual, int) and name in self._symbolic else str(actual)
-            case Apply(operator, arguments):
-                said = self._applied(operator, arguments)
-                return f"({said})" if inner and operator in _SIGNS else said
-
-    def _applied(self, operator: str, arguments: Sequence[Expression]) -> str:
-        named = operator in SYMBOLIC and any(isinstance(one, Name) and one.name in self._symbolic for one in arguments)
-        inner = operator not in _CLOSED
-        parts = [
-            self._symbol(one.value) if named and isinstance(one, Constant) else self.text(one, inner=inner)
-            for one in arguments
-        ]
-        if operator in _FORMS:
-            return _FORMS[operator].format(*parts)
-        if operator in _WORDED:
-            return say(f"imported.says.{operator}", first=parts[0], others=", ".join(parts[1:]))
-        return f" {_SIGNS[operator]} ".join(parts) if operator in _SIGNS else f"{operator}({', '.join(parts)})"
-
-    def _symbol(self, code: int) -> str:
-        return self._symbols[code] if 0 <= code < len(self._symbols) else str(code)
+    def worded(self, operator: str, parts: Sequence[str]) -> str:
+        """See `Infix.worded`."""
+        return say(f"imported.says.{operator}", first=parts[0], others=", ".join(parts[1:]))

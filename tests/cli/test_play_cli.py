@@ -1,0 +1,82 @@
+"""`robochoc play`: the report, JSON, journals, and wrong usage."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import write_team
+from tests.support.limits import HANG_S
+from tests.support.program import robochoc_within
+from tests.support.seats import lamps, program
+
+
+@pytest.fixture(name="team")
+def team_folder(tmp_path: Path) -> Path:
+    folder = tmp_path / "lamps"
+    write_team(lamps(), folder)
+    return folder
+
+
+def test_the_report_names_a_liar_and_broken_rules(team: Path) -> None:
+    body = """
+if number == 2: move["announce"] = values[(best + 1) % 3]
+if number == 3: move["say"] = [{"to": "\\x1b[31mr9", "text": "hello"}]
+"""
+    seat = f"r1={shlex.join(program(body))}"
+    done = robochoc_within(
+        "play", team, "--seat", seat, "--others", "greedy", "--rounds", 3, "--timeout", HANG_S, "--coalition", "r0,r1"
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("lamps: 3 rounds, cost ")
+    assert "r1 lied: it announced another value than it played in round 2" in done.stdout
+    assert "r1 broke the rule wrong-receiver 1 time, first in round 3: " in done.stdout
+    assert "joint regret of r0 and r1: " in done.stdout
+    assert "\x1b" not in done.stdout
+
+
+def test_json_and_journal(team: Path, tmp_path: Path) -> None:
+    path = tmp_path / "game.journal"
+    done = robochoc_within("play", team, "--player", "r0=script:1,0", "--others", "mgm", "--journal", path, "--json")
+    report = json.loads(done.stdout)
+    assert report["optimum"] == 2
+    assert report["feasible"] is True
+    assert [one["player"] for one in report["seats"]] == ["script", "mgm", "mgm", "mgm"]
+    assert report["regret"] == report["cost"] - 2
+    assert len(report["costs"]) == 20
+    shown = robochoc_within("journal", "show", path).stdout
+    assert "not possible: the players of a game (robochoc play) are not in its journal" in shown
+    replayed = robochoc_within("replay", path)
+    assert replayed.returncode == 2
+    assert "not in its journal" in replayed.stderr
+    assert robochoc_within("privacy", path).returncode == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--seat", "r1"), "is not of the form ROBOT=..."),
+        (("--seat", "r1='"), "cannot be read"),
+        (("--seat", "r1=  "), "is empty"),
+        (("--player", "r1=random", "--player", "r1=dsa"), "names r1 twice"),
+        (("--player", "r7=random"), "no robot 'r7'"),
+        (("--others", "dpop"), "cannot play in rounds"),
+        (("--others", "nobody"), "no protocol 'nobody'"),
+        (("--seat", "r1=/no/such/program"), "cannot be started"),
+        (("--optimum", "dpopp"), "no protocol"),
+    ],
+)  # fmt: skip
+def test_wrong_usage(team: Path, words: tuple[str, ...], says: str) -> None:
+    done = robochoc_within("play", team, *words)
+    assert done.returncode == 2
+    assert says in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_journal_that_cannot_be_written(team: Path) -> None:
+    done = robochoc_within("play", team, "--journal", "/dev/full", "--others", "greedy")
+    assert done.returncode == 1
+    assert "/dev/full" in done.stderr
