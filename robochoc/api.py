@@ -278,7 +278,7 @@ class AgentsContainer:
         robot = read_robot(file)
         identity = identity_of(name, main, *self._identities.get(name, (None, None)))
         with errors_in_python(("identity",)), Compiler() as compiler:
-            return join(robot, main, identity, RobotSettings(PATIENCE_S, sniffed=sniff), compiler)
+            return join(robot, (main,), identity, RobotSettings(PATIENCE_S, sniffed=sniff), compiler)
 
 
 def protocol_called(word: str) -> str:

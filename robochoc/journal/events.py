@@ -168,6 +168,14 @@ class Lost(Event, frozen=True):
     why: str
 
 
+class Leads(Event, frozen=True):
+    """The master `master` leads the team in the term `term`, for the reason `why`, if robots know several masters."""
+
+    master: str
+    term: int
+    why: str
+
+
 class Granted(Event, frozen=True):
     """The Authority has granted `what` to `who`. `t` is a Unix time, because the Authority outlives runs.
 
@@ -205,6 +213,7 @@ AnyEvent = (
     | Settled
     | Concluded
     | Lost
+    | Leads
     | Granted
     | Refused
 )
@@ -233,7 +242,18 @@ def actor(event: AnyEvent) -> str | None:
             return event.receiver
         case Heard() | Decided() | Concluded() | Settled():
             return event.robot
-        case Began() | Given() | Registered() | DroppedOut() | Bounded() | Improved() | Lost() | Granted() | Refused():
+        case (
+            Began()
+            | Given()
+            | Registered()
+            | DroppedOut()
+            | Bounded()
+            | Improved()
+            | Lost()
+            | Leads()
+            | Granted()
+            | Refused()
+        ):
             return None
         case never:
             assert_never(never)

@@ -322,6 +322,8 @@ class Outcome(Answer):
         placed_by: The protocol that decided the withdrawal, if it differs from `protocol`.
         claimed_by: In runs across machines: the robot on whose claim the verdict relies, or `ALL_ROBOTS`. Such claims
             cannot be checked.
+        led_by: The name of the master that led the run, if the robots know several masters.
+        term: The term in which it led. A takeover by another master begins a later term.
         symbols: The names of the team's symbols, if any: the value 2 means the symbol at index 2.
         symbolic: The variables whose values are symbols.
         chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.
@@ -338,6 +340,8 @@ class Outcome(Answer):
     channel: str | None = None
     placed_by: str | None = None
     claimed_by: str | None = None
+    led_by: str | None = None
+    term: int | None = None
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
     chosen: dict[str, str] = field(default_factory=dict)

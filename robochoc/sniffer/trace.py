@@ -26,6 +26,7 @@ from robochoc.journal.events import (
     Granted,
     Heard,
     Improved,
+    Leads,
     Lost,
     Received,
     Refused,
@@ -106,10 +107,12 @@ def note_of(event: AnyEvent, step: int) -> TraceNote | None:
     match event:
         case Improved():
             return TraceNote(event.t, step, "improved", "", f"the best cost so far is {cost_shown(event.cost)}")
-        case DroppedOut():
-            return TraceNote(event.t, step, "lost", event.robot, f"{event.robot} has dropped out: {event.why}")
-        case Lost():
-            return TraceNote(event.t, step, "lost", event.robot, f"{event.robot} was lost: {event.why}")
+        case DroppedOut() | Lost():
+            end = "was lost" if isinstance(event, Lost) else "has dropped out"
+            return TraceNote(event.t, step, "lost", event.robot, f"{event.robot} {end}: {event.why}")
+        case Leads():
+            words = f"{event.master} leads in term {event.term}: {event.why}"
+            return TraceNote(event.t, step, "granted", event.master, words)
         case Refused():
             return TraceNote(event.t, step, "refused", event.who, f"{event.who} was refused {event.what}: {event.why}")
         case Granted():

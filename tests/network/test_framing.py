@@ -29,6 +29,8 @@ from robochoc.communication.network.control_messages import (
     Register,
     RegistrationDenied,
     SearchTask,
+    StandbyAnswer,
+    StandbyRequest,
     ToMaster,
     ToPeer,
     ToRobot,
@@ -64,6 +66,8 @@ OUTSIDE = (
     DirectoryAnswer,
     JournalRequest,
     JournalAnswer,
+    StandbyRequest,
+    StandbyAnswer,
 )
 WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
 

@@ -60,6 +60,7 @@ any_event: st.SearchStrategy[AnyEvent] = st.one_of(
     _of(events.Settled, robot=names, clock=counts, checks=counts),
     _of(events.Concluded, robot=names, verdict=names),
     _of(events.Lost, robot=names, why=names),
+    _of(events.Leads, master=names, term=st.integers(1, 9), why=names),
     _of(events.Granted, who=names, what=names, origin=names),
     _of(events.Refused, who=names, what=names, why=names, origin=names),
 )

@@ -51,15 +51,22 @@ def init(folder: Path | None) -> None:
         )
 
 
-@authority.command(short_help="Enrol robots or observers: one token per name.")
+@authority.command(short_help="Enrol robots, observers or standby masters: one token per name.")
 @click.argument("names", nargs=-1, metavar="[NAME]...")
 @click.option("--team", type=TeamFolder(), metavar="DIR", help="Enrol all robots of this team.")
 @click.option(
     "--role",
-    type=click.Choice(["robot", "observer"]),
+    type=click.Choice(["robot", "observer", "master"]),
     default="robot",
     show_default=True,
-    help="Role of the names.",
+    help="Role of the names. The role master is for standby masters.",
+)
+@click.option(
+    "--host",
+    "hosts",
+    multiple=True,
+    metavar="HOST",
+    help="Name or address by which robots reach a standby master. Repeatable.",
 )
 @click.option(
     "--may",
@@ -87,6 +94,7 @@ def enrol(
     *,
     as_json: bool,
     role: str,
+    hosts: tuple[str, ...],
     may: tuple[str, ...],
     hours: float,
 ) -> None:
@@ -104,7 +112,7 @@ def enrol(
     with _errors_as_failures(), _opened(folder) as opened:
         from robochoc.authority.registry import Right, Role
 
-        tokens = opened.enrol_all(names, Role(role), timedelta(hours=hours), map(Right, may))
+        tokens = opened.enrol_all(names, Role(role), timedelta(hours=hours), map(Right, may), hosts)
     if as_json:
         import msgspec
 
@@ -162,6 +170,7 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 def _errors_as_failures() -> Iterator[None]:
     """Convert the Authority's errors to a `Failure` with one line and an exit status."""
     try:
+        from robochoc.authority.certificates import HostNameError
         from robochoc.authority.names import InvalidNameError, NotEnrolledError
         from robochoc.authority.registry import AuthorityError
     except ModuleNotFoundError as missing:
@@ -173,7 +182,7 @@ def _errors_as_failures() -> Iterator[None]:
 
     try:
         yield
-    except (InvalidNameError, NotEnrolledError) as error:
+    except (HostNameError, InvalidNameError, NotEnrolledError) as error:
         raise Failure(USAGE, on_one_line(str(error))) from error
     except AuthorityError as error:
         raise Failure(INVALID, on_one_line(str(error))) from error

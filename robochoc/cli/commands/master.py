@@ -5,13 +5,22 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.network import AddressType, authority_option, network_errors_as_failures, patience_option
+from robochoc.cli.options.network import (
+    AddressType,
+    authority_option,
+    identity_option,
+    masters_option,
+    network_errors_as_failures,
+    patience_option,
+    token_options,
+)
 from robochoc.cli.options.paths import TeamFolder
 from robochoc.cli.options.recording import flushing_progress, journal_option, recording
 from robochoc.cli.options.ros import improve_option
@@ -29,7 +38,7 @@ from robochoc.cli.options.solve import (
     withdraw_option,
 )
 from robochoc.cli.options.value_types import Number, WholeNumber
-from robochoc.cli.reports.failures import LIMIT
+from robochoc.cli.reports.failures import LIMIT, LOST, Failure
 from robochoc.cli.reports.improvements import ImprovementReporter
 from robochoc.cli.reports.progress import print_above, progress_line
 from robochoc.system.stopping import stop_handled
@@ -42,6 +51,7 @@ if TYPE_CHECKING:
     from robochoc.run.improvement import Audience
     from robochoc.run.networked.address import Address
     from robochoc.run.networked.master_run import MasterPlan, MasterResult
+    from robochoc.run.networked.standby import StandbyPlan
 
 
 _SECTIONS: Sections = {
@@ -51,6 +61,7 @@ _SECTIONS: Sections = {
     ),
     "Search": ("--set", "--seed", "--start", "--messages", "--message-loss"),
     "Robots and losses": ("--host", "--authority", "--gather", "--patience", "--on-loss"),
+    "Standby masters": ("--standby", "--as", "--token-file", "--token", "--identity"),
     "Privacy and security": ("--private", "--filter"),
 }  # fmt: skip
 
@@ -128,6 +139,15 @@ _SECTIONS: Sections = {
     is_flag=True,
     help="Let observers with the right to sniff follow the run ('robochoc sniff --master').",
 )
+@masters_option(
+    "--standby",
+    "leaders",
+    "Lead only if none of these masters leads. Give the options of the first master, and the next three.",
+    required=False,
+)
+@click.option("--as", "own_name", metavar="NAME", help="Name of the standby master, enrolled with the role master.")
+@token_options()
+@identity_option
 @click.pass_context
 def master(
     context: click.Context,
@@ -148,6 +168,7 @@ def master(
 
     \b
     robochoc master --listen 192.168.1.14:7447 --robots 16
+    robochoc master --standby 192.168.1.14:7447 --as B --listen 192.168.1.15:7447 --robots 16
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     if given["number"] and team:
         raise click.UsageError("--robots and --team both define the team; remove one")
@@ -163,6 +184,8 @@ def master(
         ):
             audience = ImprovementReporter(None, quiet=as_json)
             result = _run(plan, recorder, publication, audience)
+            if result is None:
+                return
             _print_result(result, as_json=as_json)
     context.exit(LIMIT if result.outcome.verdict == "unknown" else 0)
 
@@ -186,6 +209,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
         patience_s=given.pop("patience_s"),
         survive=given.pop("on_loss") == "withdraw",
     )
+    standby = _standby(given.pop("leaders"), given.pop("own_name"), given.pop("identity"), given.pop("token"))
     withdraw, start = given.pop("withdraw"), given.pop("start")
     return MasterPlan(
         authority=folder or default_authority_folder(),
@@ -193,10 +217,29 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
         settings=protocol_settings(given.pop("settings_given")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
         start=saved_outcome(start)[0] if start else None,
+        standby=standby,
         names=tuple(robot_names(team)) if team else None,
         name=team.resolve().name if team else "team",
         **given,
     )
+
+
+def _standby(
+    leaders: tuple[Address, ...], name: str | None, identity: Path | None, token: str | None
+) -> StandbyPlan | None:
+    """Return the plan of a standby master, after it has enrolled or renewed its certificate; None for another one."""
+    if not leaders:
+        if name or identity or token:
+            raise click.UsageError("--as, --identity and --token are only for standby masters: add --standby HOST:PORT")
+        return None
+    if name is None:
+        raise click.UsageError(
+            "--standby requires the name of this master, enrolled with the role master: add --as NAME"
+        )
+    from robochoc.run.networked.join import identity_of
+    from robochoc.run.networked.standby import StandbyPlan
+
+    return StandbyPlan(leaders, identity_of(name, leaders[0], identity, token))
 
 
 @contextmanager
@@ -214,9 +257,10 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
 
 def _run(
     plan: MasterPlan, recorder: JournalRecorder | None, publication: Publication | None, audience: Audience
-) -> MasterResult:
-    """Run the master with its observers."""
+) -> MasterResult | None:
+    """Run the master with its observers. Return None if this is a standby master, and another one has ended the run."""
     from robochoc.run.networked.master_run import run_master
+    from robochoc.run.networked.standby import RunOverElsewhereError
 
     if recorder and publication:
         publication.fresh = recorder.flush_if_due
@@ -230,16 +274,24 @@ def _run(
             if recorder:
                 recorder(event)
 
-        return run_master(
-            plan,
-            observer=observe,
-            audience=audience,
-            watched=recorder is not None,
-            progress=progress,
-            listening=printer.print_listening,
-            publication=publication,
-            concluded=partial(_close_journal, recorder, publication),
-        )
+        plan = replace(plan, following=lambda: printer.print_following(plan))
+        try:
+            return run_master(
+                plan,
+                observer=observe,
+                audience=audience,
+                watched=recorder is not None,
+                progress=progress,
+                listening=printer.print_listening,
+                publication=publication,
+                concluded=partial(_close_journal, recorder, publication),
+            )
+        except RunOverElsewhereError as over:
+            _close_journal(recorder, publication, None)
+            if over.failed:
+                raise Failure(LOST, str(over)) from None
+            print_above(str(over))
+            return None
 
 
 def _close_journal(recorder: JournalRecorder | None, publication: Publication | None, outcome: Outcome | None) -> None:
@@ -287,6 +339,11 @@ class _EventPrinter:
                 _print_event(event)
             self._early = None
 
+    def print_following(self, plan: MasterPlan) -> None:
+        """Print that this standby master follows the masters with a higher priority."""
+        leaders = ", ".join(map(str, plan.standby.leaders)) if plan.standby else ""
+        print_above(f"standing by for {leaders}")
+
     def print_event(self, event: AnyEvent) -> None:
         """Print an event now, or as soon as the master listens. Events arrive from several threads."""
         with self._lock:
@@ -299,7 +356,7 @@ class _EventPrinter:
 def _print_event(event: AnyEvent) -> None:
     """Print one line for an event that the master's operator needs to know at once."""
     from robochoc.formats import on_one_line
-    from robochoc.journal.events import DroppedOut, Granted, Lost, Refused, Registered
+    from robochoc.journal.events import DroppedOut, Granted, Leads, Lost, Refused, Registered
 
     match event:
         case Registered(robot=name):
@@ -308,6 +365,8 @@ def _print_event(event: AnyEvent) -> None:
             line = f"{name} has disconnected: {why}; waiting for its return"
         case Lost(robot=name, why=why):
             line = f"{name} is lost: {why}"
+        case Leads(master=master, term=term, why=why):
+            line = f"{master} leads in term {term}: {why}"
         case Granted(who=who, what=what):
             line = f"{who}: granted to {what}"
         case Refused(who=who, what=what, why=why):

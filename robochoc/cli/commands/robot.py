@@ -12,7 +12,7 @@ import click
 from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.network import (
     identity_option,
-    master_option,
+    masters_option,
     network_errors_as_failures,
     patience_option,
     token_options,
@@ -39,7 +39,12 @@ _SECTIONS: Sections = {
 
 @click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("file", type=InputPath())
-@master_option
+@masters_option(
+    "--master",
+    "places",
+    "Address of the master; several by priority, separated by commas or repeated, if there are standby masters.",
+    required=True,
+)
 @token_options()
 @identity_option
 @patience_option("Time without contact after which the master counts as lost.", 30.0, "patience")
@@ -52,7 +57,7 @@ def robot(
     context: click.Context,
     /,
     file: Path,
-    place: Address,
+    places: tuple[Address, ...],
     *,
     token: str | None,
     identity: Path | None,
@@ -69,7 +74,7 @@ def robot(
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     with network_errors_as_failures(file):
         with _stages(file.stem) as show_stage:
-            ending, values, published = _run(file, place, (identity, token), given, show_stage)
+            ending, values, published = _run(file, places, (identity, token), given, show_stage)
         _print_ending(file.stem, ending, values, published, as_json=as_json)
     context.exit(LIMIT if ending.why.startswith("unknown") else 0)
 
@@ -93,7 +98,7 @@ def _stages(name: str) -> Iterator[Callable[[str], None]]:
 
 def _run(
     file: Path,
-    place: Address,
+    places: tuple[Address, ...],
     credentials: tuple[Path | None, str | None],
     given: dict[str, Any],
     show_stage: Callable[[str], None],
@@ -102,7 +107,7 @@ def _run(
 
     Args:
         file: The robot's file.
-        place: The address of the master.
+        places: The addresses of the masters, by priority.
         credentials: The folder with the robot's certificate, and its token.
         given: The other options of the command.
         show_stage: Shows the stage of the run.
@@ -121,18 +126,39 @@ def _run(
 
     own = read_robot(file)  # before the token is used
     with robot_publisher(own, given) as publish:
-        show_stage(f"looking for the master at {place}")
-        identity = identity_of(file.stem, place, *credentials, given["patience"])
+        show_stage(f"looking for the master at {places[0]}")
+        identity = identity_of(file.stem, places[0], *credentials, given["patience"])
         settings = RobotSettings(
-            given["patience"], sniffed=given["sniff"], stage=show_stage, decided=_DecisionReporter(own, publish).report
+            given["patience"],
+            sniffed=given["sniff"],
+            stage=show_stage,
+            decided=_DecisionReporter(own, publish).report,
+            lost_master=_LostMasterReporter(file.stem).report,
         )
         cache = None if given["no_cache"] else SolutionCache()
         bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
         with Compiler(bounds, cache) as compiler:
-            ending = join(own, place, identity, settings, compiler)
+            ending = join(own, places, identity, settings, compiler)
         if ending.failed:
             raise Failure(LOST, f"{file.stem}: {ending.why}")
         return ending, _labelled(own, ending.assignment), publish(ending.why, ending.assignment)
+
+
+class _LostMasterReporter:
+    """Prints that the robot looks for another master. Repetitions are skipped."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._last = ("", "")
+
+    def report(self, place: str, why: str) -> None:
+        """Print the address of the last master, and why the robot has left it."""
+        if (place, why) == self._last:
+            return
+        self._last = place, why
+        from robochoc.system.plain_text import on_one_line
+
+        print_above(on_one_line(f"{self._name}: left the master at {place}: {why}; looking for another master"))
 
 
 def _labelled(own: Robot, assignment: Assignment) -> dict[str, int | str]:

@@ -44,6 +44,45 @@ class AddressType(click.ParamType["Address"]):
             self.fail(str(bad), param, ctx)
 
 
+class AddressList(click.ParamType["tuple[Address, ...]"]):
+    """Addresses `HOST:PORT` of masters, separated by commas."""
+
+    name = "addresses"
+
+    def convert(
+        self, value: str | tuple[Address, ...], param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[Address, ...]:
+        """Return the addresses."""
+        if isinstance(value, tuple):
+            return value
+        return tuple(AddressType().convert(text.strip(), param, ctx) for text in value.split(","))
+
+
+def _joined(
+    _context: click.Context, param: click.Parameter, value: tuple[tuple[Address, ...], ...]
+) -> tuple[Address, ...]:
+    """Return all addresses. The same address twice is rejected."""
+    places = tuple(place for places in value for place in places)
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice:
+        raise click.BadParameter(f"{twice} is given twice: remove one", param=param)
+    return places
+
+
+def masters_option(name: str, argument: str, text: str, *, required: bool) -> Callable[[Command], Command]:
+    """Return the repeatable option `name`, with addresses of masters, stored in `argument`, with the help `text`."""
+    return click.option(
+        name,
+        argument,
+        type=AddressList(),
+        required=required,
+        multiple=True,
+        callback=_joined,
+        metavar="HOST:PORT[,...]",
+        help=text,
+    )
+
+
 master_option = click.option(
     "--master", "place", type=AddressType(), required=True, metavar="HOST:PORT", help="Address of the master."
 )

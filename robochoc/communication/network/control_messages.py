@@ -27,6 +27,7 @@ from robochoc.communication.control import (
     TakeSnapshot,
     WentOn,
 )
+from robochoc.communication.network.leadership import NO_TERM, Term
 from robochoc.communication.network.profile import Profile, Ranges
 from robochoc.protocols.message import Value
 from robochoc.solver.encoding import Cost
@@ -39,17 +40,74 @@ class _Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     pass
 
 
+class TeamDecision(NamedTuple):
+    """A decision without the robots' values, which each robot stores itself.
+
+    Attributes:
+        run: The run of the master that has found the decision.
+        outcome: The outcome without values, as JSON.
+        words: The outcome in a few words.
+    """
+
+    run: str
+    outcome: str
+    words: str
+
+
+class AcceptedDecision(NamedTuple):
+    """A decision, and the latest term in which a robot has accepted it. See `leadership.Acceptance`."""
+
+    term: Term
+    decision: TeamDecision
+
+
+class Standing(NamedTuple):
+    """The mission of a robot that knows several masters: the runs of these masters that together make one decision.
+
+    Attributes:
+        mission: The run of the master that closed the team; empty before that.
+        team: The names of the robots in the team.
+        promised: The latest term that the robot has promised in the mission.
+    """
+
+    mission: str = ""
+    team: tuple[str, ...] = ()
+    promised: Term = NO_TERM
+
+
 # From a robot to the master
 
 
 class Register(_Message, frozen=True):
     """Registers the robot of `profile`.
 
-    `incarnation` names this process of the robot: a restarted robot has another one.
+    `incarnation` names this process of the robot: a restarted robot has another one. `standing`: the robot knows
+    several masters.
     """
 
     profile: Profile
     incarnation: str
+    standing: Standing | None = None
+
+
+class Promised(_Message, frozen=True):
+    """The answer to `Lead`: the robot's latest promise, and the decision that it has accepted before, if any.
+
+    `values` are the robot's last values, found in the run `run`; they are empty in private runs.
+    """
+
+    term: Term
+    promised: Term
+    accepted: AcceptedDecision | None
+    run: str
+    values: dict[str, int]
+
+
+class Accepted(_Message, frozen=True):
+    """The answer to `Propose`: the robot's latest promise, which is `term` if it has accepted the decision."""
+
+    term: Term
+    promised: Term
 
 
 class Joined(_Message, frozen=True):
@@ -144,6 +202,12 @@ class JournalRequest(_Message, frozen=True):
     """A request for the journal of the run. The answer has the same `number`."""
 
     number: int
+
+
+class StandbyRequest(_Message, frozen=True):
+    """A standby master's request for a `StandbyAnswer`. `over`: it knows that the run is over."""
+
+    over: bool = False
 
 
 class Bye(_Message, frozen=True):
@@ -253,10 +317,51 @@ class JournalAnswer(_Message, frozen=True):
 
 
 class Leave(_Message, frozen=True):
-    """The run is over. `failed`: it was not completed, for the reason `why`; otherwise `why` is the verdict."""
+    """The run is over. `failed`: it was not completed, for the reason `why`; otherwise `why` is the verdict.
+
+    `elsewhere`: another master may complete it.
+    """
 
     why: str
     failed: bool
+    elsewhere: bool = False
+
+
+class Lead(_Message, frozen=True):
+    """The request to promise the `term` in which this master leads the `team` in the `mission`."""
+
+    term: Term
+    mission: str
+    team: tuple[str, ...]
+
+
+class Propose(_Message, frozen=True):
+    """The request to accept a decision in the master's term."""
+
+    term: Term
+    decision: TeamDecision
+
+
+class Heartbeat(_Message, frozen=True):
+    """A sign of life for robots that know several masters."""
+
+
+class StandbyAnswer(_Message, frozen=True):
+    """Shows a standby master that this master leads, and whom the Authority admits.
+
+    Attributes:
+        names: By role, the admitted names, including those that have a token.
+        sniffers: The names that may follow runs.
+        over: The result of the run in words, if it is over.
+        failed: True if the run is over, and was not completed.
+        resigned: True if this master does not lead any more, so that another one may.
+    """
+
+    names: dict[str, tuple[str, ...]]
+    sniffers: tuple[str, ...]
+    over: str = ""
+    failed: bool = False
+    resigned: bool = False
 
 
 # From robot to robot
@@ -295,6 +400,9 @@ ToMaster = (
     | LostFrames
     | DirectoryRequest
     | JournalRequest
+    | Promised
+    | Accepted
+    | StandbyRequest
     | Bye
 )
 ToRobot = (
@@ -313,6 +421,10 @@ ToRobot = (
     | Revoked
     | DirectoryAnswer
     | JournalAnswer
+    | Lead
+    | Propose
+    | Heartbeat
+    | StandbyAnswer
     | Leave
 )
 ToPeer = ProtocolMessage | Copies

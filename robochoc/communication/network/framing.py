@@ -20,6 +20,8 @@ from robochoc.communication.network.control_messages import (
     JournalRequest,
     Register,
     RegistrationDenied,
+    StandbyAnswer,
+    StandbyRequest,
     ToMaster,
     ToPeer,
     ToRobot,
@@ -42,6 +44,8 @@ _OUTSIDE = (
     | DirectoryAnswer
     | JournalRequest
     | JournalAnswer
+    | StandbyRequest
+    | StandbyAnswer
 )
 
 

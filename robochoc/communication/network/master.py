@@ -24,6 +24,7 @@ from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.checked_snapshots import CheckedSnapshots
 from robochoc.communication.network.control_messages import (
+    Accepted,
     Adopt,
     Bye,
     CheckRequest,
@@ -31,15 +32,20 @@ from robochoc.communication.network.control_messages import (
     DirectoryRequest,
     DomainAnswer,
     DomainRequest,
+    Heartbeat,
     Joined,
     JournalRequest,
     Leave,
     LostFrames,
     Objection,
+    Promised,
     Register,
     RegistrationDenied,
     Revoked,
+    StandbyRequest,
+    Standing,
     StartSearch,
+    TeamDecision,
     ToRobot,
     Welcome,
 )
@@ -50,9 +56,12 @@ from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item,
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
+from robochoc.communication.network.master_votes import MasterVotes, SupersededError
+from robochoc.communication.network.masters import HEARTBEAT_S
 from robochoc.communication.network.members import Member, NetworkMembers, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.standbys import Standbys
 from robochoc.communication.search_result import Progress, RobotsLostError, SearchResult
 from robochoc.communication.session import is_past
 from robochoc.journal.events import Observer
@@ -72,6 +81,7 @@ class Registrar:
         events: Receives registrations and refusals.
         settings: The settings of the run. A welcome contains some of them.
         watched: True if robots are to report their events.
+        votes: Knows the mission of robots that know several masters.
     """
 
     def __init__(
@@ -82,6 +92,7 @@ class Registrar:
         events: MasterEvents,
         settings: NetworkSettings,
         watched: bool,  # noqa: FBT001 - passed on by the master
+        votes: MasterVotes,
     ) -> None:
         self._members = members
         self._connection = connection
@@ -89,15 +100,16 @@ class Registrar:
         self._events = events
         self._settings = settings
         self._watched = watched
+        self._votes = votes
 
-    def register(self, name: str, profile: Profile, incarnation: str) -> bool:
+    def register(self, name: str, profile: Profile, incarnation: str, standing: Standing | None) -> bool:
         """Register and welcome a robot, or refuse it. Return whether the robot is new."""
         known = self._members.robots.get(name)
         try:
+            self._join_mission(standing)
             member = self._members.register(name, profile, incarnation, admitted=self._connection.policy.is_robot(name))
         except RegistrationRefusedError as refusal:
-            self._events.refuse(name, "register", str(refusal))
-            self._connection.send(name, RegistrationDenied(incarnation, str(refusal)))
+            self._deny(name, incarnation, str(refusal))
             return False
         if member is not known:
             self._connection.framing.forget(name)
@@ -106,6 +118,22 @@ class Registrar:
             self._events.registered(name)
         self._welcome(name, incarnation)
         return member is not known
+
+    def _join_mission(self, standing: Standing | None) -> None:
+        """Consider the standing of a robot. If another master closed its team, only the team's robots may register.
+
+        Raises `RegistrationRefusedError`.
+        """
+        before = self._votes.mission
+        if why := self._votes.admit(standing, closed=self._members.closed):
+            raise RegistrationRefusedError(why)
+        if self._votes.mission != before:
+            for name, incarnation in self._members.expect(self._votes.team).items():
+                self._deny(name, incarnation, "it is not a member of the team")
+
+    def _deny(self, name: str, incarnation: str, why: str) -> None:
+        self._events.refuse(name, "register", why)
+        self._connection.send(name, RegistrationDenied(incarnation, why))
 
     def welcome_again(self) -> None:
         """Welcome again robots that have not answered a welcome since they registered or returned."""
@@ -171,9 +199,16 @@ class Master(MasterLoop):
         self._journal_server = connection.journal_server
         self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
         self._requests = RequestHandler(self._journal_server, self._facilitator, self._send, self.events.refuse)
-        self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
+        self.votes = MasterVotes(self.run, identity.name)
+        self._standbys = Standbys(admission, connection.send)
+        self._heartbeat_at = 0.0
+        self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched, self.votes)
+        self.is_superseded: Callable[[], bool] = bool
+        """Returns whether a master with a higher priority leads, so that this one must not close a team."""
         self._dead: dict[str, str] = {}
         self._has_ended = False
+        self.absent: dict[str, str] = {}
+        """Robots of another master's team that did not come to this master, with the reason."""
         self.snapshots: CheckedSnapshots | None = None
         """The snapshots in the current search, if robots must check them."""
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
@@ -204,7 +239,9 @@ class Master(MasterLoop):
         robot.
         """
         until = math.inf if deadline is None else deadline  # people start the robots
-        self._serve_until(lambda: self.members.complete, until)
+        self._serve_until(lambda: self.members.complete or self._is_gathered(), until)
+        if self.is_superseded():
+            raise SupersededError("a master with a higher priority leads")
         unseen = self.members.unseen()
         while unseen and not is_past(deadline):
             for name, variables in unseen.items():
@@ -216,6 +253,63 @@ class Master(MasterLoop):
         if invalid:
             raise UnsupportedError(invalid)
         return self.members.closed
+
+    def _is_gathered(self) -> bool:
+        """Return whether to wait no longer for robots, because another master leads, or has led the missing robots.
+
+        Raises:
+            RobotsLostError: if robots of another master's team do not come, and the run does not survive that.
+            NoMajorityError: if fewer than a majority of this team has come.
+        """
+        if self.is_superseded():
+            return True
+        missing = sorted(set(self.votes.team) - self.members.robots.keys())
+        last = max((member.since for member in self.members.robots.values()), default=None)
+        if not missing or last is None or not is_past(last + self._settings.patience_s):
+            return False
+        self.votes.check_team(self.members.robots)
+        why = "it did not come to this master after the previous one was gone"
+        if not self._settings.survive:
+            raise RobotsLostError(dict.fromkeys(missing, why))
+        for name in missing:
+            self.events.lost(name, why)
+        self.absent |= dict.fromkeys(missing, why)
+        self.members.give_up(missing)
+        return self.members.complete
+
+    def elect(self) -> TeamDecision | None:
+        """Obtain the votes of a majority of the team, if robots know several masters.
+
+        Returns:
+            The decision that this master must confirm instead of a search, because an earlier one may have published
+            it, or None.
+
+        Raises:
+            NoMajorityError: if a majority does not vote for this master.
+            RobotsLostError: if a robot is lost, and the run does not survive that.
+        """
+        if not self.votes.is_needed:
+            return None
+        self._send_all(self.votes.start(self.members.order))
+        self._wait_for_votes(lambda: self.votes.promised)
+        self.votes.check_promises()
+        self.events.leads(self.votes.name, self.votes.term or 0, self.votes.reason)
+        return self.votes.inherited
+
+    def confirm(self, decision: TeamDecision) -> None:
+        """Let a majority of the team accept the decision, if robots know several masters. Raises `NoMajorityError`."""
+        if not self.votes.is_needed:
+            return
+        self._send_all(self.votes.propose(decision))
+        self._wait_for_votes(lambda: self.votes.accepted)
+        self.votes.check_acceptances()
+
+    def _wait_for_votes(self, votes: Callable[[], frozenset[str]]) -> None:
+        """Wait for the votes of all present robots, for a limited time."""
+        away_s = self._settings.patience_s + self._settings.lease_ms / 1000
+        self._serve_until(
+            lambda: votes() >= set(self.members.listening) - set(self.state.lost), time.monotonic() + away_s
+        )
 
     def search(
         self,
@@ -301,17 +395,25 @@ class Master(MasterLoop):
             raise RobotsLostError(state.lost or {MASTER: "robots have not checked their constraints in time"})
         return state.held, state.cost
 
-    def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
-        """Announce the end of the run until all robots confirm it, even those that have just joined or returned."""
-        leave, until = Leave(why, failed), time.monotonic() + farewell_s
+    def leave(self, why: str, *, failed: bool = False, elsewhere: bool = False, farewell_s: float = FAREWELL_S) -> None:
+        """Announce the end of the run until all robots confirm it, even those that have just joined or returned.
+
+        `elsewhere`: another master may complete the run, if robots know one.
+        """
+        elsewhere = elsewhere and self.votes.is_needed
+        leave, until = Leave(why, failed, elsewhere), time.monotonic() + farewell_s
+        if elsewhere:
+            self._standbys.resign()
+        else:
+            self._standbys.end(why, failed=failed)
         self._has_ended = True
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):
             # A run may end before the next check of the directory.
             self._notify_subscribers()
             self._send_all(leave)
-            while staying() and not is_past(until):
-                self._serve_until(lambda: not staying(), time.monotonic() + AGAIN_S)
+            while (staying() or self._standbys.waiting) and not is_past(until):
+                self._serve_until(lambda: not (staying() or self._standbys.waiting), time.monotonic() + AGAIN_S)
                 self._send_all(leave)
             self._serve_until(lambda: not self._journal_server.lagging, time.monotonic() + FAREWELL_S)
 
@@ -347,6 +449,9 @@ class Master(MasterLoop):
         """Find revoked robots, and robots that have been absent for too long."""
         if failure := self._policy.failure:
             raise RobotsLostError({MASTER: f"the router's process {failure}"})
+        if self.votes.is_needed and now - self._heartbeat_at >= HEARTBEAT_S:
+            self._heartbeat_at = now
+            self._send_all(Heartbeat())
         away_s = self._settings.patience_s
         for name in [n for n, member in self.members.robots.items() if member.is_away(away_s) and not member.left]:
             self._lose(name, f"it has not been there for {away_s:g} s")
@@ -393,12 +498,14 @@ class Master(MasterLoop):
             return
         member = self.members.robots.get(sender)
         match opened.message:
-            case Register(profile, incarnation):
-                if self._registrar.register(sender, profile, incarnation) and self._progress:
+            case Register(profile, incarnation, standing):
+                if self._registrar.register(sender, profile, incarnation, standing) and self._progress:
                     elapsed_s, number = time.monotonic() - self._began, len(self.members.robots)
                     self._progress(Progress(0, elapsed_s, f"{number} robots registered"))
             case DirectoryRequest() | JournalRequest():
                 self._requests.answer(sender, opened.message)
+            case StandbyRequest():
+                self._standbys.answer(sender, opened.message)
             case _ if member is None:
                 self.events.refuse(sender, TO_MASTER, "it is not registered")
             case message:
@@ -417,12 +524,12 @@ class Master(MasterLoop):
             case RobotFailed(why, unsupported, elsewhere):
                 refusal = TooLargeError if elsewhere else UnsupportedError
                 self._note_failure(name, why, refusal if unsupported else None)
-            case Objection() | LostFrames() if not self.events.may_report_others(name):
-                pass
-            case Objection(who, what, why):
-                self.events.refuse(who, what, f"{why} (reported by {name})")
-            case LostFrames():
-                self._frame_loss.note_between(name, message)
+            case Objection() | LostFrames():
+                self._handle_report_on_others(name, message)
+            case Promised():
+                self.votes.note_promise(name, message)
+            case Accepted():
+                self.votes.note_acceptance(name, message)
             case Bye():
                 self._dismiss(name, member)
             case _:
@@ -434,6 +541,14 @@ class Master(MasterLoop):
             member.left = True
         else:
             self._lose(name, "it has left before the end of the run", for_good=True)
+
+    def _handle_report_on_others(self, name: str, report: Objection | LostFrames) -> None:
+        if not self.events.may_report_others(name):
+            return
+        if isinstance(report, LostFrames):
+            self._frame_loss.note_between(name, report)
+        else:
+            self.events.refuse(report.who, report.what, f"{report.why} (reported by {name})")
 
     def _note_failure(self, name: str, why: str, refusal: type[UnsupportedError] | None = None) -> None:
         """Record that the robot `name` cannot continue, if there is a `why`. A `refusal` ends the run."""
@@ -458,5 +573,8 @@ class Master(MasterLoop):
             return
         self.events.lost(name, why)
         self.state.lose(name, why)
+        self.votes.check_majority(
+            [n for n, member in self.members.robots.items() if member.away_since is None and n not in self.state.lost]
+        )
         if not self._settings.survive or not self.members.closed:
             raise RobotsLostError({name: why})

@@ -18,7 +18,7 @@ from robochoc.communication.network.inbox import Inbox, Item
 from robochoc.communication.network.journal_server import JournalServer, Publication
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.quotas import OBSERVER_SHARE, ROBOT_SHARE, Share
-from robochoc.communication.network.router import Refusal, RefusalObserver, Router
+from robochoc.communication.network.router import CLOSED_EARLY, Refusal, RefusalObserver, Router
 from robochoc.communication.network.settings import PATIENCE_S, NetworkSettings
 from robochoc.communication.network.transport import Transport
 
@@ -95,6 +95,11 @@ class ConnectionPolicy:
     def is_robot(self, name: str) -> bool:
         """Return whether `name` is enrolled as a robot, and not only as an observer."""
         return name in self._admission.names(Role.ROBOT)
+
+    @property
+    def has_other_masters(self) -> bool:
+        """True if several masters are enrolled."""
+        return len(self._admission.names(Role.MASTER)) > 1
 
     def share_of(self, name: str) -> Share:
         """Return the quota for messages from `name` at the master."""
@@ -213,5 +218,7 @@ class MasterConnection:
 
     def _note_refusal(self, refusal: Refusal) -> None:
         """Report a refusal by the router, unless the identity has meanwhile been admitted and will try again."""
+        if refusal.why == CLOSED_EARLY and self.policy.has_other_masters:  # robots look whether a master listens
+            return
         if refusal.what != "connect" or not self.policy.admits(refusal.who):
             self._events.refuse(*refusal)

@@ -10,7 +10,7 @@ import msgspec
 from robochoc.communication.network.plausibility import Doubt
 from robochoc.communication.network.quotas import EVENTS_A_SECOND, REPORTS_A_SECOND, Allowance
 from robochoc.communication.network.refusals import Refusals
-from robochoc.journal.events import AnyEvent, DroppedOut, Granted, Lost, Observer, Refused, Registered, actor
+from robochoc.journal.events import AnyEvent, DroppedOut, Granted, Leads, Lost, Observer, Refused, Registered, actor
 
 
 class MasterEvents:
@@ -43,6 +43,10 @@ class MasterEvents:
     def lost(self, robot: str, why: str) -> None:
         """Report that `robot` is lost."""
         self._report(Lost(t=self._now, robot=robot, why=why))
+
+    def leads(self, master: str, term: int, why: str) -> None:
+        """Report that this master leads the team in a term."""
+        self._report(Leads(t=self._now, master=master, term=term, why=why))
 
     def granted(self, who: str, what: str) -> None:
         """Report that the participant `who` was granted `what`."""

@@ -54,6 +54,7 @@ class Member:
         unconfirmed: True if the robot was absent since its last message, and may have been restarted.
         asked: Variables that were requested from the robot.
         left: True if the robot has confirmed that the run is over.
+        since: The time of the registration, on the monotonic clock.
     """
 
     profile: Profile
@@ -65,6 +66,7 @@ class Member:
     unconfirmed: bool = False
     asked: set[str] = field(default_factory=set)
     left: bool = False
+    since: float = field(default_factory=time.monotonic)
 
     @property
     def robot(self) -> Robot:
@@ -112,6 +114,8 @@ class NetworkMembers:
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._dropped: set[str] = set()
         """Robots that were registered, have dropped out, and have not returned."""
+        self._given_up: set[str] = set()
+        """Robots that the team does not wait for."""
         self._over: set[str] = set()
         """Incarnations that have ended. If one of them continues nevertheless, its frames have unexpected numbers."""
 
@@ -167,7 +171,18 @@ class NetworkMembers:
     @property
     def awaited(self) -> set[str]:
         """The names of known robots that have not yet registered."""
-        return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
+        return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys() - self._given_up
+
+    def expect(self, team: Collection[str]) -> dict[str, str]:
+        """Allow only the robots in `team`. Remove all others, and return their incarnations."""
+        self.expected, self.number = frozenset(team), None
+        others = {name: member.incarnation for name, member in self.robots.items() if name not in team}
+        self.remove(others)
+        return others
+
+    def give_up(self, names: Collection[str]) -> None:
+        """Do not wait for robots that do not come."""
+        self._given_up.update(names)
 
     @property
     def waited_for(self) -> list[str]:
@@ -234,7 +249,9 @@ class NetworkMembers:
         for name, member in self.robots.items():
             looked_at = [one for names in member.profile.looks_at.values() for one in names]
             for variable in (*member.profile.wants, *looked_at):
-                if owners.get(variable) not in {name, *member.profile.neighbours}:
+                owner = owners.get(variable)
+                is_absent = owner is None and self._given_up
+                if owner not in {name, *member.profile.neighbours} and not is_absent:
                     yield f"{name} has a constraint over {variable}, which is not a variable of a neighbour"
 
     def _owners(self) -> dict[str, str]:

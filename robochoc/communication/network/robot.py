@@ -8,6 +8,7 @@ patience.
 
 from __future__ import annotations
 
+import math
 import secrets
 import time
 import traceback
@@ -30,17 +31,21 @@ from robochoc.communication.network.control_messages import (
     DirectoryAnswer,
     DomainAnswer,
     DomainRequest,
+    Heartbeat,
     Joined,
     JournalAnswer,
+    Lead,
     Leave,
     LostFrames,
     Objection,
+    Propose,
     ProtocolMessage,
     Recall,
     Register,
     RegistrationDenied,
     Revoked,
     SearchTask,
+    StandbyAnswer,
     StartSearch,
     ToMaster,
     ToPeer,
@@ -48,10 +53,12 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Opened
 from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
+from robochoc.communication.network.masters import Masters
 from robochoc.communication.network.profile import profile_of, ranges_of, restrict_to_team
 from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.robot_settings import DEFAULT_SETTINGS, RobotSettings
+from robochoc.communication.network.robot_votes import RobotVotes, VotesError
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.communication.network.secure_channel import SecureChannel
 from robochoc.communication.network.transport import Transport
@@ -68,12 +75,16 @@ _INCARNATION_BYTES = 8
 
 
 class RunOverError(RobochocError):
-    """Raised when the run is over for this robot. `failed`: the run was not completed."""
+    """Raised when the run is over for this robot.
 
-    def __init__(self, why: str, *, failed: bool) -> None:
+    `failed`: the run was not completed. `elsewhere`: another master may complete it.
+    """
+
+    def __init__(self, why: str, *, failed: bool, elsewhere: bool = False) -> None:
         super().__init__(why)
         self.why = why
         self.failed = failed
+        self.elsewhere = elsewhere
 
 
 class Registration:
@@ -119,7 +130,8 @@ class Registration:
             self.welcome = welcome
             return True
         if welcome.run != self.welcome.run:
-            raise RunOverError("the master was restarted: restart this robot as well", failed=True)
+            why = "the master was restarted: restart this robot as well"
+            raise RunOverError(why, failed=True, elsewhere=True)
         return False
 
     def check_link(self) -> None:
@@ -159,11 +171,13 @@ class Ending(NamedTuple):
         why: The reason sent by the master, or the reason why the robot ended by itself.
         failed: True if the run was not completed.
         assignment: The values that the robot has decided on.
+        elsewhere: True if another master may complete the run.
     """
 
     why: str
     failed: bool
     assignment: dict[str, int]
+    elsewhere: bool = False
 
 
 class NetworkRobot:
@@ -175,6 +189,8 @@ class NetworkRobot:
         transport: The robot's connection to the router.
         protocol_named: Finds the protocol that the master requests; raises `LookupError`.
         settings: The owner's settings of the robot.
+        votes: The robot's votes for masters (None: they are stored in memory).
+        masters: The masters that the robot knows (None: only the one that it is connected to).
     """
 
     def __init__(
@@ -184,14 +200,19 @@ class NetworkRobot:
         transport: Transport,
         protocol_named: Callable[[str], type[Protocol]],
         settings: RobotSettings = DEFAULT_SETTINGS,
+        votes: RobotVotes | None = None,
+        masters: Masters | None = None,
     ) -> None:
+        self._votes = votes or RobotVotes()
+        self._masters = masters or Masters([""], settings.patience_s)
         self._own = own
         self._robot = own.robot
         self._transport = transport
         self._protocol_named = protocol_named
         self._settings = settings
         self._channel = SecureChannel(own.robot.name, identity)
-        self._registration = Registration(own.robot.name, transport, settings.patience_s, self._register)
+        patience_s = math.inf if self._masters.several else settings.patience_s  # `Masters` has its own
+        self._registration = Registration(own.robot.name, transport, patience_s, self._register)
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
         """Frames for an epoch whose task this robot has not yet received."""
@@ -202,14 +223,20 @@ class NetworkRobot:
 
     def run(self) -> Ending:
         """Register, and participate until the end."""
+        self._masters.start()
         try:
             self._registration.send()
             while True:
                 self._turn(self._items())
         except RunOverError as over:
-            return Ending(
-                on_one_line(over.why, LONGEST_REASON), over.failed, self._searcher.assignment if self._searcher else {}
-            )
+            self._remember_values()
+            why = on_one_line(over.why, LONGEST_REASON)
+            has_searched = self._searcher is not None or over.failed
+            values = self._decided if has_searched else self._votes.values  # found under an earlier master
+            return Ending(why, over.failed, values, over.elsewhere and self._masters.several)
+        except VotesError as unusable:
+            self._fail(RobotFailed(on_one_line(str(unusable), LONGEST_REASON)))
+            return Ending(str(unusable), failed=True, assignment={})
         except UnsupportedError as refusal:
             why = on_one_line(str(refusal), LONGEST_REASON)
             self._fail(RobotFailed(why, unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
@@ -219,6 +246,15 @@ class NetworkRobot:
             why = on_one_line(f"{type(error).__name__}: {error} ({where.filename}:{where.lineno})", LONGEST_REASON)
             self._fail(RobotFailed(why))
             return Ending(why, failed=True, assignment={})
+
+    @property
+    def _decided(self) -> dict[str, int]:
+        return self._searcher.assignment if self._searcher else {}
+
+    def _remember_values(self) -> None:
+        """Store the robot's values for the next master."""
+        if self._registration.welcome is not None:
+            self._votes.remember(self._registration.welcome.run, self._decided)
 
     # The loop
 
@@ -237,6 +273,8 @@ class NetworkRobot:
         for item in items:
             match item:
                 case FrameArrived(sender, content):
+                    if sender == MASTER:
+                        self._masters.hear()
                     self._read(sender, content, packet)
                 case FramesLost(sender, frames) if sender == MASTER:
                     raise UnsupportedError(f"{frames:,} frames from the master to {self._robot.name} were lost")
@@ -244,6 +282,7 @@ class NetworkRobot:
                     self._report_lost_frames(sender, frames)
                 case FramesLost() | PresenceChanged() | WakeUp():
                     pass
+        self._check_master()
         if self._searcher:
             self._searcher.receive(packet)
         if items:
@@ -252,6 +291,13 @@ class NetworkRobot:
             self._searcher.report_idle()
         else:
             self._registration.check_link()
+
+    def _check_master(self) -> None:
+        """Look for another master if the present one is silent. Raises `RunOverError`."""
+        if self._masters.other_listens():
+            raise RunOverError("the master is silent, and another one listens", failed=True, elsewhere=True)
+        if self._masters.is_over:
+            raise RunOverError(self._masters.failure, failed=True)
 
     def _report_lost_frames(self, sender: str, frames: int) -> None:
         """Report lost frames to the master, once per search. The master decides whether the run can continue."""
@@ -332,7 +378,8 @@ class NetworkRobot:
             case Welcome():
                 self._enter(order)
             case RegistrationDenied(incarnation, why) if incarnation == self._registration.incarnation:
-                raise RunOverError(f"the master does not admit {self._robot.name}: {why}", failed=True)
+                self._masters.note_refusal(why)
+                raise RunOverError(f"the master does not admit {self._robot.name}: {why}", failed=True, elsewhere=True)
             case DomainRequest(variables):
                 domains = {variable.name: variable.domain for variable in self._robot.variables}
                 self._send_to_master(
@@ -340,9 +387,18 @@ class NetworkRobot:
                 )
             case Revoked(name):
                 self._channel.revoke(name)
-            case Leave(why, failed):
+            case Leave(why, failed, elsewhere):
                 self._send_to_master(Bye())
-                raise RunOverError(why, failed=failed)
+                self._masters.note_refusal(why)
+                raise RunOverError(why, failed=failed, elsewhere=elsewhere)
+            case Lead() if self._registration.welcome:
+                self._remember_values()
+                self._send_to_master(self._votes.promise(order, private=self._registration.welcome.private))
+            case Propose():
+                self._remember_values()
+                self._send_to_master(self._votes.accept(order))
+            case Heartbeat() | StandbyAnswer():
+                pass
             case RegistrationDenied() | DirectoryAnswer() | JournalAnswer():
                 pass
             case _:
@@ -378,7 +434,7 @@ class NetworkRobot:
                 self._send_to_master(searcher.check_constraints(values, snapshot))
             case Adopt(epoch, number, why) if epoch == searcher.epoch:
                 searcher.adopt(number, published=bool(why))
-                if why:
+                if why and not self._votes.several:  # else a majority must accept the decision first
                     self._settings.decided(on_one_line(why, LONGEST_REASON), searcher.assignment)
             case _:
                 self._refuse_order(order)
@@ -387,7 +443,7 @@ class NetworkRobot:
         self._object(MASTER, f"{type(order).__name__} is not expected now")
 
     def _register(self, incarnation: str) -> None:
-        self._send_to_master(Register(profile_of(self._robot), incarnation))
+        self._send_to_master(Register(profile_of(self._robot), incarnation, self._votes.standing))
 
     def _enter(self, welcome: Welcome) -> None:
         """Join the run. Welcomes are repeated after an outage; a restarted master sends a welcome to another run."""

@@ -23,6 +23,7 @@ class RobotSettings:
         set_rank: Called before each search with the robot's index in the priority order, and the number of robots.
         stage: Called with a short text on the robot's progress.
         decided: Called with the verdict in words and the robot's values when the team has a decision but continues.
+        lost_master: Called with the address of a master, and the reason why the robot looks for another one.
         compiled: Compiles the robot's domain again if the robot must disclose more variables than expected.
     """
 
@@ -31,6 +32,7 @@ class RobotSettings:
     set_rank: Callable[[int, int], None] = _ignore
     stage: Callable[[str], None] = _ignore
     decided: Callable[[str, Mapping[str, int]], None] = _ignore
+    lost_master: Callable[[str, str], None] = _ignore
     compiled: CompileRobot = compile_domain
 
 

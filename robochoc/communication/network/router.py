@@ -48,6 +48,7 @@ _KNOWN = re.compile(rb"CertCommonName\(([^)]*)\)\S*\+([0-9a-f]+) is unauthorized
 _ACCEPTED = re.compile(rb"zenoh_link_tls::unicast: Accepted TLS connection [^\n]*Common Name: ([^\n]*)\.\n")
 _TLS = re.compile(rb"WARN [^\n]*zenoh_link_tls::unicast: ([^\n]*)")
 _HINT = re.compile(r"\. Hint: .*$")
+CLOSED_EARLY = "it has closed the connection during the handshake"
 _MEANINGS = {
     "invalid peer certificate: UnknownIssuer": "its certificate was not issued by this Authority",
     "invalid peer certificate: certificate expired": "its certificate has expired",
@@ -56,7 +57,7 @@ _MEANINGS = {
     "peer sent no certificates": "it has sent no certificate",
     "received corrupt message": "it does not speak TLS",
     "received fatal alert: UnknownCA": "it does not trust the master, which its Authority has not certified",
-    "tls handshake eof": "it has closed the connection during the handshake",
+    "tls handshake eof": CLOSED_EARLY,
 }
 """The meanings of zenoh's texts for refused connections. The first match counts."""
 _KEPT_SESSIONS = 10_000

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from robochoc.authority.enrolment import EnrolmentError, NotReachableError, enrol, renew
 from robochoc.authority.identity import Identity, IdentityError, default_identity_folder
 from robochoc.authority.names import check_member_name
+from robochoc.communication.network.masters import Masters
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
-from robochoc.communication.network.transport import Transport
+from robochoc.communication.network.robot_votes import RobotVotes
+from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.formats import check_robot
 from robochoc.model.costs import UnboundedCostError, normalized_robot
 from robochoc.model.problem import Robot
@@ -24,6 +27,8 @@ from robochoc.solver.errors import UnsupportedError
 PATIENCE_S = 30.0
 """The longest time for which the master may be unreachable, in seconds."""
 _TRY_AGAIN_S = 0.5
+VOTES = "votes.json"
+"""The file of a robot's votes for masters, in the folder of its identity."""
 
 
 def identity_of(
@@ -82,13 +87,15 @@ def _normalized(robot: Robot) -> Robot:
         raise UnsupportedError(f"{error}; the domains of other robots are not known across machines") from None
 
 
-def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettings, compiler: Compiler) -> Ending:
-    """Participate in one run of a master, as the robot `robot`.
+def join(
+    robot: Robot, places: Sequence[Address], identity: Identity, settings: RobotSettings, compiler: Compiler
+) -> Ending:
+    """Participate in one run, as the robot `robot`. If its master is gone, follow the next master that leads.
 
     Args:
         robot: The robot, as read from its file.
-        place: The address of the master.
-        identity: The robot's identity.
+        places: The addresses of the masters, by priority.
+        identity: The robot's identity. With several masters, the robot's votes are stored in its folder.
         settings: The settings of the robot.
         compiler: Compiles the robot's domain.
 
@@ -106,6 +113,21 @@ def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettin
     settings.stage("compiling")
     settings = replace(settings, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, settings.compiled)
-    settings.stage(f"searching for the master at {place}")
-    with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as transport:
-        return NetworkRobot(own, identity, transport, protocol_or_stage, settings).run()
+    masters = Masters(list(map(str, places)), settings.patience_s)
+    votes = RobotVotes(identity.folder / VOTES if masters.several else None, several=masters.several)
+    while True:
+        place = masters.current
+        settings.stage(f"searching for the master at {place}")
+        try:
+            with Transport(place, identity, watch=(), patience_s=masters.attempt_s) as transport:
+                ending = NetworkRobot(own, identity, transport, protocol_or_stage, settings, votes, masters).run()
+        except CannotConnectError:
+            if not masters.several:
+                raise
+        else:
+            if not ending.elsewhere:
+                return ending
+            settings.lost_master(place, ending.why)
+        masters.leave()
+        if masters.is_over:
+            raise CannotConnectError(masters.failure)

@@ -6,21 +6,25 @@ Section 5.2: "The master waits for the confirmation of creation all agents befor
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import field, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from robochoc.authority.admission import Admission
 from robochoc.authority.authority import Authority
 from robochoc.authority.enrolment_server import EnrolmentServer
-from robochoc.authority.identity import Identity
+from robochoc.authority.identity import Identity, IdentityError
+from robochoc.communication.network.control_messages import TeamDecision
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master import Master
+from robochoc.communication.network.master_votes import NoMajorityError, SupersededError
 from robochoc.communication.network.members import NetworkMembers
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.search_result import Progress, RobotsLostError
+from robochoc.formats.result import ResultError, read_result, result_json
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
@@ -32,8 +36,10 @@ from robochoc.run.compatibility.team_rules import refuse_unfit
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.improvement import Audience
+from robochoc.run.incumbent import merged_values
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
+from robochoc.run.networked.standby import LeaderWatch, StandbyPlan
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_or_stage
 from robochoc.run.starts import start_of_outcome
@@ -70,6 +76,8 @@ class MasterPlan:
         messages: A limit on the number of messages (None: no limit).
         message_loss: The probability with which robots drop received messages.
         start: The outcome from whose assignment the robots begin (None: they begin without an assignment).
+        standby: The masters with a higher priority, and this master's identity (None: it has the highest priority).
+        following: Called whenever a standby master begins to follow another master.
         conditions: The network settings.
     """
 
@@ -90,6 +98,8 @@ class MasterPlan:
     messages: int | None = None
     message_loss: float = 0.0
     start: Outcome | None = None
+    standby: StandbyPlan | None = None
+    following: Callable[[], None] = lambda: None
     conditions: NetworkSettings = NetworkSettings()
 
     def options(self, protocol: str) -> Options:
@@ -154,29 +164,74 @@ def run_master(
         UnsupportedError: if the options cannot be combined with each other or with the team.
         UnknownProtocolError: if the protocol is not installed.
         RefutedError: if a check refutes the answer.
+        RunOverElsewhereError: if this is a standby master, and another master has ended the run.
     """
     _refuse_early(plan)
-    authority = Authority.open(plan.authority)
     hosts = [*([] if plan.place.anywhere else [plan.place.host]), *plan.hosts]
     called = [host for host in hosts if ":" not in host]
     if not called:
         why = "means all addresses" if plan.place.anywhere else "has no name that zenoh can check"
         raise UnsupportedError(f"{plan.place} {why}; name the host by which robots connect: --host NAME")
-    endpoint = str(plan.place._replace(host=called[0]))
-    identity = authority.master_identity(hosts)
     conditions = replace(
         plan.conditions, protocol="" if plan.protocol in {None, AUTO} else plan.protocol, listen=str(plan.place)
     )
-    members = NetworkMembers(plan.names, plan.number)
-    master = Master(
-        authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
-    )
+
+    def opened(admission: Admission, identity: Identity) -> Master:
+        endpoint = str(plan.place._replace(host=called[0]))
+        members = NetworkMembers(plan.names, plan.number)
+        master = Master(
+            admission, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
+        )
+        if publication:
+            master.publish(publication)
+        return master
+
+    observers = observer, audience
+    if plan.standby is not None:
+        _refuse_other_hosts(plan.standby.identity, hosts)
+        return _stand_by(plan, plan.standby, opened, lambda master: _run(plan, master, observers, concluded), listening)
+    authority = Authority.open(plan.authority)
+    identity = authority.master_identity(hosts)
+    master = opened(authority, identity)
     authority.observer = master.events.relay
-    if publication:
-        master.publish(publication)
     with _enrolling(authority, identity, plan.place), master:
         listening()
-        return _run(plan, master, (observer, audience), concluded)
+        return _run(plan, master, observers, concluded)
+
+
+def _refuse_other_hosts(identity: Identity, hosts: Sequence[str]) -> None:
+    """Raise `IdentityError` if robots would not accept a standby master at one of `hosts`."""
+    if unknown := [host for host in hosts if host not in identity.hosts]:
+        known = ", ".join(identity.hosts) or "no address"
+        raise IdentityError(
+            f"{identity.name} is certified for {known}, not for {', '.join(unknown)}: enrol it again, with"
+            f" robochoc authority enrol {identity.name} --role master --host {unknown[0]}"
+        )
+
+
+def _stand_by(
+    plan: MasterPlan,
+    standby: StandbyPlan,
+    opened: Callable[[Admission, Identity], Master],
+    run: Callable[[Master], MasterResult],
+    listening: Callable[[], None],
+) -> MasterResult:
+    """Lead the run as soon as no master with a higher priority leads. Follow a master that returns before the search.
+
+    Raises `RunOverElsewhereError` and the errors of `run`.
+    """
+    with LeaderWatch(standby) as watch:
+        while True:
+            plan.following()
+            watch.wait()
+            master = opened(watch.admission, standby.identity)
+            master.is_superseded = lambda: watch.is_led
+            with master:
+                listening()
+                try:
+                    return run(master)
+                except SupersededError:
+                    continue
 
 
 @contextmanager
@@ -201,10 +256,15 @@ def _run(
     """Run the search after the master has started to listen, and send the outcome to the robots."""
     try:
         led = _solve(plan, master, *observers)
+    except SupersededError:
+        master.leave("a master with a higher priority leads", failed=True, elsewhere=True)
+        raise
     except BaseException as error:
         failure = isinstance(error, RobotsLostError | UnsupportedError | RefutedError | TeamIncompleteError)
+        is_final = failure and not isinstance(error, NoMajorityError)
         concluded(None)
-        master.leave(f"the run was broken off: {error if failure else 'the master has stopped'}", failed=True)
+        why = f"the run was broken off: {error if failure else 'the master has stopped'}"
+        master.leave(why, failed=True, elsewhere=not is_final)
         raise
     concluded(led.outcome)
     master.leave(_in_words(led.outcome))
@@ -216,6 +276,14 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = first_names(master.members.waited_for) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; missing: {names}")
+    if master.votes.is_needed and plan.improve is not None:
+        raise UnsupportedError(
+            "--improve publishes answers before a majority has accepted them: remove it,"
+            " or give the robots only one master"
+        )
+    decided = master.elect()
+    if decided is not None:
+        return _repeat(plan, master, decided)
     team = registered_team(master, plan.name)
     options = choose_for_private_team(team, plan.options(plan.protocol or AUTO)).options
     if plan.start is not None:
@@ -226,7 +294,11 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
     name, protocol = options.protocol, protocol_or_stage(options.protocol)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
+    if known := _last_values(master, team):
+        options = replace(options, start=known)
     machines = Machines(master, options, plan.name, observer, audience)
+    if master.absent:
+        machines.remove(master.absent)
     header = Outcome(
         Verdict.UNKNOWN,
         team=plan.name,
@@ -237,8 +309,35 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
         symbolic=symbolic_variables(team),
         chosen=dict(options.chosen),
     )
-    outcome = claimed(solve_distributed(machines, protocol, header))
+    outcome = _led(master, claimed(solve_distributed(machines, protocol, header)))
+    bare = replace(outcome, assignment={}, epochs=(), improvements=(), optima=None)
+    master.confirm(TeamDecision(master.run, result_json(bare).decode(), _in_words(outcome)))
     return MasterResult(outcome, machines.team_seen())
+
+
+def _led(master: Master, outcome: Outcome) -> Outcome:
+    """Return `outcome` with the master that led, if robots know several masters."""
+    return replace(outcome, led_by=master.votes.name, term=master.votes.term) if master.votes.is_needed else outcome
+
+
+def _last_values(master: Master, team: Team) -> dict[str, int | None]:
+    """Return the values that the robots had under the previous master, from which their search begins again."""
+    known = set(team.variables)
+    values = {name: value for own in master.votes.values().values() for name, value in own.items() if name in known}
+    return dict(values)
+
+
+def _repeat(plan: MasterPlan, master: Master, decided: TeamDecision) -> MasterResult:
+    """Publish the decision that an earlier master may have published, with the values that the robots have stored."""
+    master.confirm(decided)
+    values = merged_values({name: dict(own) for name, own in master.votes.values(decided.run).items()})
+    try:
+        outcome = read_result(decided.outcome.encode())
+    except ResultError as bad:
+        raise UnsupportedError(f"robots have stored an invalid decision: {bad}") from None
+    lost = tuple(sorted({*outcome.lost, *master.absent}))
+    outcome = _led(master, replace(outcome, assignment=values, lost=lost))
+    return MasterResult(outcome, registered_team(master, plan.name))
 
 
 def _refuse_early(plan: MasterPlan) -> None:

@@ -1,0 +1,148 @@
+"""A robot's votes for masters, stored in a file before they are sent. See `leadership.py`."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from pathlib import Path
+
+import msgspec
+
+from robochoc.communication.network.control_messages import (
+    Accepted,
+    AcceptedDecision,
+    Lead,
+    Promised,
+    Propose,
+    Standing,
+    TeamDecision,
+)
+from robochoc.communication.network.leadership import Acceptance, Term, Votes
+from robochoc.system.errors import RobochocError
+from robochoc.system.files import write_atomically
+
+KEPT_S = 7 * 24 * 3600.0
+"""The time for which votes are stored, in seconds. A mission ends earlier, since certificates expire."""
+_PRIVATE = 0o600
+
+
+class VotesError(RobochocError):
+    """Raised if the file of a robot's votes cannot be used."""
+
+
+class _Record(msgspec.Struct, frozen=True):
+    """The stored votes in a mission, with the robot's last values, and the Unix time of the last change."""
+
+    team: tuple[str, ...]
+    promised: Term
+    accepted: AcceptedDecision | None
+    run: str
+    values: dict[str, int]
+    changed: float
+
+
+class _Content(msgspec.Struct, frozen=True):
+    missions: dict[str, _Record] = {}
+
+
+class RobotVotes:
+    """The votes of one robot.
+
+    Attributes:
+        mission: The mission in which this process of the robot takes part; empty before its first promise.
+        several: True if the robot knows several masters.
+
+    Args:
+        file: Stores the votes (None: they are stored only in memory, which suffices for robots that do not restart).
+        several: True if the robot knows several masters.
+    """
+
+    def __init__(self, file: Path | None = None, *, several: bool = False) -> None:
+        self.mission = ""
+        self.several = several
+        self._file = file
+        self._team: tuple[str, ...] = ()
+        self._votes = Votes[TeamDecision]()
+        self._values: tuple[str, dict[str, int]] = ("", {})
+
+    @property
+    def standing(self) -> Standing | None:
+        """The part of the votes for the registration, or None if the robot knows only one master."""
+        return Standing(self.mission, self._team, self._votes.promised) if self.several else None
+
+    @property
+    def values(self) -> dict[str, int]:
+        """The robot's last values."""
+        return self._values[1]
+
+    def remember(self, run: str, values: Mapping[str, int]) -> None:
+        """Store the robot's values in the run `run`, unless there are none."""
+        if values:
+            self._values = run, dict(values)
+
+    def promise(self, order: Lead, *, private: bool) -> Promised:
+        """Answer the request of a master to lead. Raises `VotesError`."""
+        if order.mission != self.mission:
+            self._join(order)
+        votes = self._votes.promise(order.term)
+        if votes is not None:
+            self._store(votes)
+        run, values = ("", {}) if private else self._values
+        return Promised(order.term, self._votes.promised, self._accepted, run, values)
+
+    def accept(self, order: Propose) -> Accepted:
+        """Answer a proposal. Raises `VotesError`."""
+        votes = self._votes.accept(order.term, order.decision)
+        if votes is not None:
+            self._store(votes)
+        return Accepted(order.term, self._votes.promised)
+
+    @property
+    def _accepted(self) -> AcceptedDecision | None:
+        accepted = self._votes.accepted
+        return None if accepted is None else AcceptedDecision(accepted.term, accepted.decision)
+
+    def _join(self, order: Lead) -> None:
+        """Take part in another mission, with the votes that were stored for it."""
+        known = self._read().missions.get(order.mission)
+        self.mission, self._team, self._votes = order.mission, order.team, Votes()
+        if known is not None:
+            accepted = None if known.accepted is None else Acceptance(*known.accepted)
+            self._team, self._votes = known.team, Votes(known.promised, accepted)
+            self._values = self._values if self.values else (known.run, known.values)
+
+    def _store(self, votes: Votes[TeamDecision]) -> None:
+        self._votes = votes
+        if self._file is None:
+            return
+        now = time.time()
+        recent = {name: one for name, one in self._read().missions.items() if abs(now - one.changed) < KEPT_S}
+        recent[self.mission] = _Record(self._team, votes.promised, self._accepted, *self._values, now)
+        try:
+            write_atomically(self._file, msgspec.json.encode(_Content(recent)), _PRIVATE)
+            _sync(self._file)
+            _sync(self._file.parent)
+        except OSError as error:
+            raise VotesError(f"{self._file}: the robot's votes cannot be stored: {error.strerror or error}") from error
+
+    def _read(self) -> _Content:
+        if self._file is None:
+            return _Content()
+        try:
+            return msgspec.json.decode(self._file.read_bytes(), type=_Content)
+        except FileNotFoundError:
+            return _Content()
+        except OSError as error:
+            raise VotesError(f"{self._file} cannot be read: {error.strerror or error}") from error
+        except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
+            raise VotesError(f"{self._file} is damaged: {error}; enrol this robot again under another name") from error
+
+
+def _sync(path: Path) -> None:
+    """Write a file or folder to the disk, so that votes outlast a power failure."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
