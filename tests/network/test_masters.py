@@ -28,7 +28,7 @@ from robochoc.communication.network.standbys import CopiedAdmission, Standbys
 
 A, B, C = (f"127.0.0.1:{port}" for port in (7447, 7457, 7467))
 FIRST, SECOND = Term(1, "a"), Term(2, "b")
-DECISION = TeamDecision("a", "{}", "solution")
+DECISION = TeamDecision("a", ("RA", "RB"), "{}", "solution")
 TEAM = ("RA", "RB", "RC")
 
 
@@ -103,15 +103,17 @@ def test_votes_outlast_the_process(tmp_path: Path) -> None:
     assert robot.standing == Standing()
     robot.remember("a", {"X": 1})
     order = Lead(FIRST, "m", TEAM)
-    assert robot.promise(order, private=False) == Promised(FIRST, FIRST, None, "a", {"X": 1})
+    assert robot.promise(order, private=False) == Promised(FIRST, FIRST, None, {"a": {"X": 1}})
     assert robot.standing == Standing("m", TEAM, FIRST)
     assert robot.accept(Propose(FIRST, DECISION)) == Accepted(FIRST, FIRST)
     assert stat.S_IMODE(file.stat().st_mode) == 0o600
     again = RobotVotes(file, several=True)
     assert again.standing == Standing(), "only the master knows whether the mission goes on"
     accepted = AcceptedDecision(FIRST, DECISION)
-    assert again.promise(Lead(SECOND, "m", TEAM), private=True) == Promised(SECOND, SECOND, accepted, "", {})
-    assert again.values == {"X": 1}
+    assert again.promise(Lead(SECOND, "m", TEAM), private=True) == Promised(SECOND, SECOND, accepted, {})
+    assert (again.decided("RA"), again.decided("RC")) == ({"X": 1}, {}), "RC was lost"
+    again.remember("b", {"X": 2})
+    assert again.decided("RA") == {"X": 1}, "found in another run"
     assert again.accept(Propose(FIRST, DECISION)) == Accepted(FIRST, SECOND)
     assert again.promise(Lead(FIRST, "m", TEAM), private=True).promised == SECOND
 
@@ -148,7 +150,7 @@ def test_a_master_counts_votes() -> None:
     for name in ("RA", "RB"):
         with pytest.raises(NoMajorityError, match="of 3 robots are for this master, and a decision needs 2"):
             votes.check_promises()
-        votes.note_promise(name, Promised(FIRST, FIRST, None, "", {}))
+        votes.note_promise(name, Promised(FIRST, FIRST, None, {}))
     votes.check_promises()
     assert votes.inherited is None
     assert votes.propose(DECISION) == Propose(FIRST, DECISION)
@@ -170,12 +172,12 @@ def test_a_later_master_learns_the_mission_from_robots() -> None:
     assert "another master has started" in votes.admit(Standing("n", TEAM, FIRST), closed=False)
     assert votes.start(["RA", "RB"]) == Lead(SECOND, "m", TEAM)
     accepted = AcceptedDecision(FIRST, DECISION)
-    votes.note_promise("RA", Promised(SECOND, SECOND, accepted, "a", {"X": 1}))
-    votes.note_promise("RB", Promised(SECOND, SECOND, None, "older", {"Y": 2}))
+    votes.note_promise("RA", Promised(SECOND, SECOND, accepted, {"a": {"X": 1}}))
+    votes.note_promise("RB", Promised(SECOND, SECOND, None, {"a": {"Y": 2}, "c": {"Y": 3}}))
     assert votes.inherited == DECISION
-    assert votes.values("a") == {"RA": {"X": 1}}
-    assert votes.values() == {"RA": {"X": 1}, "RB": {"Y": 2}}
-    assert votes.propose(TeamDecision("b", "", "unknown")) == Propose(SECOND, DECISION)
+    assert votes.decided_values(DECISION) == {"RA": {"X": 1}, "RB": {"Y": 2}}
+    assert votes.last_values == {"RA": {"X": 1}, "RB": {"Y": 3}}
+    assert votes.propose(TeamDecision("b", (), "", "unknown")) == Propose(SECOND, DECISION)
 
 
 def test_a_closed_team_admits_no_robots_of_another() -> None:

@@ -45,11 +45,13 @@ class TeamDecision(NamedTuple):
 
     Attributes:
         run: The run of the master that has found the decision.
+        robots: The robots whose values in that run are the decision; the others were lost.
         outcome: The outcome without values, as JSON.
         words: The outcome in a few words.
     """
 
     run: str
+    robots: tuple[str, ...]
     outcome: str
     words: str
 
@@ -93,14 +95,13 @@ class Register(_Message, frozen=True):
 class Promised(_Message, frozen=True):
     """The answer to `Lead`: the robot's latest promise, and the decision that it has accepted before, if any.
 
-    `values` are the robot's last values, found in the run `run`; they are empty in private runs.
+    `values` are the robot's last values in each run of the mission, the latest run last; empty in private runs.
     """
 
     term: Term
     promised: Term
     accepted: AcceptedDecision | None
-    run: str
-    values: dict[str, int]
+    values: dict[str, dict[str, int]]
 
 
 class Accepted(_Message, frozen=True):

@@ -57,7 +57,7 @@ from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.communication.network.master_votes import MasterVotes, SupersededError
-from robochoc.communication.network.masters import HEARTBEAT_S
+from robochoc.communication.network.masters import HEARTBEAT_S, SILENCE_S
 from robochoc.communication.network.members import Member, NetworkMembers, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.settings import NetworkSettings
@@ -574,7 +574,7 @@ class Master(MasterLoop):
         self.events.lost(name, why)
         self.state.lose(name, why)
         self.votes.check_majority(
-            [n for n, member in self.members.robots.items() if member.away_since is None and n not in self.state.lost]
+            [n for n, one in self.members.robots.items() if n not in self.state.lost and not one.is_away(SILENCE_S)]
         )
         if not self._settings.survive or not self.members.closed:
             raise RobotsLostError({name: why})

@@ -7,7 +7,7 @@ team from the robots. Pure.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 
 from robochoc.communication.network.control_messages import (
     Accepted,
@@ -55,7 +55,7 @@ class MasterVotes:
         self.leadership: Leadership[TeamDecision] | None = None
         self._run = run
         self._seen: set[Term] = {NO_TERM}
-        self._values: dict[str, tuple[str, Mapping[str, int]]] = {}
+        self._values: dict[str, dict[str, dict[str, int]]] = {}
 
     @property
     def term(self) -> int | None:
@@ -95,7 +95,7 @@ class MasterVotes:
     def note_promise(self, name: str, answer: Promised) -> None:
         """Record a robot's promise. Raises `NoMajorityError` if it has promised a later term."""
         leadership = self._led(name, answer.term, answer.promised)
-        self._values[name] = answer.run, answer.values
+        self._values[name] = answer.values
         self.leadership = leadership.note_promise(
             name, None if answer.accepted is None else Acceptance(*answer.accepted)
         )
@@ -113,9 +113,14 @@ class MasterVotes:
             raise AssertionError
         return Propose(self.leadership.term, self.leadership.proposed)
 
-    def values(self, run: str = "") -> dict[str, Mapping[str, int]]:
-        """Return the robots' last values, by robot; only those found in `run`, if it is given."""
-        return {name: values for name, (found, values) in self._values.items() if values and run in {"", found}}
+    @property
+    def last_values(self) -> dict[str, dict[str, int]]:
+        """The robots' values in their latest run, by robot."""
+        return {name: next(reversed(found.values())) for name, found in self._values.items() if found}
+
+    def decided_values(self, decision: TeamDecision) -> dict[str, dict[str, int]]:
+        """Return the robots' values in a decision, by robot, as far as the robots have voted for this master."""
+        return {name: self._values.get(name, {}).get(decision.run, {}) for name in decision.robots}
 
     @property
     def inherited(self) -> TeamDecision | None:

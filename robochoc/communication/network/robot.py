@@ -231,9 +231,9 @@ class NetworkRobot:
         except RunOverError as over:
             self._remember_values()
             why = on_one_line(over.why, LONGEST_REASON)
-            has_searched = self._searcher is not None or over.failed
-            values = self._decided if has_searched else self._votes.values  # found under an earlier master
-            return Ending(why, over.failed, values, over.elsewhere and self._masters.several)
+            values = None if over.failed else self._votes.decided(self._robot.name)
+            elsewhere = over.elsewhere and self._masters.several
+            return Ending(why, over.failed, self._decided if values is None else values, elsewhere)
         except VotesError as unusable:
             self._fail(RobotFailed(on_one_line(str(unusable), LONGEST_REASON)))
             return Ending(str(unusable), failed=True, assignment={})

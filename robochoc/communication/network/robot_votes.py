@@ -24,6 +24,8 @@ from robochoc.system.files import write_atomically
 
 KEPT_S = 7 * 24 * 3600.0
 """The time for which votes are stored, in seconds. A mission ends earlier, since certificates expire."""
+MOST_RUNS = 16
+"""The maximum number of runs of a mission whose values a robot stores."""
 _PRIVATE = 0o600
 
 
@@ -32,13 +34,12 @@ class VotesError(RobochocError):
 
 
 class _Record(msgspec.Struct, frozen=True):
-    """The stored votes in a mission, with the robot's last values, and the Unix time of the last change."""
+    """The stored votes in a mission, with the robot's values by run, and the Unix time of the last change."""
 
     team: tuple[str, ...]
     promised: Term
     accepted: AcceptedDecision | None
-    run: str
-    values: dict[str, int]
+    values: dict[str, dict[str, int]]
     changed: float
 
 
@@ -64,22 +65,28 @@ class RobotVotes:
         self._file = file
         self._team: tuple[str, ...] = ()
         self._votes = Votes[TeamDecision]()
-        self._values: tuple[str, dict[str, int]] = ("", {})
+        self._values: dict[str, dict[str, int]] = {}
+        """The robot's last values in each run, the latest run last."""
 
     @property
     def standing(self) -> Standing | None:
         """The part of the votes for the registration, or None if the robot knows only one master."""
         return Standing(self.mission, self._team, self._votes.promised) if self.several else None
 
-    @property
-    def values(self) -> dict[str, int]:
-        """The robot's last values."""
-        return self._values[1]
+    def decided(self, name: str) -> dict[str, int] | None:
+        """Return the values of the robot `name` in the decision that it has accepted, or None if there is none."""
+        if self._votes.accepted is None:
+            return None
+        decision = self._votes.accepted.decision
+        return self._values.get(decision.run, {}) if name in decision.robots else {}
 
     def remember(self, run: str, values: Mapping[str, int]) -> None:
         """Store the robot's values in the run `run`, unless there are none."""
         if values:
-            self._values = run, dict(values)
+            self._values.pop(run, None)
+            self._values[run] = dict(values)
+            if len(self._values) > MOST_RUNS:
+                del self._values[next(iter(self._values))]
 
     def promise(self, order: Lead, *, private: bool) -> Promised:
         """Answer the request of a master to lead. Raises `VotesError`."""
@@ -88,8 +95,7 @@ class RobotVotes:
         votes = self._votes.promise(order.term)
         if votes is not None:
             self._store(votes)
-        run, values = ("", {}) if private else self._values
-        return Promised(order.term, self._votes.promised, self._accepted, run, values)
+        return Promised(order.term, self._votes.promised, self._accepted, {} if private else dict(self._values))
 
     def accept(self, order: Propose) -> Accepted:
         """Answer a proposal. Raises `VotesError`."""
@@ -110,7 +116,7 @@ class RobotVotes:
         if known is not None:
             accepted = None if known.accepted is None else Acceptance(*known.accepted)
             self._team, self._votes = known.team, Votes(known.promised, accepted)
-            self._values = self._values if self.values else (known.run, known.values)
+            self._values = known.values | self._values
 
     def _store(self, votes: Votes[TeamDecision]) -> None:
         self._votes = votes
@@ -118,7 +124,7 @@ class RobotVotes:
             return
         now = time.time()
         recent = {name: one for name, one in self._read().missions.items() if abs(now - one.changed) < KEPT_S}
-        recent[self.mission] = _Record(self._team, votes.promised, self._accepted, *self._values, now)
+        recent[self.mission] = _Record(self._team, votes.promised, self._accepted, self._values, now)
         try:
             write_atomically(self._file, msgspec.json.encode(_Content(recent)), _PRIVATE)
             _sync(self._file)

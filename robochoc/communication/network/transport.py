@@ -8,6 +8,7 @@ runs callbacks in its own threads; they only put items into `inbox`.
 from __future__ import annotations
 
 import base64
+import threading
 import time
 from collections.abc import Callable, Iterable
 from contextlib import suppress
@@ -159,6 +160,10 @@ class Transport:
         """Close the connection. Pending frames are sent first, unless the link is dead."""
         with suppress(zenoh.ZError):  # the other end of a dead link does not answer
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+
+    def abandon(self) -> None:
+        """Close the connection in a thread. On a dead link, this takes 10 s."""
+        threading.Thread(target=self.close, name=f"close {self.name}", daemon=True).start()
 
     def __enter__(self) -> Self:
         return self

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
@@ -119,14 +120,18 @@ def join(
         place = masters.current
         settings.stage(f"searching for the master at {place}")
         try:
-            with Transport(place, identity, watch=(), patience_s=masters.attempt_s) as transport:
-                ending = NetworkRobot(own, identity, transport, protocol_or_stage, settings, votes, masters).run()
+            transport = Transport(place, identity, watch=(), patience_s=masters.attempt_s)
         except CannotConnectError:
             if not masters.several:
                 raise
         else:
-            if not ending.elsewhere:
-                return ending
+            with ExitStack() as closing:
+                closing.callback(transport.close)
+                ending = NetworkRobot(own, identity, transport, protocol_or_stage, settings, votes, masters).run()
+                if not ending.elsewhere:
+                    return ending
+                closing.pop_all()
+            transport.abandon()
             settings.lost_master(place, ending.why)
         masters.leave()
         if masters.is_over:

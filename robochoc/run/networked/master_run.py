@@ -311,7 +311,8 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
     )
     outcome = _led(master, claimed(solve_distributed(machines, protocol, header)))
     bare = replace(outcome, assignment={}, epochs=(), improvements=(), optima=None)
-    master.confirm(TeamDecision(master.run, result_json(bare).decode(), _in_words(outcome)))
+    there = tuple(name for name in master.members.order if name not in outcome.lost)
+    master.confirm(TeamDecision(master.run, there, result_json(bare).decode(), _in_words(outcome)))
     return MasterResult(outcome, machines.team_seen())
 
 
@@ -323,19 +324,19 @@ def _led(master: Master, outcome: Outcome) -> Outcome:
 def _last_values(master: Master, team: Team) -> dict[str, int | None]:
     """Return the values that the robots had under the previous master, from which their search begins again."""
     known = set(team.variables)
-    values = {name: value for own in master.votes.values().values() for name, value in own.items() if name in known}
+    values = {name: value for own in master.votes.last_values.values() for name, value in own.items() if name in known}
     return dict(values)
 
 
 def _repeat(plan: MasterPlan, master: Master, decided: TeamDecision) -> MasterResult:
     """Publish the decision that an earlier master may have published, with the values that the robots have stored."""
     master.confirm(decided)
-    values = merged_values({name: dict(own) for name, own in master.votes.values(decided.run).items()})
+    values = merged_values(master.votes.decided_values(decided))
     try:
         outcome = read_result(decided.outcome.encode())
     except ResultError as bad:
         raise UnsupportedError(f"robots have stored an invalid decision: {bad}") from None
-    lost = tuple(sorted({*outcome.lost, *master.absent}))
+    lost = tuple(sorted({*outcome.lost, *(name for name in decided.robots if name in master.absent)}))
     outcome = _led(master, replace(outcome, assignment=values, lost=lost))
     return MasterResult(outcome, registered_team(master, plan.name))
 

@@ -78,13 +78,21 @@ class _Follower:
     def _run(self) -> None:
         while not self._closed.wait(_CHECK_S):
             if listens(str(self._place)):
-                with (
-                    suppress(CannotConnectError),
-                    Transport(
+                with suppress(CannotConnectError):
+                    link = Transport(
                         str(self._place), self._identity, watch=(), senders=[MASTER], patience_s=_CONNECT_S
-                    ) as link,
-                ):
-                    self._follow(link)
+                    )
+                    try:
+                        self._follow(link)
+                    finally:
+                        self._close(link)
+
+    def _close(self, link: Transport) -> None:
+        """Close the connection, and send the last answer before, unless the link may be dead."""
+        if self.answered_at is not None and time.monotonic() - self.answered_at < SILENCE_S:
+            link.close()
+        else:
+            link.abandon()
 
     def _follow(self, link: Transport) -> None:
         """Ask until the master does not answer any more."""
