@@ -319,7 +319,15 @@ def solve_on_network(plan: Plan, network: VirtualNetwork, observer: Observer, au
     profiles = {robot.name: profile_of(robot) for robot in team.robots}
     ways = reach(profiles, writes_to_non_neighbours=protocol.traits.writes_to_non_neighbours)
     members = NetworkMembers(team.order, order=team.order, ways=ways)
-    master = Master(cast("Any", None), cast("Any", None), "", members, settings, observer=observer, watched=True)
+    master = Master(
+        cast("Any", None),
+        cast("Any", SimpleNamespace(name=MASTER)),
+        "",
+        members,
+        settings,
+        observer=observer,
+        watched=True,
+    )
     machines = {robot.name: VirtualMachine(network, compiled.robots[robot.name]) for robot in team.robots}
     for fault in plan.faults:
         if fault.robot in machines:
