@@ -150,16 +150,16 @@ def test_a_master_counts_votes() -> None:
     for name in ("RA", "RB"):
         with pytest.raises(NoMajorityError, match="of 3 robots are for this master, and a decision needs 2"):
             votes.check_promises()
-        votes.note_promise(name, Promised(FIRST, FIRST, None, {}))
+        assert votes.note(name, Promised(FIRST, FIRST, None, {})) == ""
     votes.check_promises()
     assert votes.inherited is None
     assert votes.propose(DECISION) == Propose(FIRST, DECISION)
-    votes.note_acceptance("RA", Accepted(FIRST, FIRST))
+    assert votes.note("RA", Accepted(FIRST, FIRST)) == ""
     with pytest.raises(NoMajorityError, match=r"1 of 3 robots are for the decision.*missing: RB, RC"):
         votes.check_acceptances()
-    with pytest.raises(NoMajorityError, match="RB follows another master in term 2, which is later than term 1"):
-        votes.note_acceptance("RB", Accepted(FIRST, SECOND))
-    votes.note_acceptance("RC", Accepted(FIRST, FIRST))
+    assert votes.note("RB", Accepted(FIRST, SECOND)) == "it has voted for another master in term 2"
+    assert votes.note("RB", Accepted(SECOND, SECOND)) == "it has voted in a term that this master did not ask for"
+    assert votes.note("RC", Accepted(FIRST, FIRST)) == ""
     votes.check_acceptances()
     with pytest.raises(NoMajorityError, match="1 of 3 robots are connected"):
         votes.check_majority(["RA", "stranger"])
@@ -172,8 +172,8 @@ def test_a_later_master_learns_the_mission_from_robots() -> None:
     assert "another master has started" in votes.admit(Standing("n", TEAM, FIRST), closed=False)
     assert votes.start(["RA", "RB"]) == Lead(SECOND, "m", TEAM)
     accepted = AcceptedDecision(FIRST, DECISION)
-    votes.note_promise("RA", Promised(SECOND, SECOND, accepted, {"a": {"X": 1}}))
-    votes.note_promise("RB", Promised(SECOND, SECOND, None, {"a": {"Y": 2}, "c": {"Y": 3}}))
+    votes.note("RA", Promised(SECOND, SECOND, accepted, {"a": {"X": 1}}))
+    votes.note("RB", Promised(SECOND, SECOND, None, {"a": {"Y": 2}, "c": {"Y": 3}}))
     assert votes.inherited == DECISION
     assert votes.decided_values(DECISION) == {"RA": {"X": 1}, "RB": {"Y": 2}}
     assert votes.last_values == {"RA": {"X": 1}, "RB": {"Y": 3}}

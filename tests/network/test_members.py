@@ -175,6 +175,19 @@ def looked_at() -> dict[str, Profile]:
     return {"A": upper, "B": lower}
 
 
+def test_the_team_of_an_earlier_master() -> None:
+    members = NetworkMembers(number=1)
+    join(members, RA, RC, incarnation="life")
+    assert members.expect([RA, RB]) == {RC: "life"}
+    assert set(members.robots) == {RA}
+    assert refused(members, RC, PROFILES[RC], "second") == "it is not a member of the team"
+    assert members.awaited == {RB, RC}
+    members.give_up([RB, RC])
+    assert members.complete
+    assert not members.unseen()
+    assert list(members.invalid_scopes()) == []
+
+
 def test_variables_that_a_parent_looks_at_are_shown() -> None:
     members = NetworkMembers()
     members.register("A", looked_at()["A"], "first")

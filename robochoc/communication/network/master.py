@@ -526,10 +526,8 @@ class Master(MasterLoop):
                 self._note_failure(name, why, refusal if unsupported else None)
             case Objection() | LostFrames():
                 self._handle_report_on_others(name, message)
-            case Promised():
-                self.votes.note_promise(name, message)
-            case Accepted():
-                self.votes.note_acceptance(name, message)
+            case Promised() | Accepted():
+                self._note_failure(name, self.votes.note(name, message))
             case Bye():
                 self._dismiss(name, member)
             case _:

@@ -92,17 +92,19 @@ class MasterVotes:
         self.leadership = Leadership(term, frozenset(self.team))
         return Lead(term, self.mission, self.team)
 
-    def note_promise(self, name: str, answer: Promised) -> None:
-        """Record a robot's promise. Raises `NoMajorityError` if it has promised a later term."""
-        leadership = self._led(name, answer.term, answer.promised)
+    def note(self, name: str, answer: Promised | Accepted) -> str:
+        """Record a robot's answer. Return why it is not a vote for this master, or an empty text."""
+        if self.leadership is None or answer.term != self.leadership.term:
+            return "it has voted in a term that this master did not ask for"
+        if answer.promised != answer.term:
+            return f"it has voted for another master in term {answer.promised.number}"
+        if isinstance(answer, Accepted):
+            self.leadership = self.leadership.note_acceptance(name)
+            return ""
         self._values[name] = answer.values
-        self.leadership = leadership.note_promise(
-            name, None if answer.accepted is None else Acceptance(*answer.accepted)
-        )
-
-    def note_acceptance(self, name: str, answer: Accepted) -> None:
-        """Record a robot's acceptance. Raises `NoMajorityError` if it has promised a later term."""
-        self.leadership = self._led(name, answer.term, answer.promised).note_acceptance(name)
+        accepted = None if answer.accepted is None else Acceptance(*answer.accepted)
+        self.leadership = self.leadership.note_promise(name, accepted)
+        return ""
 
     def propose(self, decision: TeamDecision) -> Propose:
         """Return the proposal of `decision`, or of the decision that an earlier master may have published."""
@@ -170,13 +172,3 @@ class MasterVotes:
                 f"{len(robots)} of {len(leadership.team)} robots are {what}, and a decision needs {leadership.needed},"
                 f" so that no other master can decide differently; missing: {', '.join(missing[:_NAMED])}{more}"
             )
-
-    def _led(self, name: str, term: Term, promised: Term) -> Leadership[TeamDecision]:
-        """Return the leadership that an answer belongs to. Raises `NoMajorityError` if a later master leads."""
-        if self.leadership is None or term != self.leadership.term:
-            raise NoMajorityError(f"{name} has voted in a term that this master did not ask for")
-        if promised != term:
-            raise NoMajorityError(
-                f"{name} follows another master in term {promised.number}, which is later than term {term.number}"
-            )
-        return self.leadership
