@@ -142,7 +142,7 @@ _SECTIONS: Sections = {
 @masters_option(
     "--standby",
     "leaders",
-    "Lead only if none of these masters leads. Give the options of the first master, and the next three.",
+    "Lead only if none of these masters leads. Requires --as, and the options of the first master.",
     required=False,
 )
 @click.option("--as", "own_name", metavar="NAME", help="Name of the standby master, enrolled with the role master.")
