@@ -44,7 +44,7 @@ LATEST_S = 4.0
 """The latest time of a fault, in seconds: after the start of the robots, or, in two of three trials, of the search."""
 GATHER_S, PATIENCE_S, ROBOT_PATIENCE_S = 20, 3, 12
 START_S, HANG_S, STEP_S = 60, 150, 0.05
-SEARCH = ("--protocol", "dsa", "--set", "cycles=300")
+SEARCH = ("--protocol", "dsa", "--set", "cycles=500")
 _NEWNET = 0x40000000
 
 
