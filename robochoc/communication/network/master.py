@@ -56,7 +56,7 @@ from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item,
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
-from robochoc.communication.network.master_votes import MasterVotes, SupersededError
+from robochoc.communication.network.master_votes import MasterVotes, NoMajorityError, SupersededError
 from robochoc.communication.network.masters import HEARTBEAT_S, SILENCE_S
 from robochoc.communication.network.members import Member, NetworkMembers, RegistrationRefusedError
 from robochoc.communication.network.profile import Profile
@@ -240,7 +240,7 @@ class Master(MasterLoop):
         """
         until = math.inf if deadline is None else deadline  # people start the robots
         self._serve_until(lambda: self.members.complete or self._is_gathered(), until)
-        if self.is_superseded():
+        if self._is_to_step_down:
             raise SupersededError("a master with a higher priority leads")
         unseen = self.members.unseen()
         while unseen and not is_past(deadline):
@@ -261,7 +261,7 @@ class Master(MasterLoop):
             RobotsLostError: if robots of another master's team do not come, and the run does not survive that.
             NoMajorityError: if fewer than a majority of this team has come.
         """
-        if self.is_superseded():
+        if self._is_to_step_down:
             return True
         missing = sorted(set(self.votes.team) - self.members.robots.keys())
         last = max((member.since for member in self.members.robots.values()), default=None)
@@ -276,6 +276,11 @@ class Master(MasterLoop):
         self.absent |= dict.fromkeys(missing, why)
         self.members.give_up(missing)
         return self.members.complete
+
+    @property
+    def _is_to_step_down(self) -> bool:
+        """True if a master with a higher priority leads, and no robot here has left its run."""
+        return not self.votes.mission and self.is_superseded()
 
     def elect(self) -> TeamDecision | None:
         """Obtain the votes of a majority of the team, if robots know several masters.
@@ -400,8 +405,7 @@ class Master(MasterLoop):
 
         `elsewhere`: another master may complete the run, if robots know one.
         """
-        elsewhere = elsewhere and self.votes.is_needed
-        leave, until = Leave(why, failed, elsewhere), time.monotonic() + farewell_s
+        leave, until = Leave(why, failed, elsewhere and self.votes.is_needed), time.monotonic() + farewell_s
         if elsewhere:
             self._standbys.resign()
         else:
@@ -499,6 +503,8 @@ class Master(MasterLoop):
         member = self.members.robots.get(sender)
         match opened.message:
             case Register(profile, incarnation, standing):
+                if member and standing and self._has_left(member, incarnation, standing):
+                    raise NoMajorityError(f"{sender} has left this master for another one, which begins a later term")
                 if self._registrar.register(sender, profile, incarnation, standing) and self._progress:
                     elapsed_s, number = time.monotonic() - self._began, len(self.members.robots)
                     self._progress(Progress(0, elapsed_s, f"{number} robots registered"))
@@ -539,6 +545,11 @@ class Master(MasterLoop):
             member.left = True
         else:
             self._lose(name, "it has left before the end of the run", for_good=True)
+
+    def _has_left(self, member: Member, incarnation: str, standing: Standing) -> bool:
+        """Return whether the robot of `member` has left this master's search, and registers again."""
+        is_here = bool(standing.mission) and standing.mission == self.votes.mission
+        return self.members.closed and is_here and incarnation != member.incarnation
 
     def _handle_report_on_others(self, name: str, report: Objection | LostFrames) -> None:
         if not self.events.may_report_others(name):

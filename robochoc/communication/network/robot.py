@@ -273,8 +273,6 @@ class NetworkRobot:
         for item in items:
             match item:
                 case FrameArrived(sender, content):
-                    if sender == MASTER:
-                        self._masters.hear()
                     self._read(sender, content, packet)
                 case FramesLost(sender, frames) if sender == MASTER:
                     raise UnsupportedError(f"{frames:,} frames from the master to {self._robot.name} were lost")
@@ -336,6 +334,8 @@ class NetworkRobot:
         message, epoch = opened.message, self._searcher.epoch if self._searcher else 0
         if not isinstance(message, ToPeer):
             self._channel.accept(sender, opened.number)
+            if not isinstance(message, RegistrationDenied | Leave):
+                self._masters.hear()
             self._obey(message)
         elif message.epoch > epoch:
             self._keep(sender, opened, message, epoch)
