@@ -16,7 +16,6 @@ from robochoc.journal.recorder import interfaces_given
 from robochoc.journal.team_events import TeamReader
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import INFINITE, Team
-from robochoc.robots.sink import Fields
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.run.recording import objective_to_record
@@ -58,7 +57,11 @@ class CancellableDecision:
             finally:
                 self._set_team("")
 
-    def cancel(self, _: Fields) -> dict[str, Any]:
+    def send_feedback_to(self, send: SendFeedback | None) -> None:
+        """Send the feedback on later decisions to `send`; None: send no feedback."""
+        self._send_text = send
+
+    def cancel(self, _: object = None) -> dict[str, Any]:
         """Cancel the current decision; return the answer to the request `std_srvs/Trigger_Request`.
 
         The decision ends with the best known assignment, as if its time were over, and its request is then answered.

@@ -22,11 +22,13 @@ CANCEL_GOAL = "action_msgs/CancelGoal"
 EMPTY = "uint8 structure_needs_at_least_one_member\n"
 """The field that ROS 2 adds to a structure without fields."""
 
-DECIDE_SERVICE = """\
+_DECIDE_REQUEST = """\
 string team
 string changes
 float64 timeout
 ---
+"""
+_DECIDE_ANSWER = """\
 bool success
 string message
 string verdict
@@ -35,6 +37,19 @@ string[] variables
 int64[] values
 string[] withdrawn
 string result
+"""
+DECIDE_SERVICE = _DECIDE_REQUEST + _DECIDE_ANSWER
+DECIDE_ACTION = f"""\
+{_DECIDE_REQUEST}{_DECIDE_ANSWER}---
+string team
+string state
+float64 elapsed
+uint64 messages
+uint32 robots
+uint32 decided
+string cost
+string[] variables
+int64[] values
 """
 _GROUP_HEIGHT = "uint8 group_mask\nfloat32 height\nbuiltin_interfaces/Duration duration\n---\n"
 _SERVICES: Mapping[str, str] = MappingProxyType(
@@ -105,6 +120,7 @@ def _actions(ros: str) -> Mapping[str, str]:
     result = _NAVIGATE_RESULTS.get(ros, "uint16 error_code\nstring error_msg\n")
     errors = "" if ros in _TRACKING_ERRORS else "float32 position_tracking_error\nfloat32 heading_tracking_error\n"
     return {
+        "robochoc_msgs/Decide": DECIDE_ACTION,
         "nav2_msgs/NavigateToPose": (
             f"geometry_msgs/PoseStamped pose\nstring behavior_tree\n---\n{result}---\n"
             "geometry_msgs/PoseStamped current_pose\n"

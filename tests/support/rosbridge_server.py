@@ -190,7 +190,7 @@ class Handler(WebSocketHandler):
             case "service_response":
                 number, caller = server.calls.pop(message["id"])
                 caller.send(json.dumps({**message, "id": number}))
-            case "send_action_goal" | "cancel_action_goal":
+            case operation if "action" in operation:
                 server.goals.append(message)
             case "call_service" if manner.answers_services:
                 answer = {"op": "service_response", "id": message["id"], "service": message["service"]}

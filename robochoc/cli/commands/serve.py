@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
@@ -18,10 +18,13 @@ from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, in
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
+    from robochoc.ros.live.action_goals import ActionGoals
     from robochoc.ros.live.services import ImmediateServices, Refuse, ServiceRequest, Services
 
 _SERVICE, _CANCEL, _FEEDBACK = "/robochoc/decide", "/robochoc/cancel", "/robochoc/feedback"
 _TEXT = "std_msgs/String"
+_GOAL = f"{_SERVICE} (goal)"
+"""The name of the requests that goals of the action become."""
 _MIDDLEWARES: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
         "dds": ("dds_service", "DdsServices"),
@@ -31,6 +34,8 @@ _MIDDLEWARES: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """For each kind of middleware: its module in `robochoc.ros.live`, and its class in that module."""
+_WITH_SERVICE_GOALS = frozenset({"dds", "rmw_zenoh"})
+"""The kinds of middleware over which an action consists of services and topics."""
 _SLICE_S = 0.2
 """The interval at which signals are handled, in seconds."""
 
@@ -73,9 +78,10 @@ def serve(
     feedback: bool,
     **given: Any,  # noqa: ANN401 - options of the run
 ) -> None:
-    """Solve teams on request: a ROS 2 service, for behaviour trees and other nodes. Only rclpy requires ROS here.
+    """Solve teams on request: a ROS 2 service and action, for behaviour trees and other nodes. Only rclpy requires ROS.
 
-    A request to /robochoc/decide (robochoc_msgs/srv/Decide) contains a team's name and changes to its problem. Each
+    A request to /robochoc/decide (robochoc_msgs/srv/Decide) contains a team's name and changes to its problem. The
+    action /robochoc/decide (robochoc_msgs/action/Decide; not with rclpy) also has feedback, and can be cancelled. Each
     team also has /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other;
     /robochoc/cancel (std_srvs/srv/Trigger) ends the current decision.
 
@@ -89,7 +95,9 @@ def serve(
     teams = _teams(paths)
     from robochoc.robots.connections import missing_packages_of
     from robochoc.robots.decision import CancellableDecision
-    from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
+    from robochoc.ros.decide_action import DecideAction
+    from robochoc.ros.decide_service import DECIDE, TRIGGER, DecideService, refusal
+    from robochoc.ros.live.action_goals import ActionGoals
     from robochoc.ros.names import ros_name
     from robochoc.run.options import Options
 
@@ -106,22 +114,37 @@ def serve(
         with suppress(Exception):  # an error in the feedback must not end the decision
             offered.publish(_FEEDBACK, _TEXT, {"data": text})
 
-    decision = CancellableDecision(publish_feedback if feedback else None)
+    also = publish_feedback if feedback else None
+    decision = CancellableDecision(also)
     decider = DecideService(teams, decision, options)
-    with ros_errors_as_failures(), _opened(kind, where, services, refusal, {_CANCEL: decision.cancel}) as offered:
+    goals = ActionGoals(_GOAL, decision.cancel, refusal)
+    action = DecideAction(decider, decision, goals, also)
+    with ros_errors_as_failures(), _opened(kind, where, services, {_CANCEL: decision.cancel}, goals) as offered:
         if feedback:
             offered.announce(_FEEDBACK, _TEXT)
-        for name, service in services.items():
-            is_offered = name not in offered.lacking
-            text = SERVICES[service] if is_offered else f"not offered: {SERVICES[service]} is not installed here"
-            click.echo(f"{offered.where}: {name} ({text})", err=True)
-        if feedback:
-            click.echo(f"{offered.where}: {_FEEDBACK} (a topic, {_TEXT})", err=True)
+        _list_offered(offered, services, feedback=feedback, action=goals.clients is not None)
         for request in _requests(offered, requests):
+            if request.name == _GOAL:
+                click.echo(f"{_GOAL}: {action.run(request)}", err=True)
+                continue
             team = triggers.get(request.name)
             answer = decider.decide(request.fields) if team is None else decider.trigger(team)
             offered.reply(request, answer)
             click.echo(f"{request.name}: {answer['message']}", err=True)
+
+
+def _list_offered(offered: Services, services: Mapping[str, str], *, feedback: bool, action: bool) -> None:
+    """Print the names and types of the services, of the action and of the topic."""
+    from robochoc.ros.decide_service import SERVICES
+
+    for name, service in services.items():
+        is_offered = name not in offered.lacking
+        text = SERVICES[service] if is_offered else f"not offered: {SERVICES[service]} is not installed here"
+        click.echo(f"{offered.where}: {name} ({text})", err=True)
+    if action:
+        click.echo(f"{offered.where}: {_SERVICE} (an action, robochoc_msgs/action/Decide)", err=True)
+    if feedback:
+        click.echo(f"{offered.where}: {_FEEDBACK} (a topic, {_TEXT})", err=True)
 
 
 def _requests(offered: Services, most: int | None) -> Iterator[ServiceRequest]:
@@ -134,15 +157,34 @@ def _requests(offered: Services, most: int | None) -> Iterator[ServiceRequest]:
             yielded += 1
 
 
+@contextmanager
 def _opened(
-    kind: str, place: str, services: Mapping[str, str], refuse: Refuse, immediate: ImmediateServices
-) -> Services:
-    """Return the services offered through the middleware `kind`. Raises `SinkError`."""
+    kind: str, place: str, services: Mapping[str, str], immediate: ImmediateServices, goals: ActionGoals
+) -> Iterator[Services]:
+    """Provide the services and the action offered through the middleware `kind`. Raises `SinkError`."""
+    from robochoc.ros.decide_service import DECIDE, refusal
+    from robochoc.ros.live.service_goals import ServiceGoals
+
     module, name = _MIDDLEWARES[kind]
     factory: Callable[[str, Mapping[str, str], Refuse, ImmediateServices], Services] = getattr(
         import_module(f"robochoc.ros.live.{module}"), name
     )
-    return factory(place, services, refuse, immediate)
+    clients = ServiceGoals(_SERVICE, DECIDE, goals) if kind in _WITH_SERVICE_GOALS else None
+    if clients is not None:
+        services, immediate = {**services, **clients.services}, {**immediate, **clients.handlers}
+    with factory(place, services, refusal, immediate) as offered:
+        if clients is not None:
+            clients.attach(offered)
+            goals.clients = clients
+        else:
+            offered.offer_action(_SERVICE, DECIDE, goals)
+        goals.set_queue(offered.put)
+        try:
+            yield offered
+        finally:
+            goals.close()
+            if clients is not None:
+                clients.wait_for_requests()
 
 
 def _teams(paths: Sequence[Path]) -> list[Team]:

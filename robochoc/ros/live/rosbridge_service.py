@@ -8,7 +8,9 @@ from functools import partial
 from typing import Any
 
 from robochoc.robots.sink import Fields, SinkError
+from robochoc.ros.live.action_goals import ActionGoals
 from robochoc.ros.live.rosbridge_connection import Connection, MalformedMessageError, incoming, outgoing
+from robochoc.ros.live.rosbridge_goals import RosbridgeGoals
 from robochoc.ros.live.services import ImmediateServices, Refuse, ServiceRequest, Services, known_fields
 
 
@@ -27,6 +29,7 @@ class RosbridgeServices(Services):
     ) -> None:
         super().__init__(services, refuse, immediate)
         self._topics: dict[str, Any] = {}
+        self._action: RosbridgeGoals | None = None
         self._connection = Connection(place, SinkError)
         self.where = f"rosbridge at {self._connection.url}"
         for name, kind in services.items():
@@ -54,9 +57,15 @@ class RosbridgeServices(Services):
         if not self._connection.ended.is_set() and not self._connection.is_ahead():
             self._topics[topic].publish(outgoing(fields))
 
+    def offer_action(self, name: str, kind: str, goals: ActionGoals) -> None:
+        """Offer the action `name` of the type `kind`, such as `robochoc_msgs/Decide`."""
+        goals.clients = self._action = RosbridgeGoals(name, kind, goals, self._connection)
+
     def close(self) -> None:
         """Refuse the waiting requests, stop offering services, and end the connection."""
         try:
+            if self._action is not None:
+                self._action.stop()
             self._refuse_waiting()
             self._connection.stop_serving(self._kinds)
             with suppress(SinkError):  # a lost server needs no answer

@@ -8,10 +8,13 @@ from __future__ import annotations
 import queue
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Collection, Mapping
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 from robochoc.robots.sink import Fields
 from robochoc.ros.message_types import types_of
+
+if TYPE_CHECKING:
+    from robochoc.ros.live.action_goals import ActionGoals
 
 WAITING_MAX = 16
 """The size of the queue of requests. Requests beyond it are refused at once."""
@@ -19,8 +22,6 @@ ENDED = "the service has ended"
 
 Refuse = Callable[[str], Fields]
 """Returns the fields of an answer that refuses a request for a given reason."""
-ImmediateServices = Mapping[str, Callable[[Fields], Fields]]
-"""The services, by name, that are answered in the receiving thread, even while other requests wait."""
 
 
 class ServiceRequest(NamedTuple):
@@ -29,6 +30,12 @@ class ServiceRequest(NamedTuple):
     name: str
     fields: Fields
     client: Any
+
+
+ImmediateServices = Mapping[str, Callable[[ServiceRequest], Fields | None]]
+"""The services, by name, that are answered in the receiving thread, even while other requests wait. A service that
+returns None answers later, by `Services.reply`.
+"""
 
 
 class Services(ABC):
@@ -60,12 +67,23 @@ class Services(ABC):
             self.check()
             return None
 
+    def put(self, request: ServiceRequest) -> bool:
+        """Put a request into the queue, in any thread; return False if the queue is full."""
+        try:
+            self._waiting.put_nowait(request)
+        except queue.Full:
+            return False
+        return True
+
     def check(self) -> None:  # noqa: B027 - some middlewares have no connection
         """Raise `SinkError` if no further requests can arrive."""
 
     @abstractmethod
     def reply(self, request: ServiceRequest, fields: Fields) -> None:
         """Answer `request`."""
+
+    def offer_action(self, name: str, kind: str, goals: ActionGoals) -> None:  # noqa: B027 - most middlewares cannot
+        """Offer an action, if the middleware has operations for actions; otherwise `goals` remains without clients."""
 
     @abstractmethod
     def announce(self, topic: str, kind: str) -> None:
@@ -83,11 +101,10 @@ class Services(ABC):
         """Answer a request at once or put it into the queue; called in a thread of the middleware."""
         immediate = self._immediate.get(request.name)
         if immediate is not None:
-            self.reply(request, immediate(request.fields))
-            return
-        try:
-            self._waiting.put_nowait(request)
-        except queue.Full:
+            answer = immediate(request)
+            if answer is not None:
+                self.reply(request, answer)
+        elif not self.put(request):
             self._refuse_now(request, f"{WAITING_MAX} requests are already waiting; try again later")
 
     def _refuse_waiting(self) -> None:
@@ -97,7 +114,8 @@ class Services(ABC):
                 request = self._waiting.get_nowait()
             except queue.Empty:
                 return
-            self._refuse_now(request, ENDED)
+            if request.name in self._kinds:  # the goals of actions are ended elsewhere
+                self._refuse_now(request, ENDED)
 
     def _refuse_now(self, request: ServiceRequest, why: str) -> None:
         """Refuse `request` without waiting."""
