@@ -14,10 +14,13 @@ from tests.support.program import ROOT
 
 
 class PlayedRobots:
-    """Enter it to have the robots run; `place` is `dds:DOMAIN` or `rmw_zenoh:HOST:PORT`."""
+    """Enter it to have the robots run; `place` is `dds:DOMAIN` or `rmw_zenoh:HOST:PORT`.
 
-    def __init__(self, place: str, manners: dict[str, str]) -> None:
-        words = [sys.executable, "-m", "tests.support.played_nav2", place, json.dumps(manners)]
+    With the program `played_crazyflies`, they are the drones of a server of Crazyswarm2.
+    """
+
+    def __init__(self, place: str, manners: dict[str, str], program: str = "played_nav2") -> None:
+        words = [sys.executable, "-m", f"tests.support.{program}", place, json.dumps(manners)]
         self._program = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT)
         self._lines: Queue[Any] = Queue()
         self.events: list[Any] = []

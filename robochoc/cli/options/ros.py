@@ -149,7 +149,7 @@ flight_options = _all_of(
 arm_option = click.option(
     "--arm",
     is_flag=True,
-    help="Let vehicles of mavlink: and crazyflie: fly.",
+    help="Let vehicles of mavlink:, crazyflie: and crazyswarm2: fly.",
 )
 
 improve_option = click.option(
@@ -250,7 +250,7 @@ def pop_ros_options(settings: dict[str, Any]) -> RosOptions:
     if not sinks:
         refuse_given(PUBLISHED, asked, NOT_PUBLISHED)
     if arm and not sinks:
-        raise click.UsageError("--arm requires --ros mavlink:FILE or --ros crazyflie:FILE")
+        raise click.UsageError("--arm requires --ros mavlink:FILE, crazyflie:FILE or crazyswarm2:FILE")
     flight = {name: given[name] for name in _SIMULATED if name in asked}
     frame = given["frame"] or FRAME
     return RosOptions(

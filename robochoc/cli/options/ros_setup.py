@@ -82,7 +82,8 @@ def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
     able = [sink for sink in sinks if sink.arms]
     if not able:
         raise click.UsageError(
-            f"--arm requires --ros mavlink:FILE or --ros crazyflie:FILE; {', '.join(texts)} cannot arm vehicles"
+            "--arm requires --ros mavlink:FILE, crazyflie:FILE or crazyswarm2:FILE; "
+            f"{', '.join(texts)} cannot arm vehicles"
         )
     for sink in able:
         sink.allow_arming()

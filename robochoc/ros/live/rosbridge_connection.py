@@ -302,6 +302,9 @@ def _encoded(name: str, value: object) -> object:
         case int() if name == "stamp":
             seconds, rest = divmod(value, _BILLION)
             return {"secs": seconds, "nsecs": rest}
+        case int() if name == "duration":  # only in services of ROS 2
+            seconds, rest = divmod(value, _BILLION)
+            return {"sec": seconds, "nanosec": rest}
         case _:
             return value
 

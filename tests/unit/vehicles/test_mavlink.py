@@ -99,10 +99,10 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
 @looped(
     ("words", "told"),
     [
-        (["--arm"], "--arm requires --ros mavlink:FILE or --ros crazyflie:FILE"),
+        (["--arm"], "--arm requires --ros mavlink:FILE, crazyflie:FILE or crazyswarm2:FILE"),
         (
             ["--arm", "--ros", "mcap:run.mcap"],
-            "--arm requires --ros mavlink:FILE or --ros crazyflie:FILE; mcap:run.mcap cannot arm vehicles",
+            "--arm requires --ros mavlink:FILE, crazyflie:FILE or crazyswarm2:FILE; mcap:run.mcap cannot arm vehicles",
         ),
         (["--ros", "mavlink"], "mavlink: the fleet file is missing; name a fleet file, as in mavlink:fleet.yaml"),
         (["--ros", "mavlink:nowhere.yaml"], "nowhere.yaml: No such file or directory; name a fleet file"),
