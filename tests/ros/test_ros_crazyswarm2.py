@@ -110,8 +110,10 @@ def test_drones_fly_together_or_one_after_the_other() -> None:
     corner = (2.0, 2.0, 1.0)
     late = flights({"a": a, "b": b}, {"a": c, "b": corner}, 1.2)
     assert late == [{"b": corner}, {"a": c}]
-    with pytest.raises(TooCloseError, match="no order of straight flights keeps 1 m between a, b"):
+    with pytest.raises(TooCloseError, match="no order of straight flights keeps 1 m between a and b"):
         flights({"a": a, "b": b}, {"a": b, "b": a}, 1.0)
+    with pytest.raises(TooCloseError, match="the straight flight of a passes b, which stays in place"):
+        flights({"a": a, "b": b}, {"a": c}, 1.0)
     with pytest.raises(TooCloseError, match="the places of a and b are less than 1 m apart"):
         flights({"a": a, "b": b}, {"a": (1.5, 0.0, 1.0)}, 1.0)
 
@@ -185,6 +187,9 @@ class Swarm:
             self.clock[0] += 1.0
         return self.calls.sent[before:]
 
+    def is_busy(self) -> bool:
+        return self.commander.is_busy
+
     def phase(self, name: str) -> RobotPhase:
         return self.commander.robots[name].phase
 
@@ -202,10 +207,10 @@ def test_drones_take_off_fly_and_arrive(swarm: Swarm) -> None:
     swarm.fly(Nose=(2.0, 1.0, 1.0), Fin=(0.0, 0.0, 2.0))
     swarm.commander.poll(0)
     assert swarm.calls.sent == [("/nose/takeoff", 1.0), ("/fin/takeoff", 1.0)]
-    assert swarm.commander.is_busy
+    assert swarm.is_busy()
     assert swarm.finish() == [("/nose/go_to", (2.0, 1.0, 1.0)), ("/fin/go_to", (0.0, 0.0, 2.0))]
     assert [swarm.phase(name) for name in ("Nose", "Fin")] == [RobotPhase.ARRIVED] * 2
-    assert not swarm.commander.is_busy
+    assert not swarm.is_busy()
     swarm.fly(Nose=(2.0, 1.0, 1.0), Fin=(0.0, 1.0, 2.0))
     assert swarm.finish() == [("/fin/go_to", (0.0, 1.0, 2.0))]
     swarm.fly(Nose=(9.0, 9.0, -1.0))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from graphlib import CycleError, TopologicalSorter
 from itertools import combinations
 
 from robochoc.flight.layout import Point
@@ -36,15 +37,29 @@ def flights(places: Mapping[str, Point], targets: Mapping[str, Point], distance_
         return []
     if not any(_close_pairs(places, left, distance_m)):
         return [left]
-    here, found = dict(places), []
-    while left:
-        free = next((name for name, at in left.items() if not any(_close_pairs(here, {name: at}, distance_m))), None)
-        if free is None:
-            names = ", ".join(sorted(left))
-            raise TooCloseError(f"no order of straight flights keeps {distance_m:g} m between {names}")
-        here[free] = left[free]
-        found.append({free: left.pop(free)})
-    return found
+    try:
+        order = [*TopologicalSorter(_predecessors(places, left, distance_m)).static_order()]
+    except CycleError as error:
+        names = " and ".join(sorted({*error.args[1]}))
+        raise TooCloseError(f"no order of straight flights keeps {distance_m:g} m between {names}") from None
+    return [{name: left[name]} for name in order]
+
+
+def _predecessors(places: Mapping[str, Point], targets: Mapping[str, Point], distance_m: float) -> dict[str, list[str]]:
+    """Return for each drone with a target those that must fly before it. Raises `TooCloseError`."""
+    before: dict[str, list[str]] = {name: [] for name in targets}
+    for name, at in targets.items():
+        line = (places[name], at)
+        for other, place in places.items():
+            if other == name:
+                continue
+            if _least_distance(line, (place, place)) < distance_m - _SLACK_M:
+                if other not in targets:
+                    raise TooCloseError(f"the straight flight of {name} passes {other}, which stays in place")
+                before[name].append(other)
+            if other in targets and _least_distance(line, (targets[other],) * 2) < distance_m - _SLACK_M:
+                before[other].append(name)
+    return before
 
 
 def longest_m(places: Mapping[str, Point], targets: Mapping[str, Point]) -> float:
