@@ -149,7 +149,7 @@ flight_options = _all_of(
 arm_option = click.option(
     "--arm",
     is_flag=True,
-    help="Let vehicles of mavlink:, crazyflie: and crazyswarm2: fly.",
+    help="Let vehicles and drones fly.",
 )
 
 improve_option = click.option(
