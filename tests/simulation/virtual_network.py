@@ -129,7 +129,13 @@ class VirtualNetwork:
         if for_s > LEASE_S:
             self.system.at(self.now() + LEASE_S, lambda: self._arrive(MASTER, PresenceChanged(name, there=False)))
             if for_s < math.inf:
-                self.system.at(self.now() + for_s, lambda: self._arrive(MASTER, PresenceChanged(name, there=True)))
+                self.system.at(self.now() + for_s, lambda: self._return(name))
+
+    def _return(self, name: str) -> None:
+        """Let the router report that a robot is back, unless there is another reason for its absence."""
+        machine = self.robots[name]
+        if machine.is_alive and not (self.is_cut(name) or self.now() < machine.stopped_until):
+            self._arrive(MASTER, PresenceChanged(name, there=True))
 
     def lose(self, name: str, frames: int) -> None:
         """Lose the next frames of a robot."""
