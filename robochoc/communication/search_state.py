@@ -16,17 +16,12 @@ from robochoc.communication.search_result import SearchResult
 from robochoc.communication.search_watch import SnapshotRound
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
+from robochoc.system.plain_text import listed
 
 NO_TRAITS = Traits()
 _ASKED_ENOUGH = 2
 _AWAITED_S = 10.0
 """The time without changes after which the progress report names the robots that have not answered, in seconds."""
-_MOST_NAMED = 3
-
-
-def first_names(names: Sequence[str]) -> str:
-    """Return the first of these names as a text."""
-    return ", ".join(names[:_MOST_NAMED]) + ", ..." * (len(names) > _MOST_NAMED)
 
 
 class SearchState:
@@ -215,12 +210,12 @@ class SearchState:
     def describe_stall(self) -> str:
         """Return why the search can never continue. It must be stalled."""
         if self._unready:
-            return f"{first_names(self.unready)} cannot start: data from other robots were lost for good"
+            return f"{listed(self.unready)} cannot start: data from other robots were lost for good"
         return f"{self.counters.missing:,} messages between robots were lost for good"
 
     def awaited(self, now: float) -> str:
         """Return the names of the robots that have not answered, if nothing has changed for long; otherwise empty."""
-        return first_names(self.silent) if now - self._still_since > _AWAITED_S else ""
+        return listed(self.silent) if now - self._still_since > _AWAITED_S else ""
 
     def next_wave(self, *, wanted: bool = False) -> int | None:
         """Return the number of a wave to start now, or None.

@@ -168,11 +168,11 @@ def test_who_does_not_answer() -> None:
         state.handle(name, Ready(1))
     state.handle("RA", Counters(1, state.counters.start_wave(), 150, 3))
     state.note_end(1, in_time=False)
-    assert state.unfinished == "RB, RC have not answered the master"
+    assert state.unfinished == "RB and RC have not answered the master"
 
 
 def test_who_was_never_ready() -> None:
     state = begun()
     state.handle("RA", Ready(1))
     state.note_end(1, in_time=False)
-    assert state.unfinished.startswith("RB, RC have not answered the master")
+    assert state.unfinished.startswith("RB and RC have not answered the master")

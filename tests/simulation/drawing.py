@@ -50,12 +50,43 @@ def drawn_plan(seed: int) -> Plan:
     team = _team(like, traits, chance, changes=runtime != Runtime.NETWORK)
     options = _options(team, protocol, traits, runtime, chance)
     if runtime == Runtime.SIMULATOR:
-        return Plan(seed, team, options, tuple(_faults(HOUR_S, chance)), tick_s=10 ** chance.uniform(-4, 1.5))
+        plan = Plan(seed, team, options, tuple(_faults(HOUR_S, chance)), tick_s=10 ** chance.uniform(-4, 1.5))
+        return _with_environment(plan, chance)
     scale_s = chance.choice((0.01, 0.1, 1.0, 10.0) if runtime == Runtime.PROCESSES else (0.01, 0.1, 1.0, 3.0))
     faults = (*_faults(scale_s, chance), *_faults_of_robots(team, scale_s, chance))
     if runtime == Runtime.NETWORK:
         faults, options = _faults_of_network(team, options, faults, chance)
-    return Plan(seed, _named_files(team), options, faults, tick_s=1e-6, delay_s=scale_s * chance.random())
+    plan = Plan(seed, _named_files(team), options, faults, tick_s=1e-6, delay_s=scale_s * chance.random())
+    return _secured(plan, scale_s, chance) if runtime == Runtime.NETWORK else _with_environment(plan, chance)
+
+
+def _with_environment(plan: Plan, chance: Random) -> Plan:
+    """Return `plan`, sometimes with an environment in place of its scenario."""
+    if not plan.team.scenario or chance.random() < 0.5:
+        return plan
+    return _unless_refused(plan, replace(plan, environment=True))
+
+
+def _secured(plan: Plan, scale_s: float, chance: Random) -> Plan:
+    """Return `plan` with filters of messages, hidden values and revoked names, sometimes."""
+    if chance.random() < 0.15:
+        options = replace(plan.options, filters=chance.choice((("signed",), ("sealed",), ("signed", "sealed"))))
+        plan = _unless_refused(plan, replace(plan, options=options))
+    if chance.random() < 0.1:
+        plan = _unless_refused(plan, replace(plan, private=True))
+    if chance.random() < 0.1:
+        fault = Fault(FaultKind.REVOKE, chance.choice(plan.team.order), _moment(scale_s, chance))
+        plan = replace(plan, faults=(*plan.faults, fault))
+    return plan
+
+
+def _unless_refused(plan: Plan, changed: Plan) -> Plan:
+    """Return `changed`, or `plan` if the options of the former cannot be combined."""
+    try:
+        refuse_options(changed.options, environment=changed.environment, private=changed.private)
+    except UnsupportedError:
+        return plan
+    return changed
 
 
 # The problem

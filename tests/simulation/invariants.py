@@ -43,13 +43,15 @@ def violated(plan: Plan, outcome: Outcome) -> Iterator[Finding]:
         if set(now.order) != set(epoch.robots):
             yield Finding("epoch", f"epoch {number} has the robots {epoch.robots}, expected {now.order}")
         interrupted = limited or bool(epoch.lost) or events < len(plan.team.scenario)
-        for found in _Judge(now, plan.options, traits, limited=interrupted).faults(epoch):
+        for found in _Judge(now, plan, traits, limited=interrupted).faults(epoch):
             yield Finding(found.kind, f"epoch {number}: {found.detail}")
         events += not epoch.lost
+    if plan.private and outcome.assignment:
+        yield Finding("private", "the master knows values, although robots do not disclose them")
     last = team_after_events(plan.team, max(0, events - 1))
     present = outcome.epochs[-1].robots if outcome.epochs else last.order
     now = _with_robots(last, [name for name in present if name not in outcome.lost])
-    yield from _Judge(now, plan.options, traits, limited=limited).faults(outcome)
+    yield from _Judge(now, plan, traits, limited=limited).faults(outcome)
 
 
 def _in_spite_of(traitor: str, team: Team, outcome: Outcome) -> Iterator[Finding]:
@@ -90,9 +92,10 @@ def is_limited(options: Options) -> bool:
 class _Judge:
     """Compares an answer with the truth about `team`."""
 
-    def __init__(self, team: Team, options: Options, traits: Traits, *, limited: bool) -> None:
+    def __init__(self, team: Team, plan: Plan, traits: Traits, *, limited: bool) -> None:
         self._team = team
-        self._options = options
+        self._options = plan.options
+        self._is_private = plan.private
         self._traits = traits
         self._limited = limited
         self._truth = minimum_cost(team) if team.robots else 0.0
@@ -103,10 +106,17 @@ class _Judge:
         yield from self._of_verdict(answer)
         if answer.cost is not None or answer.assignment:
             yield from self._of_assignment(answer)
-        elif answer.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL} and self._team.robots and not answer.withdrawn:
+        elif (
+            answer.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}
+            and self._team.robots
+            and not self._may_be_empty(answer)
+        ):
             yield Finding("verdict", f"{answer.verdict} without an assignment")
         yield from self._of_bound(answer)
         yield from self._of_improvements(answer)
+
+    def _may_be_empty(self, answer: Answer) -> bool:
+        return bool(answer.withdrawn) or self._is_private
 
     def _of_verdict(self, answer: Answer) -> Iterator[Finding]:
         solvable = self._truth < INFINITE
@@ -122,7 +132,8 @@ class _Judge:
                 yield Finding("incomplete", f"unknown, although the protocol is complete: {answer.reason}")
             case _:
                 pass
-        if answer.verdict == Verdict.OPTIMAL and not own and self._has_costs and answer.cost != self._truth:
+        costs = self._has_costs and not self._is_private
+        if answer.verdict == Verdict.OPTIMAL and not own and costs and answer.cost != self._truth:
             yield Finding("optimum", f"optimal with the cost {answer.cost}, but the minimum is {self._truth}")
         if answer.confirmed and answer.verdict == Verdict.UNKNOWN:
             yield Finding("confirmed", "a confirmed unknown")

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from robochoc.communication.kill_schedule import Kill
 from robochoc.model.change import apply_changes
@@ -22,7 +22,7 @@ class FaultKind(StrEnum):
     robot's process ends. `STOP`: it stands still for `for_s` seconds. `SLOW`: each of its steps lasts `for_s` seconds.
     `PARTITION`: what the robot sends to others, or they to it, arrives only after `for_s` seconds. `GARBLE`: its
     message number `size` cannot be decoded. `LOSS`: the network loses its next `size` frames. `LIE`: it is a traitor,
-    with the lie number `size`.
+    with the lie number `size`. `REVOKE`: the Authority revokes its name.
     """
 
     CLOCK = "clock"
@@ -34,6 +34,7 @@ class FaultKind(StrEnum):
     GARBLE = "garble"
     LOSS = "loss"
     LIE = "lie"
+    REVOKE = "revoke"
 
 
 class Fault(NamedTuple):
@@ -62,7 +63,14 @@ class Reduction(NamedTuple):
 
 @dataclass(frozen=True)
 class Plan:
-    """One run. `tick_s`: the virtual seconds that pass with each look at the clock; `delay_s`: the longest delay."""
+    """One run.
+
+    Attributes:
+        tick_s: The virtual seconds that pass with each look at the clock.
+        delay_s: The longest delay of a message.
+        environment: True if an environment returns the events of the scenario, one after each answer.
+        private: True if robots do not disclose their values to the master.
+    """
 
     seed: int
     team: Team
@@ -70,6 +78,8 @@ class Plan:
     faults: tuple[Fault, ...] = ()
     tick_s: float = 1e-3
     delay_s: float = 0.0
+    environment: bool = False
+    private: bool = False
     reductions: tuple[Reduction, ...] = ()
 
     def has(self, *kinds: FaultKind) -> bool:
@@ -88,10 +98,17 @@ FIXED = frozenset({"protocol", "runtime", "seed", "cache"})
 """Options without which the run would be another one."""
 
 
+FLAGS = ("environment", "private")
+"""Attributes of a plan that are usually false."""
+
+
 def possible_reductions(plan: Plan) -> Iterator[Reduction]:
     """Yield everything that can be left out, large parts first."""
     for number, _ in reversed([*enumerate(plan.faults)]):
         yield Reduction("fault", "", number)
+    for name in FLAGS:
+        if getattr(plan, name):
+            yield Reduction("flag", name)
     for number, _ in reversed([*enumerate(plan.team.scenario)]):
         yield Reduction("event", "", number)
     for name in changed_options(plan.options).keys() - FIXED - {"settings"}:
@@ -125,6 +142,9 @@ def reduced(plan: Plan, reduction: Reduction) -> Plan:
             faults = (*faults[:number], *faults[number + 1 :])
         case "event":
             team = replace(team, scenario=(*team.scenario[:number], *team.scenario[number + 1 :]))
+        case "flag":
+            changed: dict[str, Any] = {which: False}
+            plan = replace(plan, **changed)
         case "option":
             options = replace(options, **{which: getattr(Options(), which)})
         case "setting":
@@ -172,6 +192,7 @@ def described(plan: Plan) -> dict[str, object]:
         "runtime": str(plan.options.runtime or Runtime.PROCESSES),
         "options": options,
         "faults": [str(fault) for fault in plan.faults],
+        **{name: True for name in FLAGS if getattr(plan, name)},
         "tick_s": plan.tick_s,
         "delay_s": plan.delay_s,
         "team": team,

@@ -10,6 +10,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from types import FrameType
 
 from robochoc.communication.processes.processes import BUSY_REPORTS_S
@@ -17,7 +18,7 @@ from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.journal.journal import JournalError, JournalRecorder, read_journal
 from robochoc.model.outcome import EpochOutcome, Metrics, Outcome
-from robochoc.model.problem import Team
+from robochoc.model.problem import ScenarioEvent, Team
 from robochoc.model.team_edits import ChangeError
 from robochoc.replay import replay
 from robochoc.run import Runtime
@@ -82,6 +83,17 @@ class _Audience:
         return False
 
 
+class Script:
+    """An environment that returns the events of the plan's scenario, one after each answer of a whole team."""
+
+    def __init__(self, plan: Plan) -> None:
+        self._left = iter(plan.team.scenario)
+
+    def __call__(self, _team: Team, epoch: EpochOutcome, _left_s: float | None) -> ScenarioEvent | None:
+        """See `Environment`."""
+        return None if epoch.lost else next(self._left, None)
+
+
 class FullDisk:
     """A sink of a journal on a disk that is full after `size` bytes: a block may be written in part."""
 
@@ -117,12 +129,14 @@ def _play(plan: Plan, *, disk: FullDisk | None = None) -> _Played:
     clock, audience = VirtualClock(plan.tick_s, jumps), _Audience()
     options = plan.options
     with _world(plan, clock) as network:
-        refuse_options(options)
         outcome, error = None, ""
         team, chosen, run = plan.team, options, _solver_of(plan, network)
         if network is None:
-            prepared = prepare(plan.team, options)
-            team, chosen, run = prepared.team, prepared.choice.options, prepared.solve
+            refuse_options(options, environment=plan.environment)
+            script = Script(plan) if plan.environment else None
+            team = replace(plan.team, scenario=()) if plan.environment else plan.team
+            prepared = prepare(team, options, environment=plan.environment)
+            team, chosen, run = prepared.team, prepared.choice.options, partial(prepared.solve, environment=script)
         sinks = [disk.write] if disk else []
         recorder = JournalRecorder(journal_header(team, chosen), objective_to_record(team, chosen), sinks=sinks)
         try:

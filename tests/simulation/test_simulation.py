@@ -6,6 +6,7 @@ import itertools
 import json
 import sys
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -32,6 +33,20 @@ def test_no_seed_has_a_finding() -> None:
     assert {seed: report.findings for seed, report in reports.items() if report.findings} == {}
     assert sum(bool(report.refused) for report in reports.values()) < SEEDS // 5
     assert {"solution", "optimal", "no-solution", "unknown"} <= {report.verdict for report in reports.values()}
+
+
+def test_environments_filters_private_runs_and_revocations_are_simulated() -> None:
+    kinds: dict[str, Callable[[Plan], object]] = {
+        "environment": lambda plan: plan.environment,
+        "filters": lambda plan: plan.options.filters,
+        "private": lambda plan: plan.private,
+        "revocation": lambda plan: plan.has(FaultKind.REVOKE),
+    }
+    plans = [drawn_plan(seed) for seed in range(150)]
+    for name, has in kinds.items():
+        reports = [examine(plan) for plan in [plan for plan in plans if has(plan)][:2]]
+        assert [report.findings for report in reports] == [[], []], name
+        assert any(report.runs and not report.refused for report in reports), name
 
 
 def test_the_same_seed_gives_the_same_plan_and_run() -> None:

@@ -13,6 +13,7 @@ from unittest.mock import patch
 
 import msgspec
 
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Counters, Ready, RobotFailed
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport, ToRobot
@@ -34,6 +35,7 @@ from robochoc.model.orders import OrderError, with_order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.findings import Findings
+from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.setting_rules import refuse_settings
 from robochoc.run.compatibility.team_rules import refuse_unfit
 from robochoc.run.distributed import solve_distributed
@@ -81,6 +83,12 @@ class VirtualNetwork:
         self._waiting: dict[tuple[str, str], deque[Item]] = {}
         self._cut_until: dict[str, float] = {}
         self._to_lose: dict[str, int] = {}
+        self._authority = InMemoryAuthority(plan.team.order) if plan.options.filters else None
+        self.revoked: set[str] = set()
+
+    def identity(self, name: str) -> Identity:
+        """Return the identity of a robot, which only filters of messages need."""
+        return self._authority.identity(name) if self._authority else cast("Identity", None)
 
     def now(self) -> float:
         """Return the virtual time."""
@@ -170,7 +178,7 @@ class VirtualMachine:
         patience_s = network.plan.options.patience or PATIENCE_S
         self._robot = NetworkRobot(
             own,
-            cast("Identity", None),
+            network.identity(name),
             cast("Transport", self._transport),
             protocol_or_stage,
             RobotSettings(patience_s=patience_s),
@@ -247,6 +255,7 @@ class VirtualMachine:
             FaultKind.PARTITION: lambda: network.cut(name, fault.for_s),
             FaultKind.LOSS: lambda: network.lose(name, fault.size),
             FaultKind.SLOW: lambda: setattr(self, "step_s", fault.for_s),
+            FaultKind.REVOKE: lambda: network.revoked.add(name),
         }
         if fault.kind in actions:
             network.system.at(fault.at_s, actions[fault.kind])
@@ -261,14 +270,19 @@ class VirtualConnection(MasterConnection):
         self._inbox = network.add(MASTER)
         self.framing = Framing(MASTER, run)
         policy = SimpleNamespace(
-            is_robot=lambda _name: True,
+            is_robot=lambda name: name not in network.revoked,
             open_ways=lambda _ways: None,
-            follow=lambda: None,
-            revoked=lambda _names: [],
+            follow=self._exclude,
+            revoked=lambda names: [name for name in names if name in network.revoked],
             failure="",
         )
         self.policy = cast("Any", policy)
         self.journal_server = cast("Any", SimpleNamespace(lagging=False, publication=None))
+
+    def _exclude(self) -> None:
+        """Close the links of the robots whose names were revoked, as the router does with new rules."""
+        for name in self._network.revoked:
+            self._network.cut(name, math.inf)
 
     def open(self) -> None:
         """See `MasterConnection.open`."""
@@ -321,7 +335,9 @@ def solve_on_network(plan: Plan, network: VirtualNetwork, observer: Observer, au
     team = compiled.team
     protocol = protocol_or_stage(options.protocol)
     refuse_settings(options.protocol, protocol, options.settings)
-    settings = NetworkSettings(survive=options.survives_losses, patience_s=options.patience or PATIENCE_S)
+    refuse_options(options, private=plan.private)
+    patience_s = options.patience or PATIENCE_S
+    settings = NetworkSettings(options.filters, plan.private, patience_s, survive=options.survives_losses)
     profiles = {robot.name: profile_of(robot) for robot in team.robots}
     ways = reach(profiles, writes_to_non_neighbours=protocol.traits.writes_to_non_neighbours)
     members = NetworkMembers(team.order, order=team.order, ways=ways)

@@ -26,8 +26,9 @@ from robochoc.communication.network.plausibility import (
     widest_gap,
 )
 from robochoc.communication.quiescence import MessageCounts
-from robochoc.communication.search_state import SearchState, first_names
+from robochoc.communication.search_state import SearchState
 from robochoc.model.outcome import CheckCounts, Violations
+from robochoc.system.plain_text import listed
 
 _MOST_NAMED = 3
 """The maximum number of doubts described in a text."""
@@ -193,7 +194,7 @@ class AuditedSearchState(SearchState):
     @property
     def unfinished(self) -> str:
         """A text on the robots that had not finished at the time limit; empty if no such robot is known."""
-        names = first_names(self._late)
+        names = listed(self._late)
         waited = f"{names} {'has' if len(self._late) == 1 else 'have'} not answered the master"
         doubts = [doubt.why for doubt in self.doubts_about_counts]
         return "; ".join(filter(None, [waited if names else "", *(doubts or [widest_gap(self._accounts)])]))
