@@ -23,8 +23,8 @@ from robochoc.system.stopping import stop_requested
 
 TICK_S = 0.2
 """The interval between two progress reports, in seconds."""
-TRANSIT_S = 10.0
-"""The longest transit of a message between processes on a busy machine, in seconds."""
+TRANSIT_S = 3600.0
+"""The longest transit of a message between processes, in seconds, also if the machine is busy or was suspended."""
 
 
 class MasterLoop(ABC):

@@ -42,7 +42,7 @@ def test_environments_filters_private_runs_and_revocations_are_simulated() -> No
         "private": lambda plan: plan.private,
         "revocation": lambda plan: plan.has(FaultKind.REVOKE),
     }
-    plans = [drawn_plan(seed) for seed in range(150)]
+    plans = [drawn_plan(seed) for seed in range(600)]
     for name, has in kinds.items():
         reports = [examine(plan) for plan in [plan for plan in plans if has(plan)][:2]]
         assert [report.findings for report in reports] == [[], []], name
