@@ -17,7 +17,7 @@ from msgspec import UNSET
 
 from robochoc.communication.search_result import SearchResult
 from robochoc.journal.entries import STAMPED_LATE
-from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Sent
+from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Sent, Settled
 from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.costs import user_cost
 from robochoc.model.outcome import Answer, Metrics, Outcome, Verdict
@@ -280,8 +280,9 @@ def _places(run: RecordedRun, outcome: Outcome) -> bool:
 
 
 def _verdict(events: Sequence[AnyEvent], concluded: set[str]) -> Verdict:
-    """Return the verdict that a robot has concluded; otherwise `solution`, if all messages were received."""
+    """Return the verdict that a robot has concluded; otherwise `solution`, if robots began and received all messages."""
     if len(concluded) == 1:
         return Verdict(concluded.pop())
     under_way = sum(isinstance(event, Sent) - isinstance(event, Received) for event in events)
-    return Verdict.UNKNOWN if under_way or concluded else Verdict.SOLUTION
+    began = any(isinstance(event, Settled) for event in events)
+    return Verdict.UNKNOWN if under_way or concluded or not began else Verdict.SOLUTION

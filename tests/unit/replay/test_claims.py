@@ -14,11 +14,11 @@ import pytest
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
-from robochoc.journal.events import Decided, Sent
+from robochoc.journal.events import Began, Decided, Given, Sent
 from robochoc.journal.journal import Journal
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.costs import user_cost
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 from robochoc.replay import replay
 from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
@@ -257,6 +257,24 @@ def test_decisions_of_processes_are_known_in_bundles_only() -> None:
         false = replace(journal, header=header, outcome=replace(ours, cost=cost - 1))
         assert [one.what for one in replay(false).contradictions] == ["the outcome's cost"]
     assert found
+
+
+def test_a_search_without_time_ends_with_its_start() -> None:
+    """Found by `make simulate`: the replay of a search in which no robot began had no solution."""
+    team = random_csp(4, 3, 0.5, 0.2, seed=1)
+    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, cache=False)
+    solved = recorded(team, options).outcome
+    assert solved is not None
+    assert solved.verdict is Verdict.SOLUTION
+    journal = recorded(team, replace(options, start=solved.assignment, deadline=1000))
+    outcome = journal.outcome
+    assert outcome is not None
+    nothing = tuple(event for event in journal.events if isinstance(event, Began | Given))
+    late = replace(outcome, assignment=solved.assignment, metrics=Metrics(), deadline=1000)
+    found = replay(replace(journal, events=nothing, outcome=late))
+    assert not found.contradictions
+    other = {name: value % 3 + 1 for name, value in solved.assignment.items()}
+    assert replay(replace(journal, events=nothing, outcome=replace(late, assignment=other))).contradictions
 
 
 def cheaper_combinations(team: Team, journal: Journal) -> Iterator[dict[str, int]]:
