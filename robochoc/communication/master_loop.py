@@ -24,7 +24,7 @@ from robochoc.system.stopping import stop_requested
 TICK_S = 0.2
 """The interval between two progress reports, in seconds."""
 TRANSIT_S = 3600.0
-"""The longest transit of a message between processes, in seconds, also if the machine is busy or was suspended."""
+"""The longest transit of a message between processes, in seconds, also if the machine is busy."""
 
 
 class MasterLoop(ABC):
@@ -37,12 +37,15 @@ class MasterLoop(ABC):
     watch: SearchWatch | None = None
     check_s: float = TICK_S
     """The interval between two checks for lost robots, in seconds."""
+    longest_turn_s: float = 1.0
+    """The longest turn of the loop that counts as waiting, in seconds: the clock of a suspended machine jumps."""
 
     def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
         self._progress = progress
         self._kills = KillSchedule()
         self._kill: Callable[[str], None] | None = None
         self._shown = self._checked = 0.0
+        self._turned = self._waited_s = 0.0
         self._began = time.monotonic()
 
     @abstractmethod
@@ -101,6 +104,8 @@ class MasterLoop(ABC):
         """Serve the robots until `done()` or the deadline. The state ends a search that can never continue."""
         while not done() and not is_past(deadline):
             now, is_searching = time.monotonic(), self.state.searching
+            self._waited_s += min(now - self._turned, self.longest_turn_s)
+            self._turned = now
             watch = self.watch if is_searching else None
             kill_s = self._kills.wait_s(now) if is_searching else None  # only then robots are killed
             self._serve_once(now, deadline, kill_s, None if watch is None else watch.wait_s(now))
@@ -156,13 +161,13 @@ class MasterLoop(ABC):
         A search that can never continue ends.
         """
         state = self.state
-        if state.is_stalled(now, self._transit_s):
+        if state.is_stalled(self._waited_s, self._transit_s):
             self._end_stalled()
             return
         wanted = self._progress is not None and now - self._shown >= TICK_S
         if self._progress and wanted:
             self._shown = now
-            stage = f"waiting for {names}" if (names := state.awaited(now)) else ""
+            stage = f"waiting for {names}" if (names := state.awaited(self._waited_s)) else ""
             self._progress(Progress(state.counters.sent, time.monotonic() - self._began, stage))
         if state.start_continuation():
             self._send_all(GoOn())

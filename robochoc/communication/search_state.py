@@ -191,7 +191,7 @@ class SearchState:
         robot has not answered whether it continues, no waves are started.
 
         Args:
-            now: The time on the monotonic clock.
+            now: The time for which the master has waited so far, in seconds.
             patience_s: The longest transit of a message, in seconds.
         """
         counters = self.counters

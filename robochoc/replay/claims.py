@@ -280,7 +280,7 @@ def _places(run: RecordedRun, outcome: Outcome) -> bool:
 
 
 def _verdict(events: Sequence[AnyEvent], concluded: set[str]) -> Verdict:
-    """Return the verdict that a robot has concluded; otherwise `solution`, if robots began and received all messages."""
+    """Return the verdict that a robot has concluded; else `solution`, if robots began and received all messages."""
     if len(concluded) == 1:
         return Verdict(concluded.pop())
     under_way = sum(isinstance(event, Sent) - isinstance(event, Received) for event in events)

@@ -6,6 +6,7 @@ robots report what it compares, as `Searcher` does.
 
 from __future__ import annotations
 
+import math
 import time
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -61,6 +62,8 @@ class AuditedRobot(QueueRobot):
 
 class AuditedRun(Run):
     """The session of a master that audits. A search that is stuck is a result, as in `Master`."""
+
+    longest_turn_s = math.inf
 
     def _new_state(self, epoch: int, order: Sequence[str]) -> AuditedSearchState:
         team = self.compiled.team
