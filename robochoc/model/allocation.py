@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import field
 from enum import StrEnum
 from fractions import Fraction
+from functools import cached_property
 from math import floor, isqrt
 from typing import NamedTuple, cast
 
@@ -26,8 +27,11 @@ from robochoc.system.lazy_dataclass import dataclass
 
 NOT_THE_SAME = Predicate("notSame", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
 """Two robots do not do the same task. 0 means no task."""
-NOT_BOTH = Predicate("notBoth", ("X", "Y"), parse("or(eq(X, 0), eq(Y, 0))", ("X", "Y"), Type.BOOLEAN))
+NOT_BOTH = Predicate("notBoth", ("X", "Y"), parse("eq(mul(X, Y), 0)", ("X", "Y"), Type.BOOLEAN))
+"""Not both values are 1. A product has no meaning without one of its robots, so the constraint is dropped with it."""
 _DONE = Domain("Done", (range(2),))
+TOUR = "tour"
+"""The last part of the name of the variable with the number of a tour."""
 START = "start"
 """The last part of the name of the variable with the start of a task."""
 NOT_DONE = -1
@@ -83,9 +87,8 @@ class Worker:
         capacity: Its maximum load. None: unlimited.
         most: The maximum number of tasks. None: unlimited.
         together: The additional profit of pairs of tasks if the robot does both.
-        tours: The length of the tour for each schedule of the robot. With tours, `profit` does not include distances;
-            tasks in no tour have no location and no times.
-        has_deadlines: True if the robot can do only the sets of tasks in `tours`, because tasks have times.
+        tours: The length of the tour for each schedule for which the robot has time and capacity. With tours, `profit`
+            does not include distances; tasks in no tour have no location and no times. Tours are numbered from 1.
     """
 
     name: str
@@ -96,7 +99,17 @@ class Worker:
     most: int | None = None
     together: Mapping[tuple[int, int], int] = field(default_factory=dict)
     tours: Mapping[Schedule, int] = field(default_factory=dict)
-    has_deadlines: bool = False
+
+    @cached_property
+    def scheduled(self) -> tuple[int, ...]:
+        """The tasks that are part of tours."""
+        known = {task for schedule in self.tours for task in schedule.tasks}
+        return tuple(task for task in self.profit if task in known)
+
+    @property
+    def all_scheduled(self) -> bool:
+        """True if all tasks are part of tours, which then are within the robot's capacity."""
+        return bool(self.tours) and len(self.scheduled) == len(self.profit)
 
 
 @dataclass(frozen=True)
@@ -152,6 +165,7 @@ def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec], order
     variables = {
         one.name: [Variable(_does(one, jobs[task]), _DONE) for task in one.profit]
         + [Variable(_start(one, jobs[task]), domain) for task, domain in starts[one.name].items()]
+        + [Variable(tour_variable(one), Domain("Tours", (range(len(one.tours) + 1),))) for _ in one.scheduled[:1]]
         for one in able
     }
 
@@ -159,7 +173,8 @@ def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec], order
         for one in able:
             for task, worth in one.profit.items():
                 yield _worth(f"{one.label}.{jobs[task].name}", _does(one, jobs[task]), {1: worth})
-            yield from _limits(one, jobs)
+            if not one.all_scheduled:
+                yield from _limits(one, jobs)
             yield from _tours(one, jobs, [*starts[one.name]])
             for (first, second), worth in one.together.items():
                 scope = (_does(one, jobs[first]), _does(one, jobs[second]))
@@ -192,6 +207,11 @@ def distance_between(
 
 def _does(one: Worker, job: TaskSpec) -> str:
     return f"{one.variable}.{job.name}"
+
+
+def tour_variable(one: Worker) -> str:
+    """Return the name of the variable with the number of a robot's tour; 0 is the tour without tasks."""
+    return f"{one.variable}.{TOUR}"
 
 
 def _start(one: Worker, job: TaskSpec) -> str:
@@ -239,31 +259,29 @@ def _limits(one: Worker, jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
 
 
 def _tours(one: Worker, jobs: Mapping[int, TaskSpec], ordered: Sequence[int]) -> Iterator[Constraint]:
-    """Yield the costs of tours, and the constraint on the schedules for which a robot has time.
+    """Yield the constraint that the robot does the tasks of its tour, and the costs of tours.
 
     Args:
         one: The robot.
         jobs: The tasks, by number.
         ordered: The tasks with a start.
     """
-    single = {schedule.tasks for schedule in one.tours if len(schedule.tasks) == 1}
-    placed = [task for task in one.profit if (task,) in single]
-    scope = (*(_does(one, jobs[task]) for task in placed), *(_start(one, jobs[task]) for task in ordered))
-    if not scope:
+    placed = one.scheduled
+    if not placed:
         return
-    rows = {}
-    for schedule, length in one.tours.items():
+    does = (*(_does(one, jobs[task]) for task in placed), *(_start(one, jobs[task]) for task in ordered))
+    rows = [(0, *[0] * len(placed), *[NOT_DONE] * len(ordered))]
+    for number, schedule in enumerate(one.tours, start=1):
         starts = dict(schedule.starts)
-        row = (
-            *[int(task in schedule.tasks) for task in placed],
-            *[starts.get(task, NOT_DONE) for task in ordered],
-        )
-        rows[row] = -length
-    cost = Relation(f"tour{one.label}", len(scope), Semantics.SOFT, tuple(rows), tuple(rows.values()))
-    yield Constraint("tour", cost, scope, scope)
-    if one.has_deadlines or ordered:
-        able = ((0,) * len(placed) + (NOT_DONE,) * len(ordered), *rows)
-        yield Constraint("time", Relation(f"time{one.label}", len(scope), Semantics.SUPPORTS, able), scope, scope)
+        done = [int(task in schedule.tasks) for task in placed]
+        rows.append((number, *done, *[starts.get(task, NOT_DONE) for task in ordered]))
+    tour = tour_variable(one)
+    chosen = Relation(f"tour{one.label}", 1 + len(does), Semantics.SUPPORTS, tuple(rows))
+    yield Constraint("tour", chosen, (tour, *does), (tour, *does))
+    lengths = tuple(-length for length in one.tours.values())
+    numbers = tuple((number,) for number in range(1, len(lengths) + 1))
+    cost = Relation(f"way{one.label}", 1, Semantics.SOFT, numbers, lengths)
+    yield Constraint("way", cost, (tour,), (tour,))
 
 
 def _at_most(name: str, loads: Sequence[int], most: int) -> Predicate:

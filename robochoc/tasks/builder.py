@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from fractions import Fraction
 
 from robochoc.formats.definitions import check_topic
@@ -15,6 +15,7 @@ from robochoc.formats.symbols import check_symbol
 from robochoc.formats.team_reader import GROUND_FILE
 from robochoc.model.allocation import (
     START,
+    TOUR,
     Order,
     Schedule,
     TasksModel,
@@ -22,6 +23,7 @@ from robochoc.model.allocation import (
     Worker,
     assignment,
     several_tasks,
+    tour_variable,
 )
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.cost_units import CostUnits
@@ -30,7 +32,7 @@ from robochoc.model.problem import ProblemKind, Team, Topic, Variable
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.tasks.entries import MAX_PLACES, Point, RobotEntry, Synergy, TaskEntry
 from robochoc.tasks.precedence import orders_of, precedence_of
-from robochoc.tasks.tours import TaskSet, Tour, TourSearch, round_length
+from robochoc.tasks.tours import Tour, TourSearch, round_length
 from robochoc.tasks.waypoints import Cells, in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
 from robochoc.tasks.ways import MapWays, Ways
 
@@ -94,12 +96,14 @@ class TaskTeamBuilder:
         self._number = {name: number for number, name in enumerate(read.tasks, start=1)}
         self._notes: list[ConversionNote] = []
         self._sets = 0
-        self._tours_of: dict[str, dict[TaskSet, list[Tour]]] = {}
+        self._tours_of: dict[str, list[Tour]] = {}
         self._precedence = precedence_of(read.tasks, read.step)
         self._impossible: set[str] = set()
         self._names = list(read.tasks)
         self._unit = unit_of(read.points)
         self._robot_names, self._task_names = NameMap(), NameMap()
+        if read.tours:
+            self._task_names.reserve(TOUR)
         amounts = [one.worth for one in read.tasks.values()] + [one.worth for one in read.synergies]
         self._scale = Scale([*amounts, Fraction(1, 10**read.places)])
         if self._scale.rounds:
@@ -170,7 +174,7 @@ class TaskTeamBuilder:
             for task, entry in self._read.tasks.items()
             if task not in self._impossible and (profit_of_task := self._profit(robot, task, entry)) is not None
         }
-        tours, is_limited = self._tours(name, robot, profit)
+        tours = self._tours(name, robot, profit)
         together: dict[tuple[int, int], int] = {}
         for one in self._read.synergies:
             first, second = sorted(self._number[task] for task in one.tasks)
@@ -179,15 +183,15 @@ class TaskTeamBuilder:
         own = self._robot_names.allowed(name)
         if self._read.model == TasksModel.ASSIGNMENT:
             return Worker(own, own, f"{own}.{_ONLY}", profit)
-        return Worker(own, own, own, profit, robot.capacity, robot.most, together, tours, is_limited)
+        return Worker(own, own, own, profit, robot.capacity, robot.most, together, tours)
 
-    def _tours(self, name: str, robot: RobotEntry, able: dict[int, int]) -> tuple[dict[Schedule, int], bool]:
-        """Return the lengths of the robot's tours, and whether times exclude other sets of tasks.
+    def _tours(self, name: str, robot: RobotEntry, able: dict[int, int]) -> dict[Schedule, int]:
+        """Return the lengths of the robot's tours; those with the same first places are together.
 
         Tasks that the robot cannot even do alone are removed from `able`.
         """
         if not self._read.tours:
-            return {}, False
+            return {}
         ordered = {*self._precedence.first, *self._precedence.last}
         numbered = enumerate(self._read.tasks.values(), start=1)
         placed = {
@@ -202,14 +206,16 @@ class TaskTeamBuilder:
         for task in placed:
             if (task,) not in found:
                 del able[task]
-        self._tours_of[self._robot_names.allowed(name)] = found
-        self._sets += sum(map(len, found.values()))
+        tours = sorted(
+            ((Schedule(tasks, one.starts), one) for tasks, some in found.items() for one in some),
+            key=lambda pair: pair[1].order,
+        )
+        self._tours_of[self._robot_names.allowed(name)] = [one for _, one in tours]
+        self._sets += len(tours)
         if self._sets > MAX_CONSTRAINTS:
             what = f"has robots and tasks for more than {MAX_CONSTRAINTS:,} tours"
             raise MistakeError(what, "use fewer robots, or a smaller number in most:")
-        is_limited = any(entry.latest is not None for entry in placed.values())
-        schedules = {Schedule(tasks, one.starts): one.length for tasks, some in found.items() for one in some}
-        return {one: round_length(length, self._scale.places) for one, length in schedules.items()}, is_limited
+        return {schedule: round_length(one.length, self._scale.places) for schedule, one in tours}
 
     def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> TaskSpec:
         able = sum(self._number[name] in one.profit for one in workers)
@@ -254,17 +260,11 @@ class TaskTeamBuilder:
             return of_choice(worker.variable, places, home)
         names = {task: self._variable(worker, task) for task in places}
         if self._read.tours:
-            tours = [(tasks, one) for tasks, some in self._tours_of[worker.name].items() for one in some]
-            first = {self._facts(worker, tasks, one.starts): self._first(one, home) for tasks, one in tours}
-            return of_tours({frozenset(): home, **first}, len(home))
+            first = [self._first(one, home) for one in self._tours_of[worker.name]]
+            return of_tours(tour_variable(worker), [home, *first], len(home))
         tasks = list(self._read.tasks.values())
         nearest = sorted(places, key=lambda task: self._way(entry, entry.at, tasks[task - 1].at, MAX_PLACES) or 0)
         return of_nearest([(names[task], places[task]) for task in nearest], home)
-
-    def _facts(self, worker: Worker, tasks: TaskSet, starts: Iterable[tuple[int, int]]) -> frozenset[tuple[str, int]]:
-        """Return the values of the robot's variables that differ from those of a robot without tasks."""
-        done = [(self._variable(worker, task), 1) for task in tasks]
-        return frozenset([*done, *((f"{self._variable(worker, task)}.{START}", start) for task, start in starts)])
 
     def _first(self, tour: Tour, home: Cells) -> Cells:
         """Return the first place of a tour."""

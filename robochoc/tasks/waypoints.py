@@ -7,7 +7,6 @@ in a unit that divides all coordinates of the list; `map.json` has its length.
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from fractions import Fraction
 
@@ -15,12 +14,8 @@ from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.problem import Topic
 from robochoc.tasks.entries import Point
 
-LEAVES_MAX = 1_000
-"""The maximum number of cases in the formula of a tour."""
-
 Cells = tuple[int, ...]
 """A place, in units."""
-_Cases = Mapping[frozenset[tuple[str, int]], Cells]
 
 
 def unit_of(points: Iterable[Point]) -> Fraction:
@@ -85,35 +80,28 @@ def of_nearest(places: Sequence[tuple[str, Cells]], home: Cells) -> tuple[Expres
     )
 
 
-def of_tours(first: _Cases, dimensions: int) -> tuple[Expression, ...] | None:
-    """Return the formulas of the first place of a tour; None if they would be too long.
+def of_tours(variable: str, first: Sequence[Cells], dimensions: int) -> tuple[Expression, ...]:
+    """Return the formulas of the first place of a tour.
 
     Args:
-        first: The first place of each possible tour, by the variables and values that say that its tasks are done, and
-            when they start. The empty set has the place of the robot.
+        variable: The variable with the number of the tour.
+        first: The first place of each tour, by number.
         dimensions: The number of coordinates.
     """
-    leaves = 0
 
-    def tree(cases: _Cases, axis: int) -> Expression:
-        nonlocal leaves
-        found = {place[axis] for place in cases.values()}
-        if len(found) == 1 or leaves > LEAVES_MAX:
-            leaves += 1
-            return Constant(found.pop())
-        # The task that most often decides, so that the formula stays short.
-        places = Counter((fact, place[axis]) for facts, place in cases.items() for fact in facts)
-        number = Counter(fact for facts in cases for fact in facts)
-        fact, _ = max(
-            (one for one in places if number[one[0]] < len(cases)), key=lambda one: (places[one], -len(one[0][0]), one)
-        )
-        done = {facts: place for facts, place in cases.items() if fact in facts}
-        left = {facts: place for facts, place in cases.items() if fact not in facts}
-        name, value = fact
-        return Apply("if", (Apply("eq", (Name(name), Constant(value))), tree(done, axis), tree(left, axis)))
+    def tree(parts: Sequence[tuple[int, int]]) -> Expression:
+        """Return the formula for the parts of the numbers, each with its first number, and its coordinate."""
+        if len(parts) == 1:
+            return Constant(parts[0][1])
+        half = len(parts) // 2
+        before = Apply("lt", (Name(variable), Constant(parts[half][0])))
+        return Apply("if", (before, tree(parts[:half]), tree(parts[half:])))
 
-    found = tuple(tree(first, axis) for axis in range(dimensions))
-    return found if leaves <= LEAVES_MAX else None
+    found = []
+    for axis in range(dimensions):
+        numbered = [(number, place[axis]) for number, place in enumerate(first)]
+        found.append(tree([one for one in numbered if one[0] == 0 or one[1] != numbered[one[0] - 1][1]]))
+    return tuple(found)
 
 
 def _is_one_of(variable: str, values: Sequence[int]) -> Expression:

@@ -29,7 +29,7 @@ _LARGE = 1 << 16
 _MOST_DROPPED = 3
 """The maximum number of dropped constraints listed in a report."""
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
-_ONLY, _NONE, _START = "task", "none", ".start"
+_ONLY, _NONE, _START, _TOUR = "task", "none", ".start", "tour"
 """A robot with at most one task has one variable, whose first value means no task (`tasks/builder.py`)."""
 
 
@@ -376,6 +376,7 @@ def _tasks_of(robot: Robot) -> dict[str, tuple[str, int | str]]:
             return {str(label): (only.name, label) for label in labels[1:]} or {_NONE: (only.name, 0)}
     names = {one.name for one in robot.variables}
     does = [one for one in robot.variables if one.name.removesuffix(_START) not in names - {one.name}]
+    does = [one for one in does if one.name != first + _TOUR]
     binary = (not one.domain.symbols and set(one.domain) == {0, 1} for one in does)
     if all(one.name.startswith(first) for one in robot.variables) and all(binary):
         return {one.name.removeprefix(first): (one.name, 1) for one in does}

@@ -133,6 +133,10 @@ class NameMap:
             self._taken[self._given[original]] = original
         return self._given[original]
 
+    def reserve(self, name: str) -> None:
+        """Use `name` for no original."""
+        self._taken[name] = name
+
     @property
     def originals(self) -> dict[str, str]:
         """The original names by their valid names, if the two differ."""

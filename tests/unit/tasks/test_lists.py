@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -14,6 +15,7 @@ from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import read_foreign, recognise
 from robochoc.formats.problems import read_problem
+from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.defaults import CENTRAL
 from tests.support.cases import looped
@@ -203,3 +205,23 @@ def test_ways_cost_the_same_with_tours_where_a_robot_does_one_task(tmp_path: Pat
     text = LIST.replace("capacity: 3", "most: 1").replace("most: 2", "most: 1").replace(", robots: 2", "")
     text = f"model: assignment\n{text}"
     assert imported(f"tours: yes\n{text}", tmp_path).team == imported(text, tmp_path).team
+
+
+@pytest.mark.usefixtures("shared_solvers")
+@pytest.mark.parametrize("head", ["model: assignment", "tours: no", "tours: yes"])
+def test_when_a_robot_leaves_the_others_do_its_tasks(head: str, tmp_path: Path) -> None:
+    """The team decides as if the robot had never been in the list."""
+    robots = {"ann": "{at: [0, 0]}", "bob": "{at: [9, 0]}", "cid": "{at: [5, 5]}"}
+    tasks = (
+        "tasks:\n  left: {at: [1, 1], worth: 20}\n  right: {at: [8, 1], worth: 20}\n  middle: {at: [4, 4], worth: 9}\n"
+    )
+
+    def listed(names: list[str]) -> Team:
+        lines = "".join(f"  {name}: {robots[name]}\n" for name in names)
+        return imported(f"{head}\nrobots:\n{lines}{tasks}", tmp_path).team
+
+    options = Options(protocol="dpop", runtime=Runtime.SIMULATOR)
+    for name in robots:
+        event = ScenarioEvent((RemoveAgent(name),))
+        outcome = solve(replace(listed([*robots]), scenario=(event,)), options)
+        assert outcome.cost == solve(listed([one for one in robots if one != name]), options).cost

@@ -15,6 +15,7 @@ from robochoc.formats import read_team, write_team
 from robochoc.formats.problems import read_problem
 from robochoc.formats.team_reader import GROUND_FILE
 from robochoc.maps.ground_map import read_ground_map
+from robochoc.model.constraint import Relation
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Robot
 from robochoc.run import Options, Runtime, solve
@@ -39,7 +40,19 @@ def sets_of(meaning: Meaning, robot: dict[str, Any], team_robot: Robot) -> Any: 
             yield tasks, {only.name: next(value for value in only.domain if only.domain.label(value) == label)}
         else:
             chosen = {f"{team_robot.name}.{name}" for name in tasks}
-            yield tasks, {one.name: int(one.name in chosen) for one in team_robot.variables}
+            values = {one.name: int(one.name in chosen) for one in team_robot.variables}
+            yield tasks, values | tour_of(team_robot, values)
+
+
+def tour_of(robot: Robot, values: dict[str, int]) -> dict[str, int]:
+    """Return the value of the variable with the number of the tour, if the robot has one."""
+    for one in robot.private:
+        if one.name == "tour":
+            assert isinstance(one.definition, Relation)
+            tour, *does = one.variables
+            wanted = [values[name] for name in does]
+            return {tour: next(number for number, *row in one.definition.tuples if row == wanted)}
+    return {}
 
 
 def first_places(meaning: Meaning, robot: dict[str, Any], tasks: tuple[str, ...]) -> set[tuple[float, ...]]:
