@@ -5,15 +5,19 @@ from __future__ import annotations
 import pytest
 
 from robochoc.communication.host import BadMessageError, Host, MessageCache
-from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
+from robochoc.journal.events import AnyEvent, Bounded, Concluded, Decided, Heard, Received, Sent, Settled
+from robochoc.journal.team_events import NOTHING_INVALIDATED
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.chance import Chance
+from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.local_search.dsa import DSA, DSASettings
 from robochoc.protocols.message import Envelope, Message, encode
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.satisfaction.abt_messages import AddLink, Ok
 from robochoc.protocols.satisfaction.first_fit_messages import Placed
 from robochoc.protocols.satisfaction.nogood_messages import Nogood
-from robochoc.solver.agent_problem import agent_problems
+from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.local_problem import LocalProblem
 from tests.support.cases import looped
 from tests.support.problems import team_of
@@ -158,3 +162,53 @@ def test_a_message_that_is_sent_on_is_encoded_once() -> None:
     equal = under_way.content(Large(b"1"))
     assert equal == content
     assert under_way.get(equal) is message
+
+
+class Informed(ABT):
+    """Reports the best assignment and the lower bound that a test sets."""
+
+    cost: float | None = None
+    bound: float | None = None
+
+    @property
+    def incumbent(self) -> Incumbent | None:
+        return None if self.cost is None else Incumbent(self.cost, {})
+
+    @property
+    def findings(self) -> Findings:
+        return Findings(bound=self.bound)
+
+
+def informed(events: list[AnyEvent]) -> Host:
+    team = chain()
+    host = Host(Informed(LocalProblem(agent_problems(team)["RB"]), PriorityOrder(team.order)))
+    host.observe(events.append, lambda: 0.0, bounds=True)
+    return host
+
+
+def reported(host: Host, events: list[AnyEvent], cost: float | None, bound: float | None) -> list[float]:
+    """Return the costs and bounds that `host` reports after a step in which it knows these."""
+    events.clear()
+    assert isinstance(host.protocol, Informed)
+    host.protocol.cost, host.protocol.bound = cost, bound
+    host.handle([])
+    return [one.cost if isinstance(one, Heard) else one.bound for one in events if isinstance(one, Heard | Bounded)]
+
+
+def test_best_assignments_and_bounds_are_reported_once_and_again_after_a_change() -> None:
+    events: list[AnyEvent] = []
+    host = informed(events)
+    known: list[tuple[float | None, float | None]] = [(5, 2), (5, 2), (6, 1), (4, 3), (None, None)]
+    assert [reported(host, events, *one) for one in known] == [[5, 2], [], [], [4, 3], []]
+    host.change(agent_problems(chain())["RB"], NOTHING_INVALIDATED)
+    assert reported(host, events, 9, 1) == [9, 1]
+
+
+def test_protocols_receive_their_settings_and_random_numbers() -> None:
+    part = agent_problems(chain())["RB"]._replace(parameters=RunParameters(7, {"cycles": "3"}))
+    one, other = Host.create(DSA, part), Host.create(DSA, part)
+    assert isinstance(one.protocol.settings, DSASettings)
+    assert one.protocol.settings.cycles == 3
+    numbers = Chance(7, "RB")
+    assert [one.protocol.chance(), one.protocol.chance()] == [numbers(), numbers()]
+    assert other.protocol.chance() == Chance(7, "RB")()
