@@ -16,7 +16,7 @@ from contextlib import suppress
 from typing import IO
 
 from robochoc.solver.errors import UnsupportedError
-from robochoc.system.signals import signals_delayed
+from robochoc.system.signals import signal_when_orphaned, signals_delayed
 
 LINE_BYTES = 1 << 16
 """The maximum length of a line from a program, in bytes."""
@@ -51,6 +51,7 @@ class LineProcess:
                     stdout=subprocess.PIPE,
                     stderr=subprocess.DEVNULL,  # its text must not reach the terminal
                     start_new_session=True,  # so that all its processes can be ended
+                    preexec_fn=_end_with_the_game,  # noqa: PLW1509 - it only calls the kernel
                 )
         except OSError as error:
             raise UnsupportedError(f"{command[0]} cannot be started: {error.strerror}") from error
@@ -132,6 +133,11 @@ class LineProcess:
         for pipe in (self.input, self.output):
             with suppress(OSError):
                 pipe.close()
+
+
+def _end_with_the_game() -> None:
+    """In the new process: let the kernel end it when robochoc is killed (Linux), even if it does not read its input."""
+    signal_when_orphaned(signal.SIGKILL)
 
 
 def _pipe(pipe: IO[bytes] | None) -> IO[bytes]:

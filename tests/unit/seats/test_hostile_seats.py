@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -132,3 +133,17 @@ def test_programs_end_if_the_game_fails(tmp_path: Path) -> None:
     if pid.exists() and pid.read_text():  # it may have been ended before
         number = int(pid.read_text())
         wait_until(partial(_has_ended, number), f"process {number} still runs")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux tells a process that its parent has died")
+def test_a_program_ends_if_robochoc_is_killed(tmp_path: Path) -> None:
+    pid = tmp_path / "pid"
+    stubborn = f"import os, time; open({str(pid)!r}, 'w').write(str(os.getpid()) + chr(10)); time.sleep(1000)"
+    game_of_its_own = (
+        "import sys; from robochoc.seats.line_process import LineProcess, exchange; "
+        f"exchange({{'r': LineProcess([sys.executable, '-c', {stubborn!r}])}}, lambda *_: False, 1000)"
+    )
+    with subprocess.Popen([sys.executable, "-c", game_of_its_own]) as robochoc:
+        wait_until(lambda: pid.exists() and pid.read_text().endswith("\n"), "the program did not start")
+        robochoc.kill()
+    wait_until(partial(_has_ended, int(pid.read_text())), "the program still runs")
