@@ -8,6 +8,7 @@
 16
 """
 
+from robochoc.environments.array_env import ArrayEnv, Observations
 from robochoc.environments.team_env import ENV_NAME, TeamEnv, env, parallel_env
 
-__all__ = ["ENV_NAME", "TeamEnv", "env", "parallel_env"]
+__all__ = ["ENV_NAME", "ArrayEnv", "Observations", "TeamEnv", "env", "parallel_env"]
