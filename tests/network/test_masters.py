@@ -15,16 +15,25 @@ from robochoc.communication.network.control_messages import (
     Lead,
     Promised,
     Propose,
+    Register,
+    RegistrationDenied,
     StandbyAnswer,
     StandbyRequest,
     Standing,
     TeamDecision,
+    Welcome,
 )
+from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.leadership import NO_TERM, Term
-from robochoc.communication.network.master_votes import MasterVotes, NoMajorityError
+from robochoc.communication.network.master import Master
+from robochoc.communication.network.master_votes import MasterVotes, NoMajorityError, SupersededError
 from robochoc.communication.network.masters import SILENCE_S, Masters
+from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.robot_votes import KEPT_S, RobotVotes, VotesError
 from robochoc.communication.network.standbys import CopiedAdmission, Standbys
+from tests.support.deployments import TRIANGLE
+from tests.support.ports import LOOPBACK
+from tests.support.sparse_teams import profiles_of
 
 A, B, C = (f"127.0.0.1:{port}" for port in (7447, 7457, 7467))
 FIRST, SECOND = Term(1, "a"), Term(2, "b")
@@ -221,3 +230,41 @@ def test_a_standby_master_receives_the_rules_of_the_authority() -> None:
     assert (sent[-1].resigned, standbys.waiting) == (True, set())
     standbys.answer("B", StandbyRequest())
     assert not standbys.waiting
+
+
+# A master whose robots have left
+
+
+def test_a_master_ends_its_term_if_a_robot_has_left_it_and_returns() -> None:
+    authority = InMemoryAuthority(TEAM)
+    members = NetworkMembers()
+    master = Master(authority, authority.master_identity((LOOPBACK,)), f"{LOOPBACK}:7447", members)
+    profile = profiles_of(TRIANGLE)["RA"]
+    members.robots["RA"] = Member(profile, "first", joined=True)
+    members.closed = True
+    master.votes.admit(Standing(), closed=False)
+    mission = master.votes.start(TEAM).mission
+    sent: list[object] = []
+    framing = Framing("RA")
+
+    def register(incarnation: str, standing: Standing | None) -> None:
+        master._read("RA", framing.write(MASTER, Register(profile, incarnation, standing)))  # noqa: SLF001 - no network
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(master._connection, "send", lambda _name, message: sent.append(message))  # noqa: SLF001
+        register("first", Standing(mission, TEAM, FIRST))
+        register("second", Standing())
+        register("second", None)
+        assert [type(message) for message in sent] == [Welcome, RegistrationDenied, RegistrationDenied]
+        with pytest.raises(NoMajorityError, match="RA has left this master for another one"):
+            register("second", Standing(mission, TEAM, FIRST))
+
+
+def test_a_master_steps_down_only_without_robots_of_an_earlier_run() -> None:
+    authority = InMemoryAuthority(TEAM)
+    master = Master(authority, authority.master_identity((LOOPBACK,)), f"{LOOPBACK}:7447", NetworkMembers())
+    master.is_superseded = lambda: True
+    with pytest.raises(SupersededError):
+        master.gather()
+    master.votes.admit(Standing("m", TEAM, FIRST), closed=False)
+    assert not master.gather(deadline=0.0)
