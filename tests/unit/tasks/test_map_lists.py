@@ -89,8 +89,8 @@ def test_travel_times_are_those_of_the_shortest_ways(tmp_path: Path) -> None:
 def test_a_robot_does_only_what_it_can_reach(tmp_path: Path) -> None:
     team = imported(LIST, tmp_path).team
     assert [[one.name for one in robot.variables] for robot in team.robots] == [
-        ["ann.left", "ann.right"],
-        ["bob.right"],
+        ["ann.left", "ann.right", "ann.tour"],
+        ["bob.right", "bob.tour"],
     ]
     outcome = solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR))
     times = robochoc.travel_times(BUILDING, [[1, 1], [1, 5], [8, 1], [9, 5]])
