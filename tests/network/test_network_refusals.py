@@ -17,8 +17,14 @@ from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.settings import PATIENCE_S
 from robochoc.communication.network.transport import HEARTBEAT_S
-from robochoc.communication.search_result import RobotsLostError
+from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.journal.events import Decided, Received, Refused, actor
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.satisfaction.afc import AFC
+from robochoc.run import Options, Runtime
+from robochoc.run.networked.machines import Machines
+from robochoc.run.phases import RunPhase
+from robochoc.solver.agent_problem import RunParameters
 
 
 def test_what_a_robot_tells_of_others() -> None:
@@ -165,6 +171,15 @@ def test_a_robot_that_leaves_before_the_end_is_lost() -> None:
     master.members.closed = True
     with pytest.raises(RobotsLostError, match="A was lost: it has left before the end of the run"):
         master._handle("A", master.members.robots["A"], Bye())  # noqa: SLF001 - as it arrives
+
+
+def test_an_answer_is_not_checked_if_a_robot_has_not_reported() -> None:
+    """Found by `make simulate`: after a timeout, honest robots contradicted each other about its constraints."""
+    master = a_master()
+    master.members._order = ("A", "B")  # noqa: SLF001 - the team is complete
+    machines = Machines(master, Options(protocol="afc", runtime=Runtime.NETWORK, timeout=1), "two", None)
+    phase = RunPhase("afc", AFC, RunParameters())
+    assert machines._check(phase, SearchResult.of(Verdict.UNKNOWN, None, {}, [], 1.0)) is None  # noqa: SLF001
 
 
 def test_messages_that_zenoh_may_hold_back_are_not_missing_yet() -> None:

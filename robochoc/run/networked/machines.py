@@ -232,7 +232,7 @@ class Machines(Deployment):
             RobotsLostError: if a robot has values and does not report them.
         """
         state, members = self._master.state, self._master.members
-        if self.options.deadline is not None and not state.assigned.keys() >= set(members.order):
+        if not state.assigned.keys() >= set(members.order):
             return None  # a robot has not reported in time that it has values or withdraws
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
