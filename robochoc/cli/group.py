@@ -46,6 +46,7 @@ COMMANDS = {
     "privacy": ("privacy", "Measure how much robots learned about each other in a run."),
     "protocols": ("protocols", "List the installed protocols, or explain one."),
     "replay": ("replay", "Replay a journal and compare it with the installed protocol."),
+    "rmf": ("rmf", "Exchange tasks with Open-RMF: dispatch, bid, request."),
     "robot": ("robot", "Run one robot on this machine, led by a master."),
     "serve": ("serve", "Solve teams on request: a ROS 2 service."),
     "sniff": ("sniff", "Show and explain the messages of a run on a page."),
@@ -59,7 +60,7 @@ The lines are stored here so that `robochoc --help` need not import any command.
 
 
 POSIX_COMMANDS = frozenset(
-    ["app", "authority", "capacity", "compare", "directory", "experiment", "master", "play", "robot", "serve", "sniff"]
+    "app authority capacity compare directory experiment master play rmf robot serve sniff".split()
 )
 """The commands that start or signal other processes, lock files, or use a network."""
 

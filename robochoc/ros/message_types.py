@@ -25,6 +25,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 
 from robochoc.robots.sink import Fields
 from robochoc.ros.interfaces import part_definition
+from robochoc.ros.rmf.definitions import RMF_TYPES
 from robochoc.ros.waypoint_types import definition_of, short_kind
 from robochoc.system.errors import RobochocError
 
@@ -161,7 +162,7 @@ class Types:
         short = short_kind(kind)
         name = short.replace("/", "/msg/", 1)
         if name not in self._store.fielddefs:
-            text = part_definition(short) or definition_of(kind)
+            text = part_definition(short) or RMF_TYPES.get(short) or definition_of(kind)
             if not text:
                 problem = f"ROS {self.version} has no type {kind!r}"
                 raise UnknownTypeError(f"{problem}; add its definition to its mapping (documentation, page ROS)")

@@ -23,6 +23,7 @@ from tests.fuzz.file_targets import TARGETS as FILES
 from tests.fuzz.foreign_targets import TARGETS as FOREIGN
 from tests.fuzz.harness import Findings, Target, TooDearError, spoilt, tried
 from tests.fuzz.mutations import spoilt_bytes
+from tests.fuzz.rmf_targets import TARGETS as RMF
 from tests.fuzz.robot_targets import TARGETS as ROBOTS
 from tests.fuzz.wire_targets import TARGETS as WIRE
 from tests.support.cases import looped
@@ -31,7 +32,7 @@ INPUTS = 8
 """Spoilt inputs of each target: enough to see that it works."""
 
 
-@looped("target", [*FILES, *FOREIGN, *ROBOTS, *WIRE])
+@looped("target", [*FILES, *FOREIGN, *RMF, *ROBOTS, *WIRE])
 def test_valid_inputs_are_accepted_and_spoilt_ones_do_no_harm(target: Target) -> None:
     corpus = target.corpus()
     assert tried(target, corpus[0]) == (True, None)

@@ -205,7 +205,7 @@ def test_a_problem_that_this_machine_does_not_hold(tmp_path: Path) -> None:
     path.write_text(LIST)
     done = robochoc_within("capacity", path, "--runtime", "simulator", "--deadline", 0.0001)
     assert done.returncode == 3
-    assert "the given problem is too large: the deadline" in done.stderr
+    assert "the given problem is too large: " in done.stderr
 
 
 def test_what_is_no_problem(tmp_path: Path) -> None:
