@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.model.allocation import TaskSpec, Worker, several_tasks
+from robochoc.model.allocation import Schedule, TaskSpec, Worker, several_tasks
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind
@@ -141,7 +141,10 @@ def plan(
     }
     workers = []
     for place, robot in enumerate(robots):
-        tours = {tuple(one + 1 for one in chosen): round(1000 * cost) for chosen, (cost, _) in orders[robot].items()}
+        tours = {
+            Schedule(tuple(one + 1 for one in chosen)): round(1000 * cost)
+            for chosen, (cost, _) in orders[robot].items()
+        }
         profit = dict.fromkeys(range(1, len(names) + 1), _DONE)
         workers.append(Worker(f"R{place}", f"R{place}", f"R{place}", profit, tours=tours))
     jobs = {number: TaskSpec(f"t{number}") for number in range(1, len(names) + 1)}
