@@ -51,11 +51,12 @@ def main() -> int:
 def _named(names: list[str] | None) -> list[Target]:
     from tests.fuzz.file_targets import TARGETS as FILES  # noqa: PLC0415 - atheris wants to see them come
     from tests.fuzz.foreign_targets import TARGETS as FOREIGN  # noqa: PLC0415 - the same
+    from tests.fuzz.mavlink_target import TARGETS as MAVLINK  # noqa: PLC0415 - the same
     from tests.fuzz.rmf_targets import TARGETS as RMF  # noqa: PLC0415 - the same
     from tests.fuzz.robot_targets import TARGETS as ROBOTS  # noqa: PLC0415 - the same
     from tests.fuzz.wire_targets import TARGETS as WIRE  # noqa: PLC0415 - the same
 
-    targets = {target.name: target for target in (*FILES, *FOREIGN, *RMF, *ROBOTS, *WIRE)}
+    targets = {target.name: target for target in (*FILES, *FOREIGN, *MAVLINK, *RMF, *ROBOTS, *WIRE)}
     unknown = set(names or ()) - targets.keys()
     if unknown:
         raise SystemExit(f"fuzz: there is no target {min(unknown)}; there are {', '.join(targets)}")

@@ -22,6 +22,7 @@ from robochoc.ros.message_types import types_of
 from tests.fuzz.file_targets import TARGETS as FILES
 from tests.fuzz.foreign_targets import TARGETS as FOREIGN
 from tests.fuzz.harness import Findings, Target, TooDearError, spoilt, tried
+from tests.fuzz.mavlink_target import TARGETS as MAVLINK
 from tests.fuzz.mutations import spoilt_bytes
 from tests.fuzz.rmf_targets import TARGETS as RMF
 from tests.fuzz.robot_targets import TARGETS as ROBOTS
@@ -32,7 +33,7 @@ INPUTS = 8
 """Spoilt inputs of each target: enough to see that it works."""
 
 
-@looped("target", [*FILES, *FOREIGN, *RMF, *ROBOTS, *WIRE])
+@looped("target", [*FILES, *FOREIGN, *MAVLINK, *RMF, *ROBOTS, *WIRE])
 def test_valid_inputs_are_accepted_and_spoilt_ones_do_no_harm(target: Target) -> None:
     corpus = target.corpus()
     assert tried(target, corpus[0]) == (True, None)
