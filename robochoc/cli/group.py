@@ -60,7 +60,10 @@ The lines are stored here so that `robochoc --help` need not import any command.
 
 
 POSIX_COMMANDS = frozenset(
-    "app authority capacity compare directory experiment master play rmf robot serve sniff".split()
+    [
+        *("app", "authority", "capacity", "compare", "directory", "experiment", "master", "play", "rmf", "robot"),
+        *("serve", "sniff"),
+    ]
 )
 """The commands that start or signal other processes, lock files, or use a network."""
 
