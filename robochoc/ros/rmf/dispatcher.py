@@ -67,7 +67,7 @@ NOBODY = "robochoc-no-fleet"
 _OVERDUE_ROUNDS = 5
 """A task that had bids in this number of rounds comes first."""
 _REFUSAL = 4
-"""The number of tries for which the refusal of all fleets counts: it is no loss of a message."""
+"""The number of tries for which a refusal by all fleets counts, since no message was lost."""
 _LONGEST = 8
 _ATTEMPTS = 3
 """The number of times that a task is asked for before its round goes on without it."""
