@@ -9,9 +9,11 @@ from decimal import Decimal
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.defaults import CENTRAL
+from robochoc.run.defaults import AUTO, CENTRAL
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
+from robochoc.run.registry import protocol_named
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import listed
 
@@ -57,8 +59,10 @@ def certified_optimum(team: Team, protocol: str = CENTRAL, timeout_s: float = TI
 
     Raises:
         UnknownProtocolError: if the protocol is not installed.
-        UnsupportedError: if the protocol does not accept the team.
+        UnsupportedError: if the protocol is incomplete, or does not accept the team.
     """
+    if protocol not in {AUTO, CENTRAL} and not protocol_named(protocol).traits.complete:
+        raise UnsupportedError(f"{protocol} is incomplete and cannot prove an optimum: choose a complete protocol")
     runtime = Runtime.PROCESSES if protocol == CENTRAL else Runtime.SIMULATOR
     outcome = solve(team, Options(protocol=protocol, runtime=runtime, timeout=timeout_s))
     proven = Verdict.SOLUTION if team.kind == ProblemKind.DISCSP else Verdict.OPTIMAL

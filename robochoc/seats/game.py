@@ -33,6 +33,8 @@ from robochoc.system.plain_text import listed
 
 BUILT_IN = ("random", "greedy", "optimal")
 """The names of the built-in players without arguments."""
+MOST_ROUNDS = 1_000_000
+"""The maximum number of rounds."""
 _SCRIPT = "script:"
 
 
@@ -45,7 +47,7 @@ class GameOptions:
         players: The player of each other robot: `random`, `greedy`, `optimal`, `script:0,2,1` (indices of values), or
             the name of a protocol.
         others: The player of all robots that are not named.
-        rounds: The number of rounds.
+        rounds: The number of rounds, at most `MOST_ROUNDS`.
         seed: The seed of built-in players and protocols.
         limits: The limits on outside programs.
         optimum: The protocol that certifies the optimum; None: no regret.
@@ -262,5 +264,8 @@ def _refuse_options(team: Team, options: GameOptions) -> None:
         raise UnsupportedError(f"{team.name} has no robot {missing[0]!r}; its robots are {listed(team.order)}")
     if both := sorted({*options.commands} & {*options.players}):
         raise UnsupportedError(f"{both[0]} has two players; name one")
-    if options.rounds < 1:
-        raise UnsupportedError(f"{options.rounds} rounds: a game has at least 1")
+    for group in options.coalitions:
+        if twice := [name for name in group if group.count(name) > 1]:
+            raise UnsupportedError(f"the coalition {','.join(group)} names {twice[0]} twice: name each robot once")
+    if not 1 <= options.rounds <= MOST_ROUNDS:
+        raise UnsupportedError(f"{options.rounds} rounds: a game has at least 1 and at most {MOST_ROUNDS:,}")

@@ -12,9 +12,16 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc import load
+from robochoc.cli.commands.capacity import DEADLINE_MIN_S
+from robochoc.cli.commands.play import MOST_ROUNDS
 from robochoc.cli.group import COMMANDS, cli
 from robochoc.cli.options.sections import COMMON, REST, SectionedCommand
+from robochoc.cli.options.value_types import LARGEST_SEED, MOST
+from robochoc.experiments.capacity import measurement
+from robochoc.protocols import settings
+from robochoc.run.compatibility import option_rules
 from robochoc.run.registry import installed_spelling
+from robochoc.seats import game
 from tests.support.cases import cases
 from tests.support.program import robochoc_within
 
@@ -107,3 +114,16 @@ def test_every_number_option_rejects_other_words_in_the_same_way(every: dict[str
                 option.type.convert(word, option, None)
             kinds = r"(a|a finite|a whole) number( of at least .+| greater than .+| from .+ to .+)?"
             assert re.fullmatch(f"'{word}' is not {kinds}", refused.value.message), (name, option.name)
+
+
+def test_every_whole_number_has_a_maximum(every: dict[str, click.Command]) -> None:
+    for name, command in every.items():
+        for parameter in command.params:
+            assert parameter.type is not click.INT, (name, parameter.name)
+            if isinstance(parameter.type, click.IntRange):
+                assert parameter.type.max is not None, (name, parameter.name)
+
+
+def test_limits_that_commands_repeat() -> None:
+    limits = (settings.MOST, option_rules.LARGEST_SEED, game.MOST_ROUNDS, measurement.DEADLINE_MIN_S)
+    assert limits == (MOST, LARGEST_SEED, MOST_ROUNDS, DEADLINE_MIN_S)

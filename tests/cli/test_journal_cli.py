@@ -350,7 +350,7 @@ def test_a_choice_that_fits_nothing_is_told(file: Path) -> None:
             (("--types", "Okay"), "no type of message matches 'Okay'; known names: AddLink, Nogood, Ok"),
             (("--robots", "Robot1.1,X*"), "no robot matches 'X*'; known names: Robot1.1, "),
             (("--conversation", "2"), "there is no conversation 2; conversations are 1 to 1"),
-            (("--from", "-1"), "'-1' is not a whole number of at least 0"),
+            (("--from", "-1"), "'-1' is not a whole number from 0 to 1,000,000,000,000"),
             (("--from", "5", "--to", "3"), "there is no message from 5 to 3; messages are 0 to "),
             (("--from", "999999"), "there is no message from 999999 on; messages are 0 to "),
         ]:

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.cli.commands.check import MOST_TEAMS
+from robochoc.cli.commands.play import MOST_ROUNDS
+from robochoc.cli.options.value_types import LARGEST_SEED, MOST
 from robochoc.formats import write_team
 from tests.support.limits import HANG_S
 from tests.support.program import robochoc_within
@@ -67,6 +70,8 @@ def test_json_and_journal(team: Path, tmp_path: Path) -> None:
         (("--others", "nobody"), "no protocol 'nobody'"),
         (("--seat", "r1=/no/such/program"), "cannot be started"),
         (("--optimum", "dpopp"), "no protocol"),
+        (("--optimum", "dsa"), "dsa is incomplete"),
+        (("--coalition", "r1,r1"), "names r1 twice"),
     ],
 )  # fmt: skip
 def test_wrong_usage(team: Path, words: tuple[str, ...], says: str) -> None:
@@ -74,6 +79,24 @@ def test_wrong_usage(team: Path, words: tuple[str, ...], says: str) -> None:
     assert done.returncode == 2
     assert says in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "option", "most"),
+    [
+        ("play", "--rounds", MOST_ROUNDS),
+        ("play", "--texts", MOST),
+        ("check", "--teams", MOST_TEAMS),
+        ("check", "--seed", LARGEST_SEED),
+    ],
+)
+def test_a_number_above_the_maximum(command: str, option: str, most: int, team: Path, tmp_path: Path) -> None:
+    where = [team, "--journal", tmp_path / "game.journal"] if command == "play" else ["abt"]
+    done = robochoc_within(command, *where, option, most + 1)
+    assert done.returncode == 2
+    assert option in done.stderr
+    assert f" to {most:,}" in done.stderr
+    assert not (tmp_path / "game.journal").exists()
 
 
 def test_a_journal_that_cannot_be_written(team: Path) -> None:

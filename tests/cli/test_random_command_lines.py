@@ -50,7 +50,7 @@ def command_line(folder: Path, chance: Random) -> list[str]:
     words += some(chance, 0.5, "--order", *ORDERS)
     words += some(chance, 0.5, "--seed", *SEEDS)
     words += by_the_time(chance, 0.3, 0.0001, 0.05, 5) or some(chance, 0.1, "--timeout", "0.0001", "0.01", "1e300")
-    words += some(chance, 0.1, "--messages", 1, 10, 100, 10**30)
+    words += some(chance, 0.1, "--messages", 1, 10, 100, 10**12)
     words += some(chance, 0.05, "--channel", "wlan", "wwan")
     words += endless(chance, words) or some(chance, 0.08, "--set", *SETTINGS)
     words += some(chance, 0.03, "--spare", 1)
@@ -65,7 +65,7 @@ def command_line(folder: Path, chance: Random) -> list[str]:
     if "--channel" not in words and runtime == "simulator":
         words += some(chance, 0.3, "--schedule", "concurrent", "one-by-one", "cycles", "random")
         words += some(chance, 0.15, "--delay", 0, 20, 300)
-        words += some(chance, 0.1, "--ncccs", 1, 10, 10**30)
+        words += some(chance, 0.1, "--ncccs", 1, 10, 10**12)
         words += some(chance, 0.05, "--cycles", 1, 100)
     return [*words, "--explain"] if chance.random() < 0.1 else [*words, "--json"]
 

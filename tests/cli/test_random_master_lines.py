@@ -35,7 +35,7 @@ def command_line(team: Team, chance: Random) -> list[str]:
     words += some(chance, 0.5, "--deadline", 0.001, 0.05, 0.3)
     words += some(chance, 0.5 if "--deadline" in words else 0.03, "--improve", 0.001, 0.3)
     words += some(chance, 0.05, "--timeout", 0.001, 60)
-    words += some(chance, 0.1, "--messages", 1, 10, 10**30)
+    words += some(chance, 0.1, "--messages", 1, 10, 10**12)
     words += some(chance, 0.1, "--seed", 0, 7, 2**64 - 1)
     words += some(chance, 0.1, "--message-loss", 0.05, 0.5)
     words += some(chance, 0.2, "--set", "cycles=3", "cycles=1000000000")

@@ -8,13 +8,15 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
+from robochoc.cli.options.value_types import Number, ProtocolName, Seed
 from robochoc.cli.reports.failures import LIMIT, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.experiments.capacity.measurement import Step
     from robochoc.experiments.capacity.search import Capacity
 
+DEADLINE_MIN_S = 0.01
+"""The limit in `experiments/capacity/measurement.py`, repeated here because it is not imported at the start."""
 _HEADINGS = ("robots", "variables", "decisions/s", "messages/s", "messages", "MiB/robot", "CPU")
 
 
@@ -30,11 +32,11 @@ _HEADINGS = ("robots", "variables", "decisions/s", "messages/s", "messages", "Mi
 )
 @click.option(
     "--deadline",
-    type=Number(0, min_open=True),
+    type=Number(DEADLINE_MIN_S),
     default=5.0,
     show_default=True,
     metavar="SECONDS",
-    help="The longest time for a decision, with its check.",
+    help=f"The longest time for a decision, with its check; at least {DEADLINE_MIN_S:g} s.",
 )
 @click.option(
     "--timeout",
@@ -44,7 +46,7 @@ _HEADINGS = ("robots", "variables", "decisions/s", "messages/s", "messages", "Mi
     metavar="SECONDS",
     help="The longest time for all measurements.",
 )
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Random seed.")
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Random seed.")
 @click.option("--json", "as_json", is_flag=True, help="Print the measurements as JSON.")
 @invalid_input_fails
 def capacity(
@@ -69,14 +71,14 @@ def capacity(
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.progress import progress_line
     from robochoc.experiments.capacity.growth import growth_of
+    from robochoc.experiments.capacity.measurement import Limit
     from robochoc.experiments.capacity.search import find_capacity
     from robochoc.run.options import Options
 
-    growth = growth_of(paths)
     name = paths[0].name or str(paths[0])
     with errors_as_failures(paths[0]), progress_line(name) as progress:
         found = find_capacity(
-            growth,
+            growth_of(paths),
             Options(protocol, runtime, seed),  # type: ignore[arg-type]  # converted and checked
             deadline_s=deadline,
             timeout_s=timeout,
@@ -90,6 +92,9 @@ def capacity(
     else:
         _print(found)
     if not found.robots:
+        if found.limit == Limit.TIME:
+            why = f"could not be measured within --timeout {timeout:g} s; use a longer --timeout"
+            raise Failure(LIMIT, f"{paths[0]}: {why}")
         raise Failure(LIMIT, f"{paths[0]}: the given problem is too large: {found.limit}: {found.why}")
 
 

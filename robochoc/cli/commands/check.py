@@ -16,7 +16,7 @@ import click
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.solve import protocol_settings, settings_option
-from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
+from robochoc.cli.options.value_types import Number, ProtocolName, Seed, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
 from robochoc.system.termination import Terminated
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robochoc.exploration.check import CheckedTeam, CheckOptions
     from robochoc.model.problem import Team
 
-MOST_ROBOTS, MOST_VALUES = 6, 6
+MOST_TEAMS, MOST_ROBOTS, MOST_VALUES = 1_000_000, 6, 6
 
 _SECTIONS: Sections = {
     COMMON: ("--set", "--timeout", "--states", "--jobs", "--journal", "--html", "--json", "--help"),
@@ -40,7 +40,12 @@ _SECTIONS: Sections = {
 @click.argument("protocol", type=ProtocolName())
 @click.argument("folders", nargs=-1, type=InputPath(), metavar="[TEAM...]")
 @click.option(
-    "--teams", type=WholeNumber(1), default=20, show_default=True, metavar="N", help="Number of random teams."
+    "--teams",
+    type=WholeNumber(1, MOST_TEAMS),
+    default=20,
+    show_default=True,
+    metavar="N",
+    help="Number of random teams.",
 )
 @click.option(
     "--robots", type=WholeNumber(1, MOST_ROBOTS), default=3, show_default=True, metavar="N",
@@ -50,9 +55,7 @@ _SECTIONS: Sections = {
     "--values", type=WholeNumber(1, MOST_VALUES), default=2, show_default=True, metavar="N",
     help="Maximum number of values of a robot in a random team.",
 )  # fmt: skip
-@click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of the random teams."
-)
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Seed of the random teams.")
 @click.option(
     "--states", type=WholeNumber(1), default=100_000, show_default=True, metavar="N",
     help="Maximum number of states per team.",

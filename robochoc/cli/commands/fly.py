@@ -21,7 +21,7 @@ from robochoc.cli.options.ros_setup import (
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
 from robochoc.cli.options.scene import ground_map, html_option, map_option, serve_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
-from robochoc.cli.options.value_types import WholeNumber
+from robochoc.cli.options.value_types import Seed
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ _SECTIONS: Sections = {
 @map_option
 @ros_options
 @flight_options
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
 @html_option()
 @serve_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

@@ -37,7 +37,7 @@ from robochoc.cli.options.solve import (
     start_option,
     withdraw_option,
 )
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
 from robochoc.cli.reports.improvements import ImprovementReporter
 from robochoc.cli.reports.progress import print_above, progress_line
@@ -92,9 +92,7 @@ _SECTIONS: Sections = {
 )
 @protocol_option(central=False)
 @settings_option
-@click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of randomised protocols."
-)
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Seed of randomised protocols.")
 @start_option
 @withdraw_option
 @click.option("--private", is_flag=True, help="Robots report that they have values, but not the values.")

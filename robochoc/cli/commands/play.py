@@ -11,11 +11,14 @@ import click
 from robochoc.cli.options.paths import TeamFolder, refuse_same_places
 from robochoc.cli.options.recording import journal_option, recording
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.seats import GameReport
+
+MOST_ROUNDS = 1_000_000
+"""The limit in `seats/game.py`, repeated here because that module is not imported at the start."""
 
 _SECTIONS: Sections = {
     COMMON: ("--seat", "--player", "--others", "--rounds", "--seed", "--journal", "--json", "--help"),
@@ -35,10 +38,10 @@ _SECTIONS: Sections = {
     help="Player of ROBOT: random, greedy, optimal, script:0,2,1 (indices of values), or a protocol.",
 )  # fmt: skip
 @click.option("--others", default="dsa", show_default=True, metavar="PLAYER", help="Player of all other robots.")
-@click.option("--rounds", type=WholeNumber(1), default=20, show_default=True, metavar="N", help="Number of rounds.")
 @click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of all but programs."
+    "--rounds", type=WholeNumber(1, MOST_ROUNDS), default=20, show_default=True, metavar="N", help="Number of rounds."
 )
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Seed of all but programs.")
 @click.option(
     "--timeout", type=Number(0, min_open=True), default=30, show_default=True, metavar="SECONDS",
     help="Time for the moves of all programs in a round.",

@@ -13,7 +13,7 @@ import click
 
 from robochoc.cli.options.paths import InputPath, teams_at
 from robochoc.cli.options.ros_setup import ros_errors_as_failures
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ _SLICE_S = 0.2
     metavar="SECONDS",
     help="Time limit of a request; a request may set a lower one.",
 )
-@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Random seed.")
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Random seed.")
 @click.option("--feedback", is_flag=True, help="Publish the progress of each decision on /robochoc/feedback.")
 @click.option("--requests", type=WholeNumber(1), metavar="N", help="End after N answers.  [default: at Ctrl-C]")
 @invalid_input_fails

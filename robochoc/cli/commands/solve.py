@@ -46,7 +46,7 @@ from robochoc.cli.options.solve import (
     start_option,
     withdraw_option,
 )
-from robochoc.cli.options.value_types import Number, WholeNumber
+from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import worst
 from robochoc.cli.reports.live_sniffer import sniffer_request
 from robochoc.system.stopping import stop_handled
@@ -98,7 +98,7 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--seed",
-    type=WholeNumber(0),
+    type=Seed(),
     default=0,
     show_default=True,
     metavar="N",

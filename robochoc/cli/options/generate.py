@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import click
 
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.value_types import Finite, Number, WholeNumber
+from robochoc.cli.options.value_types import Finite, Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import invalid_input_fails
 from robochoc.cli.reports.progress import elapsed_time
 
@@ -51,9 +51,7 @@ def share_option(name: str, text: str, default: float) -> Callable[..., Any]:
     )
 
 
-seed_option = click.option(
-    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Random seed."
-)
+seed_option = click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Random seed.")
 
 
 def writes_team(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Command]:

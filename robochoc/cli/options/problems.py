@@ -63,7 +63,7 @@ def reading_options(command: _Command) -> _Command:
     )
     infinity = click.option(
         "--infinity",
-        type=WholeNumber(1),
+        type=WholeNumber(1, 10**18),  # costs of teams are lower (`model/magnitudes.py`)
         metavar="N",
         help="Costs of N or more are forbidden (maximising: -N or less).",
     )

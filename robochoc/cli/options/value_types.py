@@ -12,6 +12,11 @@ import click
 
 from robochoc.cli.options.paths import PathLike
 
+MOST = 10**12
+"""The maximum of whole numbers without another one. It is also the maximum of settings (`protocols/settings.py`)."""
+LARGEST_SEED = 2**64 - 1
+"""The limit in `run/compatibility/option_rules.py`, repeated here because that module is not imported at the start."""
+
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
@@ -21,15 +26,31 @@ def _limits(kind: click.IntRange | click.FloatRange) -> str:
 
     >>> _limits(click.IntRange(1)), _limits(click.FloatRange(0, 0.9)), _limits(click.FloatRange(0, min_open=True))
     (' of at least 1', ' from 0 to 0.9', ' greater than 0')
+    >>> _limits(WholeNumber(1, 1_000_000))
+    ' from 1 to 1,000,000'
     """
     low, high = kind.min, kind.max
+    if isinstance(low, int) and isinstance(high, int):
+        return f" from {low:,} to {high:,}"
     if low is None or high is None:
         return "" if low is None else f" greater than {low:g}" if kind.min_open else f" of at least {low:g}"
     return f" from {low:g} to {high:g}" + (f", but not {low:g}" if kind.min_open else "")
 
 
 class WholeNumber(click.IntRange):
-    """A whole number within limits."""
+    """A whole number within limits.
+
+    Args:
+        least: The minimum.
+        most: The maximum. No number is unlimited: some do not fit the counters of Python's own functions.
+    """
+
+    def __init__(self, least: int, most: int = MOST) -> None:
+        super().__init__(least, most)
+
+    def _describe_range(self) -> str:
+        """Return the range for --help, without a maximum that docs/reference/cli.md states for all commands."""
+        return f"x>={self.min}" if self.max in {MOST, LARGEST_SEED} else super()._describe_range()
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
         """Return the number, or fail with a message in plain English."""
@@ -37,6 +58,13 @@ class WholeNumber(click.IntRange):
             return super().convert(value, param, ctx)
         except click.BadParameter:
             self.fail(f"{value!r} is not a whole number{_limits(self)}", param, ctx)
+
+
+class Seed(WholeNumber):
+    """A random seed."""
+
+    def __init__(self) -> None:
+        super().__init__(0, LARGEST_SEED)
 
 
 class Number(click.FloatRange):

@@ -17,6 +17,7 @@ from robochoc.formats.yaml_tree import Node, read_yaml
 from robochoc.maps.file_content import as_input_errors, read_content
 from robochoc.model.copies import copied_team
 from robochoc.model.problem import Team
+from robochoc.solver.errors import UnsupportedError
 
 LIST_BYTES_MAX = 1 << 20
 """The maximum size of a task list, in bytes."""
@@ -43,17 +44,26 @@ def growth_of(paths: Sequence[Path]) -> Growth:
 
     Raises:
         InvalidInputError: a problem is not valid.
+        UnsupportedError: a problem has a scenario.
     """
     if len(paths) > 1:
-        teams = sorted((read_problem(path).team for path in paths), key=lambda team: len(team.order))
+        teams = sorted((_constant_team(path) for path in paths), key=lambda team: len(team.order))
         text = f"the {len(teams)} given problems, as they are, in the order of their numbers of robots"
         return Growth(text, lambda size: teams[size - 1], given=len(teams))
     path = paths[0]
     if path.is_file() and _is_task_list(path):
         return _grown_list(path)
-    team = read_problem(path).team
+    team = _constant_team(path)
     text = f"copies of {team.name}; copies share no constraints, so each copy is as difficult as the given team"
     return Growth(text, lambda size: copied_team(team, size))
+
+
+def _constant_team(path: Path) -> Team:
+    """Return the team at a path. Raises `UnsupportedError` if it has a scenario."""
+    team = read_problem(path).team
+    if team.dynamic:
+        raise UnsupportedError(f"{team.name} has a scenario: capacity is measured for problems that do not change")
+    return team
 
 
 def _is_task_list(path: Path) -> bool:

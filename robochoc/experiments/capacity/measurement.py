@@ -12,21 +12,24 @@ from statistics import median
 
 import msgspec
 
+from robochoc.communication.network.framing import MessageTooLargeError
 from robochoc.communication.resources import read_text
 from robochoc.communication.search_result import Progress, RobotsLostError
-from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.formats.diagnostics import on_one_line
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.run.options import Options
 from robochoc.run.orchestrator import solve
 from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
-from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.posix import usable_processors
 
 BUSY = 0.8
 """The fraction of all processors' time from which on the processors are the limit."""
 REPEATS_MAX = 5
+DEADLINE_MIN_S = 0.01
+"""The shortest deadline, in seconds: measurements of shorter times are not reliable."""
 
 
 class Limit(StrEnum):
@@ -47,6 +50,9 @@ _SYSTEM_LIMITS = {
     errno.ENFILE: Limit.DESCRIPTORS,
     errno.ENOMEM: Limit.MEMORY,
 }
+
+
+_TOO_LARGE = (TooLargeError, MessageTooLargeError)
 
 
 class Step(msgspec.Struct, frozen=True):
@@ -137,10 +143,13 @@ def measured(
         size: The size of the problem, for the result.
         team: The team.
         options: The options of each run; the seed and the timeout are replaced.
-        deadline_s: The longest time for a decision, in seconds.
+        deadline_s: The longest time for a decision, in seconds; at least `DEADLINE_MIN_S`.
         until_s: The time of `time.monotonic` at which measuring ends.
         progress: Receives the number of messages of the present run.
         repeats: The largest number of decisions.
+
+    Raises:
+        UnsupportedError: the given problem (size 1) is not supported, so its size is not the reason.
     """
     sums = _Sums()
     enough_s = sums.began_s + (until_s - sums.began_s) / 4
@@ -148,8 +157,9 @@ def measured(
         began_s = time.monotonic()
         if began_s > (enough_s if repeat else until_s):
             break
-        allowed_s = max(min(deadline_s, until_s - began_s), 0.01)
-        found = _solved(team, replace(options, seed=options.seed + repeat, timeout=allowed_s), progress)
+        allowed_s = max(min(deadline_s, until_s - began_s), DEADLINE_MIN_S)
+        run = replace(options, seed=options.seed + repeat, timeout=allowed_s)
+        found = _solved(team, run, progress, is_given=size == 1)
         took_s = time.monotonic() - began_s
         if isinstance(found, Outcome) and took_s <= deadline_s:
             sums.add(found, took_s)
@@ -165,8 +175,13 @@ def measured(
     return sums.step(size, team, None, "")
 
 
-def _solved(team: Team, options: Options, progress: Callable[[Progress], None] | None) -> Outcome | tuple[Limit, str]:
-    """Return the outcome of a decision, or the limit that prevented it and a sentence about it."""
+def _solved(
+    team: Team, options: Options, progress: Callable[[Progress], None] | None, *, is_given: bool
+) -> Outcome | tuple[Limit, str]:
+    """Return the outcome of a decision, or the limit that prevented it and a sentence about it.
+
+    If the team `is_given`, not grown, an `UnsupportedError` that is not about its size is raised.
+    """
     try:
         outcome = solve(team, options, progress=progress)
     except (CompileTimeoutError, TeamCompileTimeoutError):
@@ -180,7 +195,9 @@ def _solved(team: Team, options: Options, progress: Callable[[Progress], None] |
     except (UnsupportedError, TooManySolutionsError, RobotsLostError) as error:
         text = str(error)
         is_descriptors = "open files" in text
-        return (Limit.DESCRIPTORS if is_descriptors else Limit.PROBLEM), shortened(on_one_line(text))
+        if is_given and isinstance(error, UnsupportedError) and not (is_descriptors or isinstance(error, _TOO_LARGE)):
+            raise
+        return (Limit.DESCRIPTORS if is_descriptors else Limit.PROBLEM), on_one_line(text)
     return (Limit.DEADLINE, "") if outcome.verdict == Verdict.UNKNOWN else outcome
 
 

@@ -60,13 +60,14 @@ def find_capacity(
     Args:
         growth: The problem and how it grows.
         options: The options of each run; its seed and timeout are replaced.
-        deadline_s: The longest time for a decision, in seconds.
+        deadline_s: The longest time for a decision, in seconds; at least `DEADLINE_MIN_S`.
         timeout_s: The longest time for all measurements, in seconds. A decision that has begun ends by then.
         progress: Receives the number of messages of the present run.
         report: Receives each measurement.
 
     Raises:
         InvalidInputError: the given problem is not valid.
+        UnsupportedError: the given problem is not supported by the protocol or the runtime.
     """
     until_s = time.monotonic() + timeout_s
     # The first decision of a program takes longer: modules and solvers are loaded.

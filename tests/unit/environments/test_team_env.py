@@ -22,6 +22,7 @@ from robochoc.system.errors import OptionError
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.examples import drawn
 from tests.support.pkc_problems import random_pkc_team
+from tests.support.program import ROOT
 
 
 def chain() -> Team:
@@ -151,7 +152,8 @@ def test_regret_is_measured_against_the_certified_optimum() -> None:
 
 
 def test_an_optimum_needs_a_proof() -> None:
-    assert certified_optimum(chain(), "dsa").cost is None
+    with pytest.raises(UnsupportedError, match="dsa is incomplete"):
+        certified_optimum(chain(), "dsa")
     assert certified_optimum(coloring(4, 2, 3, conflicts="hard")).regret(0) is None  # three colours are needed
 
 
@@ -197,4 +199,4 @@ def test_wrong_arguments_are_refused() -> None:
 
 def test_a_team_that_changes_is_refused() -> None:
     with pytest.raises(UnsupportedError, match="scenario"):
-        parallel_env(robochoc.load("docs/examples/rescue"))
+        parallel_env(robochoc.load(ROOT / "docs" / "examples" / "rescue"))

@@ -19,9 +19,9 @@ from robochoc.model.copies import copied_team
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, solve
-from robochoc.solver.errors import UnsupportedError
+from robochoc.solver.errors import TooLargeError, UnsupportedError
 from tests.support.example_teams import example
-from tests.support.program import robochoc_within
+from tests.support.program import ROOT, robochoc_within
 from tests.support.small_teams import triangle
 from tests.support.task_lists import LIST
 
@@ -154,9 +154,27 @@ def test_the_system_refuses(error: Exception, limit: Limit, monkeypatch: pytest.
         raise error
 
     monkeypatch.setattr(measurement, "solve", refuse)
-    step = measured(1, triangle(3), SIMULATED, 1000, float("inf"))
+    step = measured(2, triangle(3), SIMULATED, 1000, float("inf"))
     assert step.limit == limit
-    assert step.why
+    assert step.why == str(error) or "the system" in step.why or "memory" in step.why
+
+
+def test_a_refused_problem_is_not_called_too_large(tmp_path: Path) -> None:
+    path = tmp_path / "team"
+    write_team(triangle(3), path)
+    done = robochoc_within("capacity", path, "--protocol", "ssi", "--runtime", "simulator")
+    assert done.returncode == 2
+    assert "too large" not in done.stderr
+    assert "..." not in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_a_given_problem_that_is_too_large_for_the_protocol(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object, **__: object) -> Outcome:
+        raise TooLargeError("a table has too many entries")
+
+    monkeypatch.setattr(measurement, "solve", refuse)
+    assert measured(1, triangle(3), SIMULATED, 1000, float("inf")).limit == Limit.PROBLEM
 
 
 @pytest.mark.parametrize(
@@ -201,11 +219,28 @@ def test_the_command(tmp_path: Path) -> None:
 
 
 def test_a_problem_that_this_machine_does_not_hold(tmp_path: Path) -> None:
-    path = tmp_path / "tasks.yaml"
-    path.write_text(LIST)
-    done = robochoc_within("capacity", path, "--runtime", "simulator", "--deadline", 0.0001)
+    path = tmp_path / "team"
+    write_team(copied_team(triangle(3), 100), path)
+    done = robochoc_within("capacity", path, "--runtime", "simulator", "--deadline", 0.01, "--timeout", 10_000)
     assert done.returncode == 3
     assert "the given problem is too large: " in done.stderr
+
+
+def test_too_little_time_for_a_measurement(tmp_path: Path) -> None:
+    write_team(triangle(3), tmp_path / "team")
+    done = robochoc_within("capacity", tmp_path / "team", "--runtime", "simulator", "--timeout", 1e-9)
+    assert done.returncode == 3
+    assert "team: could not be measured within --timeout 1e-09 s; use a longer --timeout" in done.stderr
+
+
+def test_wrong_usage(tmp_path: Path) -> None:
+    deadline = robochoc_within("capacity", tmp_path, "--deadline", 0.009)
+    assert deadline.returncode == 2
+    assert f"is not a number of at least {measurement.DEADLINE_MIN_S}" in deadline.stderr
+    scenario = robochoc_within("capacity", ROOT / "docs" / "examples" / "rescue")
+    assert scenario.returncode == 2
+    assert "has a scenario: " in scenario.stderr
+    assert len(scenario.stderr.splitlines()) == 1
 
 
 def test_what_is_no_problem(tmp_path: Path) -> None:

@@ -144,6 +144,9 @@ def test_options_that_do_not_fit_are_refused() -> None:
         (GameOptions(others="optimal", optimum=None), "not known"),
         (GameOptions({"r1": ["/no/such/program"]}), "cannot be started"),
         (GameOptions(rounds=0), "at least 1"),
+        (GameOptions(rounds=10**12), "at most 1,000,000"),
+        (GameOptions(optimum="dsa"), "dsa is incomplete"),
+        (GameOptions(coalitions=(("r1", "r0", "r1"),)), "names r1 twice"),
     ):
         with pytest.raises(UnsupportedError, match=words):
             play(team, options)
