@@ -56,7 +56,7 @@ class Meaning:
             if any(one.get("robots", 1) > 1 for one in self.tasks.values()):
                 yield "the model assignment allows one"
             if "none" in self.tasks:
-                yield "the name 'none' of a task"
+                yield "the name 'none' is reserved"
         elif not any(self.is_able(one, task) for one in self.robots.values() for task in self.tasks.values()):
             yield "no robot can do any of the tasks"
         for task in self.tasks.values():

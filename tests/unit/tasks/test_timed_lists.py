@@ -13,7 +13,6 @@ import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.run import Options, Runtime, solve
-from tests.support.foreign_problems import optimum
 from tests.support.random_task_lists import Meaning, exact, random_list, read_or_refused, rounded_fraction, written
 from tests.support.task_lists import imported, mistakes
 
@@ -142,11 +141,9 @@ def test_random_lists_with_times_have_the_optimum_of_all_orders(count: int, tmp_
             )
             continue
         best = meaning.best()
-        assert optimum(team) == best, path.read_text()
-        if solved % 4 == 0:
-            found = solve(team, Options(protocol="sfb", runtime=Runtime.SIMULATOR)).cost
-            assert found is not None
-            assert Fraction(found) == best, path.read_text()
+        found = solve(team, Options(protocol=("sfb", "dpop")[solved % 2], runtime=Runtime.SIMULATOR)).cost
+        assert found is not None
+        assert Fraction(found) == best, path.read_text()
         solved += 1
         ordered += bool(meaning.ordered)
     assert ordered > count / 3
