@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from robochoc.rounds.team_rounds import TeamRounds
 from robochoc.seats.json_lines import Notation, end_line, read_move, round_line, welcome
 from robochoc.seats.line_process import LineProcess, exchange
-from robochoc.seats.moves import Breach, Limits, Move, Players, Rule, Seen
+from robochoc.seats.moves import Breach, Limits, Move, Players, Rule, Seen, refused_as_player
 
 
 class CommandSeats(Players):
@@ -21,7 +21,7 @@ class CommandSeats(Players):
         limits: The limits on each program.
 
     Raises:
-        UnsupportedError: if a program cannot be started.
+        PlayerError: if a program cannot be started.
     """
 
     kind = "program"
@@ -40,7 +40,8 @@ class CommandSeats(Players):
         self._processes: dict[str, LineProcess] = {}
         try:
             for name, command in commands.items():
-                self._processes[name] = LineProcess(command)
+                with refused_as_player([name]):
+                    self._processes[name] = LineProcess(command)
                 self._processes[name].send(welcome(rounds, words[name], self._notations[name], number, limits))
         except BaseException:
             self.close()

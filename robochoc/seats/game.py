@@ -21,7 +21,7 @@ from robochoc.rounds.team_rounds import TeamRounds
 from robochoc.run.defaults import CENTRAL, ROUNDS
 from robochoc.run.options import Runtime
 from robochoc.seats.command_seats import CommandSeats
-from robochoc.seats.moves import Breach, Delivery, Limits, Move, Players, Rule, Seen, Statement
+from robochoc.seats.moves import Breach, Delivery, Limits, Move, Players, Rule, Seen, Statement, refused_as_player
 from robochoc.seats.players import GreedyPlayer, OptimalPlayer, RandomPlayer, ScriptedPlayer
 from robochoc.seats.protocol_robots import ProtocolRobots
 from robochoc.seats.report import GameReport, Ledger, report_of
@@ -74,8 +74,9 @@ def play(team: Team, options: GameOptions, recorder: JournalRecorder | None = No
 
     Raises:
         InvalidInputError: if the team is not valid.
-        UnknownProtocolError: if a player is not known.
-        UnsupportedError: if the options do not fit each other or the team, or a program cannot be started.
+        PlayerError: if a player is not known or cannot play, or a program cannot be started.
+        UnknownProtocolError: if the protocol that certifies the optimum is not known.
+        UnsupportedError: if the options do not fit each other or the team.
     """
     _refuse_options(team, options)
     optimum = None if options.optimum is None else certified_optimum(team, options.optimum)
@@ -112,8 +113,8 @@ class Game:
 
     def play(self) -> GameReport:
         """Play all rounds, and return the report."""
-        self._report_start()
         with self._seated() as players:
+            self._report_start()  # not before: a refused game does not overwrite a journal
             for number in range(1, self._options.rounds + 1):
                 self._play_round(number, players)
             for one in players:
@@ -147,15 +148,15 @@ class Game:
                 if name in options.commands:
                     continue
                 chosen = options.players.get(name, options.others)
-                built_in = self._built_in(name, chosen)
+                with refused_as_player([name]):
+                    built_in = self._built_in(name, chosen)
                 if built_in is None:
                     protocols.setdefault(chosen, []).append(name)
                 else:
                     players.append(built_in)
-            players += [
-                ProtocolRobots(self.rounds, protocol, names, options.seed, options.rounds)
-                for protocol, names in protocols.items()
-            ]
+            for protocol, names in protocols.items():
+                with refused_as_player(names):
+                    players.append(ProtocolRobots(self.rounds, protocol, names, options.seed, options.rounds))
             if options.commands:
                 words = {name: problem_in_words(self._team, name) for name in options.commands}
                 players.append(CommandSeats(self.rounds, options.commands, words, options.rounds, options.limits))

@@ -24,6 +24,8 @@ ROUND_BYTES = 1 << 20
 """The maximum number of bytes that a program may write in a round."""
 ROUND_LINES = 200
 """The maximum number of lines that a program may write in a round."""
+WAIT_S = 3600.0
+"""The longest single wait, in seconds: the system accepts no arbitrarily long one."""
 _CHUNK = 1 << 16
 
 
@@ -161,7 +163,7 @@ def exchange(processes: Mapping[str, LineProcess], accept: Callable[[str, bytes]
             if one.has_unsent:
                 selector.register(one.input, selectors.EVENT_WRITE, name)
         while waiting and (left := deadline - time.monotonic()) > 0:
-            for key, _ in selector.select(left):
+            for key, _ in selector.select(min(left, WAIT_S)):
                 one = processes[key.data]
                 if key.data not in waiting:
                     continue

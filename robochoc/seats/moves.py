@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import field
 from enum import StrEnum
 
 from robochoc.model.problem import Value
 from robochoc.rounds.team_rounds import TeamRounds
+from robochoc.run.registry import UnknownProtocolError
+from robochoc.solver.errors import UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
+from robochoc.system.plain_text import listed
 
 
 class Rule(StrEnum):
@@ -107,6 +111,28 @@ class Seen:
     round: int
     announced: Mapping[str, Value] = field(default_factory=dict)
     messages: Sequence[Delivery] = ()
+
+
+class PlayerError(UnsupportedError):
+    """A player cannot play: its program cannot be started, or it does not exist or does not accept the team.
+
+    Attributes:
+        robots: The robots that it should play.
+        reason: The reason.
+    """
+
+    def __init__(self, robots: Iterable[str], reason: str) -> None:
+        self.robots, self.reason = tuple(robots), reason
+        super().__init__(f"the player of {listed(self.robots)}: {reason}")
+
+
+@contextmanager
+def refused_as_player(robots: Iterable[str]) -> Iterator[None]:
+    """Convert a refusal in the block to a `PlayerError` about the player of `robots`."""
+    try:
+        yield
+    except (UnsupportedError, UnknownProtocolError) as refused:
+        raise PlayerError(robots, str(refused)) from refused
 
 
 class Players(ABC):

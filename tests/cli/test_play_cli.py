@@ -66,19 +66,30 @@ def test_json_and_journal(team: Path, tmp_path: Path) -> None:
         (("--seat", "r1=  "), "is empty"),
         (("--player", "r1=random", "--player", "r1=dsa"), "names r1 twice"),
         (("--player", "r7=random"), "no robot 'r7'"),
-        (("--others", "dpop"), "cannot play in rounds"),
-        (("--others", "nobody"), "no protocol 'nobody'"),
-        (("--seat", "r1=/no/such/program"), "cannot be started"),
+        (("--others", "dpop"), "--others dpop: dpop cannot play in rounds"),
+        (("--others", "nobody"), "--others nobody: no protocol 'nobody'"),
+        (("--seat", "r1=/no/such/program"), "--seat r1: /no/such/program cannot be started"),
+        (("--player", "r2=script:9"), "--player r2: the script of r2 needs"),
+        (("--coalition", ","), "--coalition ',' has an empty name"),
         (("--optimum", "dpopp"), "no protocol"),
         (("--optimum", "dsa"), "dsa is incomplete"),
         (("--coalition", "r1,r1"), "names r1 twice"),
     ],
 )  # fmt: skip
 def test_wrong_usage(team: Path, words: tuple[str, ...], says: str) -> None:
-    done = robochoc_within("play", team, *words)
+    journal = team.parent / "game.journal"
+    done = robochoc_within("play", team, *words, "--journal", journal)
     assert done.returncode == 2
     assert says in done.stderr
     assert len(done.stderr.splitlines()) == 1
+    assert not journal.exists()
+
+
+@pytest.mark.parametrize("timeout", ["inf", "1e300"])
+def test_any_timeout_is_accepted(team: Path, timeout: str) -> None:
+    seat = f"r1={shlex.join(program())}"
+    done = robochoc_within("play", team, "--seat", seat, "--rounds", 2, "--timeout", timeout)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.seats import GameReport
+    from robochoc.seats import GameOptions, GameReport
 
 MOST_ROUNDS = 1_000_000
 """The limit in `seats/game.py`, repeated here because that module is not imported at the start."""
@@ -92,8 +92,9 @@ def play(  # noqa: PLR0913 - options, by name
     robochoc play out/team --others random                a baseline
     robochoc play out/team --seat r1='python agent.py'    a program among robots of DSA
     """  # noqa: D301 - \\b keeps click from wrapping the lines
-    from robochoc.formats import read_team
+    from robochoc.formats import on_one_line, read_team
     from robochoc.seats import GameOptions, Limits, header_of, play
+    from robochoc.seats.moves import PlayerError
 
     refuse_same_places({"--journal": journal}, teams=(team,))
     commands = {name: _words(name, text) for name, text in _pairs("--seat", seats).items()}
@@ -105,12 +106,16 @@ def play(  # noqa: PLR0913 - options, by name
         seed=seed,
         limits=Limits(timeout_s=timeout, messages=texts, characters=characters),
         optimum=None if optimum == "none" else optimum,
-        coalitions=tuple(tuple(one.split(",")) for one in coalitions),
+        coalitions=tuple(map(_coalition, coalitions)),
     )
     problem = read_team(team)
     with recording(journal, lambda: header_of(problem, options)) as recorder:
         with errors_as_failures(team):
-            report = play(problem, options, recorder)
+            try:
+                report = play(problem, options, recorder)
+            except PlayerError as refused:
+                place = _option(refused.robots[0], options)
+                raise Failure(USAGE, on_one_line(f"{place}: {refused.reason}")) from refused
         _print(report, as_json=as_json)
 
 
@@ -136,12 +141,27 @@ def _pairs(option: str, given: tuple[str, ...]) -> dict[str, str]:
     return found
 
 
+def _option(robot: str, options: GameOptions) -> str:
+    """Return the option that names the player of a robot, in words."""
+    if robot in options.commands:
+        return f"--seat {robot}"
+    return f"--player {robot}" if robot in options.players else f"--others {options.others}"
+
+
+def _coalition(text: str) -> tuple[str, ...]:
+    """Return the names of the robots in a coalition."""
+    names = tuple(text.split(","))
+    if not all(names):
+        raise Failure(USAGE, f"--coalition {text!r} has an empty name: write for example --coalition r1,r2")
+    return names
+
+
 def _words(name: str, command: str) -> list[str]:
     """Return the words of a command."""
     try:
         words = shlex.split(command)
     except ValueError as error:
-        raise Failure(USAGE, f"the command of {name} cannot be read: {error}") from None
+        raise Failure(USAGE, f"--seat {name}: the command cannot be read: {error}") from None
     if not words:
-        raise Failure(USAGE, f"the command of {name} is empty")
+        raise Failure(USAGE, f"--seat {name}: the command is empty")
     return words

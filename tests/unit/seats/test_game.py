@@ -13,8 +13,8 @@ from robochoc.generators.coloring import coloring
 from robochoc.journal.reader import read_journal
 from robochoc.journal.recorder import JournalRecorder
 from robochoc.privacy import Kind, privacy_of
-from robochoc.run.registry import UnknownProtocolError
 from robochoc.seats import GameOptions, Limits, header_of, play
+from robochoc.seats.moves import PlayerError
 from robochoc.seats.report import cost_shares
 from robochoc.solver.errors import UnsupportedError
 from robochoc.verification.checker import assignment_cost
@@ -150,7 +150,7 @@ def test_options_that_do_not_fit_are_refused() -> None:
     ):
         with pytest.raises(UnsupportedError, match=words):
             play(team, options)
-    with pytest.raises(UnknownProtocolError):
+    with pytest.raises(PlayerError, match="the player of r0, r1"):
         play(team, GameOptions(others="dsaa"))
 
 
