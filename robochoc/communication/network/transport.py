@@ -7,6 +7,7 @@ runs callbacks in its own threads; they only put items into `inbox`.
 
 from __future__ import annotations
 
+import atexit
 import base64
 import threading
 import time
@@ -38,6 +39,8 @@ the heartbeat: a receiver requests them as soon as it sees the sender again.
 """
 KEPT_FRAMES = 100_000
 _LATE_S = 1.0
+_CLOSE_S = 12.0
+"""The longest time in seconds that closing a dead link takes; zenoh needs 10 s."""
 _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
 """The duration of attempts to connect, in seconds. A busy router may need a long time for a handshake."""
 
@@ -162,8 +165,10 @@ class Transport:
             self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
     def abandon(self) -> None:
-        """Close the connection in a thread. On a dead link, this takes 10 s."""
-        threading.Thread(target=self.close, name=f"close {self.name}", daemon=True).start()
+        """Close the connection in a thread. On a dead link, this takes 10 s, for which the program's end waits."""
+        thread = threading.Thread(target=self.close, name=f"close {self.name}", daemon=True)
+        thread.start()
+        atexit.register(thread.join, _CLOSE_S)  # a thread in zenoh during Python's end aborts the program
 
     def __enter__(self) -> Self:
         return self

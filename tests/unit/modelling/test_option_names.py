@@ -28,7 +28,7 @@ TABLES = {"system/pydcop_words.py"}
 TRANSLATED = ARGUMENTS | {"format", "infinity", "owner", "allow_code", "hosts", "identity"}
 """The arguments of `solve`, `load`, and `AgentsContainer`."""
 OF_COMMANDS = {
-    *("--private", "--sniffable", "--may"),  # of `robochoc master` and `robochoc authority`
+    *("--private", "--sniffable", "--may", "--role"),  # of `robochoc master` and `robochoc authority`
     *("--situation", "--long", "--help", "--scale"),  # of other commands, or of all
     *("--intension", "--distribution"),  # of export, and of pyDCOP
     "--force",  # `Model.save` has its own message

@@ -18,9 +18,11 @@ from lxml import etree
 
 import robochoc
 from robochoc.app.sketch.troubles import About, Trouble
+from robochoc.communication.network.control_messages import StandbyAnswer
 from robochoc.communication.search_result import RobotsLostError
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
 from robochoc.modelling.errors import ModelError, SourceLine, UnknownNameError
+from robochoc.run.networked.address import Address
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.services.descriptions import Reason
 
@@ -32,9 +34,12 @@ ARGUMENTS: dict[str, object] = {
     "bool": True,
     "object": ("a value", 1),
     "Sequence[str]": ["a", "b"],
+    "Iterable[str]": ("a", "b"),
     "Sequence[int]": [4, 5],
     "Mapping[str, str]": {"a": "process ended", "b": "no answer"},
     "Iterable[Diagnostic]": [Diagnostic("a.xml", 3, "wrong", "do this"), Diagnostic("a.xml", 1, "odd", "")],
+    "Address": Address("a.example", 7447),
+    "StandbyAnswer": StandbyAnswer({}, (), over="solution"),
     "SourceLine | None": SourceLine("a.py", 7),
     "tuple[int, ...] | None": (1, 0),
     "etree._Element": etree.fromstring("<a><b c='1'>text</b></a>"),
