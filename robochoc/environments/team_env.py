@@ -22,6 +22,7 @@ from robochoc.rounds.team_rounds import TeamRounds
 from robochoc.run.defaults import CENTRAL
 from robochoc.solver.encoding import max_cost
 from robochoc.system.errors import OptionError
+from robochoc.system.plain_text import on_one_line
 
 ENV_NAME = "robochoc_team_v0"
 MAX_SIGNALS = 256
@@ -98,8 +99,10 @@ class TeamEnv(ParallelEnv):
         violation_cost: float | None = None,
         render_mode: str | None = None,
     ) -> None:
-        _refuse_options(rounds, reward, signals, render_mode)
-        team = problem if isinstance(problem, Team) else problem.team
+        team = problem if isinstance(problem, Team) else getattr(problem, "team", None)
+        if not isinstance(team, Team):
+            raise OptionError(f"problem is {_shown(problem)}; use a Team, a Problem or a Model")
+        _refuse_options(rounds, reward, signals, optimum, violation_cost, render_mode)
         self._state = TeamRounds(team, violation_cost)
         self._rounds, self._reward, self._signals = rounds, Reward(reward), signals
         self.render_mode = render_mode
@@ -118,9 +121,15 @@ class TeamEnv(ParallelEnv):
         self._sent: dict[str, int] = {}
         self._random = np.random.default_rng()
         self._round = 0
+        self._is_reset = False
 
     def values(self, agent: str) -> list[dict[str, int | str]]:
-        """Return the values of a robot in the order of their indices, each by variable, in the user's notation."""
+        """Return the values of a robot in the order of their indices, each by variable, in the user's notation.
+
+        Raises:
+            OptionError: if no robot is called `agent`.
+        """
+        self._refuse_name(agent)
         problem, variables = self._state.problems[agent], self._state.team.variables
         found = [problem.solution(index) for index in range(len(problem.values))]
         return [{name: variables[name].domain.label(part) for name, part in one.items()} for one in found]
@@ -141,17 +150,22 @@ class TeamEnv(ParallelEnv):
         Args:
             seed: The seed of this and later episodes. None: the random numbers continue.
             options: `values` has the index of the first value of some robots, by name. Other keys are ignored.
+
+        Raises:
+            OptionError: if `values` is not a mapping from robots to indices of their values.
         """
+        given = (options or {}).get("values", {})
+        if not isinstance(given, Mapping):
+            raise OptionError(f"values is {_shown(given)}; use a mapping from robots to the indices of values")
+        for name, index in given.items():
+            self._refuse_value(name, index)
         if seed is not None:
             self._random = np.random.default_rng(seed)
         self.agents = [*self.possible_agents]
-        self._round = 0
+        self._round, self._is_reset = 0, True
         self._sent = dict.fromkeys(self.agents, 0)
         drawn = {name: int(self._random.integers(len(self.values(name)))) for name in self.agents}
-        given = dict((options or {}).get("values", {}))
-        for name, index in given.items():
-            self._refuse_value(name, index)
-        self._state.choose(drawn | given)
+        self._state.choose(drawn | {name: int(index) for name, index in given.items()})
         return {name: self._observation(name) for name in self.agents}, self._infos()
 
     def step(
@@ -162,17 +176,13 @@ class TeamEnv(ParallelEnv):
         Raises:
             OptionError: if an action is not in the robot's action space.
         """
+        self._require_reset()
         if not self.agents:
             return {}, {}, {}, {}, {}
         before = self._paid()
-        chosen: dict[str, int] = {}
-        for name, action in actions.items():
-            index, signal = action if self._signals else (action, 0)
-            self._refuse_value(name, index)
-            if self._signals and not 0 <= int(signal) < self._signals:
-                raise OptionError(f"the signal of {name} is {signal}; it must be 0 to {self._signals - 1}")
-            chosen[name], self._sent[name] = int(index), int(signal)
-        self._state.choose(chosen)
+        chosen = {name: self._parts_of(name, action) for name, action in actions.items()}
+        self._state.choose({name: index for name, (index, _) in chosen.items()})
+        self._sent |= {name: signal for name, (_, signal) in chosen.items()}
         after = self._paid()
         rewards = {name: before[name] - after[name] for name in self.agents}
         self._round += 1
@@ -185,12 +195,14 @@ class TeamEnv(ParallelEnv):
 
     def state(self) -> NDArray[np.int64]:
         """Return the index of the value of each robot, in the order of `possible_agents`. Requires `reset`."""
+        self._require_reset()
         return np.array([self._state.values[name] for name in self.possible_agents], dtype=np.int64)
 
     def render(self) -> str | None:
         """Return or print the round, the robots' values and the cost, as text."""
         if self.render_mode is None:
             return None
+        self._require_reset()
         broken, _ = self._state.team_cost
         cost = f"violated hard constraints: {broken}" if broken else f"cost {self._state.user_cost}"
         lines = [f"round {self._round} of {self._rounds}: {cost}"]
@@ -206,13 +218,36 @@ class TeamEnv(ParallelEnv):
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
+    def _require_reset(self) -> None:
+        """Raise `OptionError` before the first episode."""
+        if not self._is_reset:
+            raise OptionError("the environment has no episode yet: call reset first")
+
     def _refuse_value(self, name: str, index: object) -> None:
         """Raise `OptionError` if `index` is not the index of a value of the robot called `name`."""
-        if name not in self._state.problems:
-            raise OptionError(f"{name!r} is not a robot of the team; its robots are in possible_agents")
+        self._refuse_name(name)
         number = len(self._state.problems[name].values)
-        if not isinstance(index, int | np.integer) or not 0 <= index < number:
-            raise OptionError(f"the action of {name} is {index!r}; it must be an index from 0 to {number - 1}")
+        if not _is_number_in(index, 0, number - 1):
+            raise OptionError(f"the action of {name} is {_shown(index)}; it must be an index from 0 to {number - 1}")
+
+    def _refuse_name(self, name: str) -> None:
+        """Raise `OptionError` if no robot is called `name`."""
+        if name not in self._state.problems:
+            raise OptionError(f"{_shown(name)} is not a robot of the team; its robots are in possible_agents")
+
+    def _parts_of(self, name: str, action: Action) -> tuple[int, int]:
+        """Return the index of the value and the signal in an action. Raises `OptionError`."""
+        if not self._signals:
+            self._refuse_value(name, action)
+            return int(action), 0
+        self._refuse_name(name)
+        parts = [*action] if isinstance(action, tuple | list | np.ndarray) else []
+        if len(parts) != 2:  # noqa: PLR2004 - a value and a signal
+            raise OptionError(f"the action of {name} is {_shown(action)}; use a pair of a value's index and a signal")
+        self._refuse_value(name, parts[0])
+        if not _is_number_in(parts[1], 0, self._signals - 1):
+            raise OptionError(f"the signal of {name} is {_shown(parts[1])}; it must be 0 to {self._signals - 1}")
+        return int(parts[0]), int(parts[1])
 
     def _actions_of(self, name: str) -> spaces.Space[Any]:
         number = len(self._state.problems[name].values)
@@ -285,13 +320,30 @@ def env(problem: Team | HasTeam, **options: Any) -> AECEnv:  # noqa: ANN401 - th
     return parallel_to_aec(TeamEnv(problem, **options))
 
 
-def _refuse_options(rounds: int, reward: str, signals: int, render_mode: str | None) -> None:
-    """Raise `OptionError` if a value is not allowed."""
-    if rounds < 1:
-        raise OptionError(f"rounds is {rounds}; an episode has at least 1 round")
-    if reward not in set(Reward):
-        raise OptionError(f"reward is {reward!r}; use {' or '.join(map(repr, map(str, Reward)))}")
-    if not (signals == 0 or 2 <= signals <= MAX_SIGNALS):  # noqa: PLR2004 - one signal says nothing
-        raise OptionError(f"signals is {signals}; use 0, or 2 to {MAX_SIGNALS}")
-    if render_mode not in {None, "ansi", "human"}:
-        raise OptionError(f"render_mode is {render_mode!r}; use None, 'ansi' or 'human'")
+def _shown(value: object) -> str:
+    """Return a value of the user as one short line."""
+    return on_one_line(repr(value))
+
+
+def _is_number_in(value: object, low: int, high: float) -> bool:
+    """Return whether `value` is a whole number from `low` to `high`. Truth values are not."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and low <= int(value) <= high
+
+
+def _refuse_options(
+    rounds: object, reward: object, signals: object, optimum: object, violation_cost: object, render_mode: object
+) -> None:
+    """Raise `OptionError` if an argument has a wrong type, or a value that is not allowed."""
+    if not _is_number_in(rounds, 1, float("inf")):
+        raise OptionError(f"rounds is {_shown(rounds)}; use a whole number of at least 1")
+    if not (isinstance(reward, str) and reward in set(Reward)):
+        raise OptionError(f"reward is {_shown(reward)}; use {' or '.join(map(repr, map(str, Reward)))}")
+    if not (_is_number_in(signals, 0, 0) or _is_number_in(signals, 2, MAX_SIGNALS)):
+        raise OptionError(f"signals is {_shown(signals)}; use 0, or 2 to {MAX_SIGNALS}")
+    if not isinstance(optimum, str | Optimum | None):
+        raise OptionError(f"optimum is {_shown(optimum)}; use the name of a protocol, an Optimum or None")
+    number = 0.0 if violation_cost is None else violation_cost
+    if not (isinstance(number, int | float) and not isinstance(number, bool) and 0 <= number < float("inf")):
+        raise OptionError(f"violation_cost is {_shown(violation_cost)}; use a finite number of at least 0, or None")
+    if not (render_mode is None or (isinstance(render_mode, str) and render_mode in {"ansi", "human"})):
+        raise OptionError(f"render_mode is {_shown(render_mode)}; use None, 'ansi' or 'human'")

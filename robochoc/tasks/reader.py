@@ -93,17 +93,28 @@ def _list(head: EntryReader, path: Path, mistakes: DiagnosticCollector) -> TaskL
     if places > MAX_PLACES:
         raise MistakeError(f"has costs with {places} decimal places", f"write places: {MAX_PLACES} or less")
     tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
-    for robot in robots.values():
-        if robot.topic:
-            with mistakes.at(robot.line):
-                check_word(robot.topic)
+    _check_topics(robots, mistakes)
     name = " ".join(head.words("name")) or path.stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
     ways = _ways(head, path.parent, robots, tasks, mistakes)
     step = head.number("step", Fraction(1)) or Fraction(0)
     if not step:
-        raise MistakeError("has the step 0", "write a number above 0", head.required_node("step").line)
+        raise MistakeError("the list has the step 0", "write a number above 0", head.required_node("step").line)
     return TaskList(name, model, ways, places, robots, tasks, synergies, tours, step)
+
+
+def _check_topics(robots: Mapping[str, RobotEntry], mistakes: DiagnosticCollector) -> None:
+    """Report invalid topics, and topics of several robots."""
+    owners: dict[str, str] = {}
+    for name, robot in robots.items():
+        if not robot.topic:
+            continue
+        with mistakes.at(robot.line):
+            check_word(robot.topic)
+            if owner := owners.get(robot.topic):
+                what = f"the robots '{shortened(owner)}' and '{shortened(name)}' have the same topic"
+                raise MistakeError(what, "give each robot its own topic")
+            owners[robot.topic] = name
 
 
 def _ways(

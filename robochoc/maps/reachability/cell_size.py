@@ -88,7 +88,7 @@ def in_pixels(radius: Fraction, resolution: Fraction) -> Fraction:
     """Return a radius in pixels. Raises `ValueError` if it exceeds `MAX_RADIUS`."""
     if radius > MAX_RADIUS * resolution:
         raise ValueError(
-            f"the radius {float(radius):g} m is more than {MAX_RADIUS} pixels of this map; use a smaller radius"
+            f"the radius {float(radius):g} m is more than {MAX_RADIUS} pixels of this map: use a smaller radius"
         )
     return radius / resolution
 

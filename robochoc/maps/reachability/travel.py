@@ -115,14 +115,33 @@ def travel_times(
     Example:
         >>> robochoc.travel_times("building.yaml", [[1, 1], [8, 2.5]], speed=0.5)  # doctest: +SKIP
     """
-    array = np.asarray(places, dtype=np.float64)
-    if array.ndim != 2 or array.shape[1] not in (2, 3) or not np.isfinite(array).all():  # noqa: PLR2004 - x, y, z
-        raise OptionError(f"places has the shape {array.shape}: give finite numbers of the shape (N, 2) or (N, 3)")
-    if not (radius >= 0 and 0 < speed < float("inf")):
-        raise OptionError(f"radius is {radius}, and speed is {speed}: give a radius of at least 0, a speed above 0")
+    array = _places_in(places)
+    if not (_is_finite(radius) and radius >= 0):
+        raise OptionError(f"radius is {radius!r}: use a finite number of at least 0")
+    if not (_is_finite(speed) and speed > 0):
+        raise OptionError(f"speed is {speed!r}: use a finite number above 0")
     space = TravelSpace(read_map(Path(map)), Fraction(str(float(radius))))
     found = [tuple(Fraction(str(part)) for part in place) for place in array.tolist()]
     for number, place in enumerate(found):
         space.check(f"place {number}", place)
     metres = [[np.inf if one is None else float(one) for one in space.lengths(start, found)] for start in found]
     return np.array(metres, dtype=np.float64).reshape(len(found), len(found)) / speed
+
+
+def _is_finite(value: object) -> bool:
+    """Return whether `value` is a finite number."""
+    return isinstance(value, int | float | np.integer | np.floating) and bool(np.isfinite(value))
+
+
+def _places_in(places: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return places as an array. Raises `OptionError` unless they are finite coordinates."""
+    try:
+        array = np.asarray(places, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise OptionError("places is not an array of numbers: use one row of coordinates for each place") from error
+    if array.ndim != 2 or array.shape[1] not in (2, 3):  # noqa: PLR2004 - x, y, z
+        raise OptionError(f"places has the shape {array.shape}: use (N, 2), or (N, 3) on an OctoMap")
+    if not np.isfinite(array).all():
+        number = int(np.argwhere(~np.isfinite(array))[0][0])
+        raise OptionError(f"place {number} is {array[number].tolist()}: use finite numbers")
+    return array

@@ -7,6 +7,7 @@ import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from random import Random
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -185,16 +186,46 @@ def test_wrong_arguments_are_refused() -> None:
         ({"reward": "all"}, "'own' or 'team'"),
         ({"signals": 1}, "signals is 1"),
         ({"render_mode": "rgb_array"}, "render_mode"),
+        ({"render_mode": []}, "render_mode"),
+        ({"rounds": 2.5}, "rounds is 2.5"),
+        ({"rounds": True}, "rounds is True"),
+        ({"rounds": "5"}, "rounds is '5'"),
+        ({"signals": 2.5}, "signals is 2.5"),
+        ({"reward": ["own"]}, "reward is"),
+        ({"violation_cost": float("nan")}, "violation_cost is nan"),
+        ({"violation_cost": "x"}, "violation_cost is 'x'"),
+        ({"violation_cost": -1}, "violation_cost is -1"),
+        ({"optimum": 3}, "optimum is 3"),
     ):
         with pytest.raises(OptionError, match=word):
-            parallel_env(team, optimum=None, **options)
-    environment = parallel_env(team, optimum=None)
-    with pytest.raises(OptionError, match="'r9' is not a robot"):
-        environment.reset(options={"values": {"r9": 0}})
+            parallel_env(team, **{"optimum": None} | options)
+    with pytest.raises(OptionError, match="use a Team"):
+        parallel_env(cast("Any", None))
+    environment = parallel_env(team, optimum=None, render_mode="ansi")
+    for early in (environment.state, environment.render, lambda: environment.step({})):
+        with pytest.raises(OptionError, match="call reset first"):
+            early()
+    for given, word in (({"r9": 0}, "'r9' is not a robot"), (None, "a mapping"), ([1], "a mapping")):
+        with pytest.raises(OptionError, match=word):
+            environment.reset(options={"values": given})
+    with pytest.raises(OptionError, match="'zz' is not a robot"):
+        environment.values("zz")
     environment.reset()
     for wrong in (3, -1, 0.5, "0"):
         with pytest.raises(OptionError, match="action of r0"):
             environment.step({"r0": wrong})
+
+
+def test_a_refused_step_changes_nothing() -> None:
+    environment = parallel_env(chain(), optimum=None, signals=2)
+    environment.reset(seed=1)
+    before = environment.state().tolist()
+    for wrong in (1, (0, 0, 0), (0, float("nan")), (0, "x"), (0, 0.7), (True, 1), (0, 2)):
+        with pytest.raises(OptionError, match="of r1 is"):
+            environment.step({"r0": (2, 1), "r1": wrong})
+    assert environment.state().tolist() == before
+    observations = environment.step({})[0]
+    assert observations["r1"]["signals"].tolist() == [0, 0]
 
 
 def test_a_team_that_changes_is_refused() -> None:

@@ -186,7 +186,7 @@ def test_a_task_after_one_that_nobody_can_do_is_left_out(tmp_path: Path) -> None
             "6: the task 'unlock' has duration:, but robots that do several tasks have no",
         ),
         ("tours: yes", "model: assignment", "has after:, which the model assignment does not support"),
-        ("tours: yes", "tours: yes\nstep: 0", "2: has the step 0 (write a number above 0)"),
+        ("tours: yes", "tours: yes\nstep: 0", "2: the list has the step 0 (write a number above 0)"),
         ("tours: yes", "tours: yes\nstep: 0.001", "the task 'unlock' has more than 1,000 starts in its window"),
     ],
 )

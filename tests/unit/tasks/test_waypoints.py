@@ -121,6 +121,8 @@ def test_a_robot_may_have_another_topic_and_the_folder_has_the_same(tmp_path: Pa
         }
     assert mistakes(text.replace("/bobs/goal", '"/bobs goal"'), tmp_path).startswith("3: ")
     assert "cannot have '7' as 'topic'" in mistakes(text.replace("/bobs/goal", "7"), tmp_path)
+    both = text.replace("capacity: 3}", "capacity: 3, topic: /bobs/goal}", 1)
+    assert "the robots 'ann' and 'bob' have the same topic" in mistakes(both, tmp_path)
 
 
 def test_robots_with_too_many_tasks_get_a_note(tmp_path: Path) -> None:
