@@ -107,8 +107,17 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, is_com
     last = _last_runs(runs)
     for number, epoch in enumerate(outcome.epochs):
         if number in last:
-            yield from _answer_contradictions(f"epoch {number}'s ", epoch, last[number])
-    yield from _answer_contradictions("the outcome's ", outcome, runs[-1])
+            yield from _answer_contradictions(f"epoch {number}'s ", epoch, _with_repair(epoch, runs, last[number]))
+    yield from _answer_contradictions("the outcome's ", outcome, _with_repair(outcome, runs, runs[-1]))
+
+
+def _with_repair(recorded: Answer, runs: Sequence[ReplayedRun], last: ReplayedRun) -> ReplayedRun:
+    """Return `last` with the answer after a repair: the bound of the search before the repair may prove it."""
+    at = next(number for number, one in enumerate(runs) if one is last)
+    before = runs[at - 1].answer if at and recorded.repair else None
+    if before is None or last.answer is None or recorded.repair is None:
+        return last
+    return replace(last, answer=before.repaired(last.answer, recorded.repair))
 
 
 def _may_be_incomplete(header: Header, outcome: Outcome) -> bool:

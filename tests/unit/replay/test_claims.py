@@ -230,6 +230,23 @@ def test_the_best_assignment_of_an_asynchronous_search_is_no_contradiction() -> 
     assert earlier
 
 
+def test_the_bound_of_the_search_before_a_repair_may_prove_the_answer() -> None:
+    """Found by `make simulate`: the replay compared the answer with the repair alone, which has no bound."""
+    options = Options(protocol="bounded-maxsum", runtime=Runtime.SIMULATOR, cache=False)
+    verdicts = set()
+    for number in (2, 42, 44):
+        journal = recorded(random_csp(6, 3, 0.6, 0.4, seed=number, max_cost=9), options)
+        outcome = journal.outcome
+        assert outcome is not None
+        assert identical(replay(journal)), number
+        if outcome.repair:
+            verdicts.add(outcome.verdict)
+        if outcome.repair and outcome.verdict == Verdict.SOLUTION:
+            forged = replace(journal, outcome=replace(outcome, verdict=Verdict.OPTIMAL))
+            assert "the outcome's verdict" in [one.what for one in replay(forged).contradictions]
+    assert verdicts >= {Verdict.SOLUTION, Verdict.OPTIMAL}
+
+
 def test_decisions_of_processes_are_known_in_bundles_only() -> None:
     """Found by `make simulate`: the answer was an assignment that the robots had, in the order of their reports."""
     found = 0
