@@ -354,6 +354,16 @@ def test_a_router_that_stands_still_does_not_keep_us(monkeypatch: pytest.MonkeyP
         sink.discard()
 
 
+def test_messages_that_the_router_has_not_read_are_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rmw_zenoh_session, "CLOSE_S", 0.5)
+    with Router() as router:
+        sink = RmwZenohSink(router.place)
+        router.stop()
+        sink.publish("/a", POSE, pose(1), STAMP)
+        with pytest.raises(SinkError, match="does not accept our messages"):
+            sink.close()
+
+
 def test_a_session_that_comes_too_late_is_closed(router: Router, monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[zenoh.Session] = []
     may_go = threading.Event()

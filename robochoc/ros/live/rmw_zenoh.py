@@ -53,7 +53,7 @@ class RmwZenohSink(LiveSink):
         self._publishers[topic].put(content, at_ns)
 
     def close(self) -> None:
-        """Wait until all messages have been sent to the router."""
+        """Wait until the router has received all messages."""
         try:
             self._session.wait_for_link()
         except SinkError:
@@ -64,7 +64,7 @@ class RmwZenohSink(LiveSink):
 
     def discard(self) -> None:
         """End the session."""
-        self._session.close()
+        self._session.discard()
 
 
 class RmwZenohSource(LiveSource):
@@ -97,7 +97,7 @@ class RmwZenohSource(LiveSource):
 
     def close(self) -> None:
         """End the session."""
-        self._session.close()
+        self._session.discard()
 
     def _receive(self, topic: ZenohTopic, kind: str, key: str, content: bytes) -> None:
         if key.rpartition("/")[2] not in {topic.hash, NO_HASH} or len(content) > MESSAGE_BYTES_MAX:

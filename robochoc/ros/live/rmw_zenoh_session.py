@@ -245,8 +245,25 @@ class RosSession:
             self.check()
 
     def close(self) -> bool:
-        """End the session; return whether zenoh has sent all its messages."""
-        return succeeds_in_time(self._session.close, CLOSE_S)
+        """End the session; return whether the router has received all its messages."""
+        has_received = succeeds_in_time(self._flush, CLOSE_S)
+        self.discard()
+        return has_received
+
+    def discard(self) -> None:
+        """End the session at once. Messages under way may be lost."""
+        succeeds_in_time(self._session.close, CLOSE_S)
+
+    def _flush(self) -> None:
+        """Wait until the router has received all messages. Raises `TimeoutError`.
+
+        Without this, closing the socket could destroy messages that the router has not read yet. The router reads in
+        order, so its answer to a query of the lowest priority proves that it has read all messages before it.
+        """
+        key = f"robochoc/flush/{self._session.zid()}"
+        answers = self._session.get(key, timeout=CLOSE_S, priority=zenoh.Priority.BACKGROUND)
+        if any(answer.err is not None for answer in answers):
+            raise TimeoutError
 
     def _check_listening(self, address: RouterAddress) -> None:
         """Raise `failed` at once if no program listens; zenoh would retry."""
