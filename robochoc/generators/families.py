@@ -12,11 +12,14 @@ from types import MappingProxyType, UnionType
 from typing import Any, get_args, get_type_hints
 
 from robochoc.generators import coloring as colorings
+from robochoc.generators import frequencies as frequency_assignments
 from robochoc.generators import ising as isings
 from robochoc.generators import meetings as schedules
+from robochoc.generators import nary as nary_problems
 from robochoc.generators import queens3d as queens
 from robochoc.generators import random_csp as random_problems
 from robochoc.generators import sensors as sensor_networks
+from robochoc.generators import smart_homes as lightings
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
@@ -206,13 +209,16 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "coloring": coloring,
         "coverage": coverage,
         "formation": formation,
+        "frequencies": frequency_assignments.frequencies,
         "grid-sensors": grid_sensors,
         "ising": isings.ising,
         "meetings": meetings,
+        "nary": nary_problems.nary,
         "patrol": patrol,
         "queens3d": queens.queens3d,
         "random": random,
         "sensors": sensor_networks.sensors,
+        "smart-homes": lightings.smart_homes,
         "tasks": tasks,
         "tracking": trackings.tracking,
     }

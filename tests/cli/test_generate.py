@@ -13,6 +13,7 @@ from robochoc.cli.options.generate import next_step
 from robochoc.cli.reports.failures import INVALID
 from robochoc.formats import read_team
 from robochoc.generators.coloring import coloring_of
+from robochoc.generators.frequencies import frequencies
 from robochoc.generators.graphs import grid, scale_free, small_world, tree
 from robochoc.generators.ising import ising
 from robochoc.generators.maps.coverage import coverage
@@ -20,8 +21,10 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.map_team import MapChoice
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.meetings import meetings
+from robochoc.generators.nary import nary
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
+from robochoc.generators.smart_homes import smart_homes
 from robochoc.generators.tasks import Skills, Travel, tasks
 from robochoc.generators.tracking import tracking
 from robochoc.maps.occupancy.grid import read_occupancy_grid
@@ -51,6 +54,11 @@ FAMILIES: dict[str, Callable[[], Team]] = {
         coloring_of(small_world(6, 2, 0), 3, conflicts="weighted", places=1)
     ),
     "ising --rows 2 --columns 3 --seed 4": lambda: ising(2, 3, 4),
+    "nary --agents 5 --domain 2 --constraints 4 --max-cost 9": lambda: nary(
+        agents=5, domain=2, constraints=4, max_cost=9
+    ),
+    "frequencies --agents 5 --frequencies 3": lambda: frequencies(agents=5, frequencies=3),
+    "smart-homes --agents 4 --rules 3 --levels 3": lambda: smart_homes(agents=4, rules=3, levels=3),
     "meetings --agents 3 --meetings 2 --slots 3 --max-length 2": lambda: meetings(3, 2, 2, 3, max_length=2),
     "meetings --agents 3 --meetings 2 --slots 3 --required": lambda: meetings(3, 2, 2, 3, max_value=None),
     "sensors --sensors 6 --targets 2 --needed 1": lambda: sensors(6, 2, needed=1),

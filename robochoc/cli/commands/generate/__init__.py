@@ -7,6 +7,7 @@ import click
 from robochoc.cli.commands.generate.binary import coloring, ising, random_problem
 from robochoc.cli.commands.generate.maps import coverage, formation, patrol
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
+from robochoc.cli.commands.generate.networks import frequencies, nary, smart_homes
 from robochoc.cli.commands.generate.queens import queens3d
 from robochoc.cli.commands.generate.scenario import scenario
 
@@ -26,14 +27,17 @@ for family in (
     coloring,
     coverage,
     formation,
+    frequencies,
     grid_sensors,
     ising,
     meetings,
+    nary,
     patrol,
     queens3d,
     random_problem,
     scenario,
     sensors,
+    smart_homes,
     tasks,
     tracking,
 ):

@@ -1,0 +1,89 @@
+"""`robochoc generate nary`, `frequencies` and `smart-homes`: constraints of several robots, radio links and lamps."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.generate import number_option, seed_option, share_option, writes_team
+from robochoc.cli.options.value_types import WholeNumber
+
+if TYPE_CHECKING:
+    from robochoc.model.problem import Team
+
+MAX_COST = 1_000_000
+
+
+@click.command(short_help="Model RB: random constraints of any arity.")
+@number_option("--agents", "Number of robots.")
+@number_option("--domain", "Number of values of each variable.")
+@number_option("--constraints", "Number of constraints.", least=0, most=200_000)
+@number_option("--arity", "Number of variables of each constraint.", most=10, default=3)
+@share_option("--tightness", "Fraction of tuples that a constraint forbids", 0.0)
+@click.option(
+    "--max-cost",
+    type=WholeNumber(0, MAX_COST),
+    metavar="COST",
+    help="Make a DCOP: each allowed tuple has a cost, uniform from 0 to COST.",
+)
+@seed_option
+@writes_team("nary-AGENTS-DOMAIN-CONSTRAINTSxARITY-TIGHTNESS[-costMAX]-SEED")
+def nary(**problem: Any) -> Team:  # noqa: ANN401 - `nary`'s own
+    """Random problems with constraints of any arity (Model RB; Xu and Li 2000).
+
+    The scopes are drawn with repetition, and each constraint forbids the same number of tuples. Robot3 has the variable
+    V3.
+
+    \b
+    robochoc generate nary --agents 10 --domain 3 --constraints 12 --tightness 0.3
+    robochoc generate nary --agents 10 --domain 3 --constraints 12 --arity 4 --max-cost 100
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.nary import nary as random_nary
+
+    return random_nary(**problem)
+
+
+@click.command(short_help="Frequency assignment: radio links with little interference.")
+@number_option("--agents", "Number of links.")
+@number_option("--frequencies", "Number of frequencies.")
+@number_option("--side", "Links are at integer coordinates from 0 to N.", most=10_000, default=100)
+@number_option("--distance", "Distance at which links interfere.", most=20_000, default=40)
+@number_option("--separation", "Separation of links at the same place, in frequencies.", default=3)
+@seed_option
+@writes_team("frequencies-AGENTS-FREQUENCIES-SIDE-DISTANCE-SEPARATION-SEED")
+def frequencies(**problem: Any) -> Team:  # noqa: ANN401 - `frequencies`'s own
+    """Frequency assignment with minimum interference (CELAR; Cabon et al. 1999).
+
+    Links within --distance must be separated, the more the nearer they are. A violated separation costs 1, 10, 100 or
+    1000.
+
+    \b
+    robochoc generate frequencies --agents 12 --frequencies 6
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.frequencies import frequencies as frequency_assignment
+
+    return frequency_assignment(**problem)
+
+
+@click.command("smart-homes", short_help="Smart lighting: lamps, rules and energy.")
+@number_option("--agents", "Number of lamps.")
+@number_option("--rules", "Number of rules.", least=0)
+@number_option("--levels", "Number of levels of a lamp; level 0 is off.", least=2, most=100, default=5)
+@number_option("--lamps", "Number of lamps in a rule.", most=10, default=3)
+@number_option("--consumption", "Maximum cost of a lamp per level.", most=MAX_COST, default=3)
+@number_option("--importance", "Maximum cost of a difference of 1 in a rule.", most=MAX_COST, default=10)
+@seed_option
+@writes_team("smart-homes-AGENTS-RULES-LEVELS-LAMPS-CONSUMPTION-IMPORTANCE-SEED")
+def smart_homes(**problem: Any) -> Team:  # noqa: ANN401 - `smart_homes`'s own
+    """Smart lighting (SECP; Rust, Picard and Ramparany 2016): light as wanted, with little energy.
+
+    A lamp pays for its level, and a rule pays for the difference between the wanted luminosity and the light of its
+    lamps.
+
+    \b
+    robochoc generate smart-homes --agents 12 --rules 8
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.smart_homes import smart_homes as lighting
+
+    return lighting(**problem)
