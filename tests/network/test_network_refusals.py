@@ -11,7 +11,8 @@ from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.control import Counters, Ready, WentOn
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import Bye, LostFrames
-from robochoc.communication.network.master import HELD_S, Master
+from robochoc.communication.network.master import Master
+from robochoc.communication.network.master_control import HELD_S
 from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals

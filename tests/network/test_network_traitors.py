@@ -171,7 +171,7 @@ def recorded_said(reader: Transport) -> ProtocolMessage:
 @pytest.mark.slow
 def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """With the key of RX2 somebody has said nothing, in a frame that bears the number of RX2's first one."""
-    monkeypatch.setattr("robochoc.communication.network.master.HELD_S", 0)
+    monkeypatch.setattr("robochoc.communication.network.master_control.HELD_S", 0)
     with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
         with run.transport("RX2") as transport:

@@ -313,7 +313,7 @@ def virtual_network(plan: Plan, network: VirtualNetwork) -> Iterator[None]:
     """Let a master use the virtual network, and a traitor lie."""
     with ExitStack() as patches:
         connection = partial(VirtualConnection, network)
-        patches.enter_context(patch("robochoc.communication.network.master.MasterConnection", connection))
+        patches.enter_context(patch("robochoc.communication.network.master_control.MasterConnection", connection))
         patches.enter_context(patch("robochoc.communication.network.searcher.own_memory", lambda: 0))
         for fault in plan.faults:
             if fault.kind is FaultKind.LIE:
