@@ -7,7 +7,8 @@ The profit of a task for a robot is the task's worth minus its distance. The sum
   value 1 if it does the task and 0 otherwise.
 
 In both models, at most one robot does a task. In `several`, a task may require several robots: then exactly that many
-robots do it, or none. Profits are private; robots share only the mutual exclusion constraints.
+robots do it, or none. It may also require a coalition (`coalition.py`) whose robots start it at the same time. Profits
+are private; robots share only the mutual exclusion constraints, and those on the robots and the starts of a task.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from functools import cached_property
 from math import floor, isqrt
 from typing import NamedTuple, cast
 
+from robochoc.model.coalition import Kind, coalitions
 from robochoc.model.constraint import Constraint, Domain, Predicate, Relation, Semantics, Variable
 from robochoc.model.expression import Apply, Constant, Expression, Name, Type, parse, total
 from robochoc.system.lazy_dataclass import dataclass
@@ -35,7 +37,10 @@ TOUR = "tour"
 START = "start"
 """The last part of the name of the variable with the start of a task."""
 NOT_DONE = -1
-"""The start of an ordered task that the robot does not do."""
+"""The start of an ordered or joint task that the robot does not do."""
+_NOT_DONE_BY_BOTH = f"or(eq(X, {NOT_DONE}), eq(Y, {NOT_DONE}))"
+SAME_START = Predicate("sameStart", ("X", "Y"), parse(f"or({_NOT_DONE_BY_BOTH}, eq(X, Y))", ("X", "Y"), Type.BOOLEAN))
+"""Two robots that do a joint task start it at the same time."""
 
 Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
 """The variables of each robot, and the constraints."""
@@ -60,7 +65,7 @@ class Schedule(NamedTuple):
 
     Attributes:
         tasks: The numbers of the tasks, in ascending order.
-        starts: The starts of those tasks that are ordered (`Order`), with their numbers, in ascending order.
+        starts: The starts of those tasks that are ordered (`Order`) or joint, with their numbers, in ascending order.
     """
 
     tasks: tuple[int, ...]
@@ -89,6 +94,7 @@ class Worker:
         together: The additional profit of pairs of tasks if the robot does both.
         tours: The length of the tour for each schedule for which the robot has time and capacity. With tours, `profit`
             does not include distances; tasks in no tour have no location and no times. Tours are numbered from 1.
+        skills: Its skills, of those that tasks require of single members of their teams.
     """
 
     name: str
@@ -99,6 +105,7 @@ class Worker:
     most: int | None = None
     together: Mapping[tuple[int, int], int] = field(default_factory=dict)
     tours: Mapping[Schedule, int] = field(default_factory=dict)
+    skills: Kind = frozenset()
 
     @cached_property
     def scheduled(self) -> tuple[int, ...]:
@@ -120,11 +127,15 @@ class TaskSpec:
         name: The last part of the names of the task's variables in `several`.
         load: Its load.
         robots: The number of robots that the task requires.
+        team: The number of these robots that have a skill, by skill. A robot counts for one skill. Empty: any robots.
+        is_joint: True if its robots start it at the same time.
     """
 
     name: str
     load: int = 1
     robots: int = 1
+    team: Mapping[str, int] = field(default_factory=dict)
+    is_joint: bool = False
 
 
 def assignment(workers: Sequence[Worker], symbols: tuple[str, ...] = ()) -> Parts:
@@ -158,7 +169,8 @@ def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec], order
     Args:
         workers: The robots.
         jobs: The tasks, by number.
-        orders: The pairs of ordered tasks. A robot has another variable for each such task: its start, or `NOT_DONE`.
+        orders: The pairs of ordered tasks. A robot has another variable for each such task, and for each joint task:
+            its start, or `NOT_DONE`.
     """
     able = [one for one in workers if one.profit]
     starts = {one.name: _starts(one) for one in able}
@@ -181,6 +193,7 @@ def several_tasks(workers: Sequence[Worker], jobs: Mapping[int, TaskSpec], order
                 relation = Relation(f"S{'.'.join(scope)}", 2, Semantics.SOFT, ((1, 1),), (worth,))
                 yield Constraint(relation.name, relation, scope, scope)
         yield from _crews(able, jobs)
+        yield from _joint_starts(starts, able, jobs)
         for order in orders:
             yield from _order(order, able, jobs)
         for one, other in itertools.combinations(able, 2):
@@ -219,7 +232,7 @@ def _start(one: Worker, job: TaskSpec) -> str:
 
 
 def _starts(one: Worker) -> dict[int, Domain]:
-    """Return the domain of the start of each ordered task that the robot can do."""
+    """Return the domain of the start of each ordered or joint task that the robot can do."""
     found: dict[int, set[int]] = {}
     for schedule in one.tours:
         for task, start in schedule.starts:
@@ -241,7 +254,7 @@ def _order(order: Order, able: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -
     body = Apply("or", (Apply("eq", (sums[1], Constant(0))), Apply("gt", (sums[0], Constant(0)))))
     label = f"{first.name}.{last.name}"
     yield Constraint("needs", Predicate(f"needs{label}", names, body), scope, scope)
-    ends = parse(f"or(or(eq(X, {NOT_DONE}), eq(Y, {NOT_DONE})), ge(Y, add(X, {order.gap})))", ("X", "Y"), Type.BOOLEAN)
+    ends = parse(f"or({_NOT_DONE_BY_BOTH}, ge(Y, add(X, {order.gap})))", ("X", "Y"), Type.BOOLEAN)
     follows = Predicate(f"follows{order.gap}", ("X", "Y"), ends)
     for one, other in itertools.product(before, after):
         pair = (_start(one, first), _start(other, last))
@@ -286,21 +299,35 @@ def _tours(one: Worker, jobs: Mapping[int, TaskSpec], ordered: Sequence[int]) ->
 
 def _at_most(name: str, loads: Sequence[int], most: int) -> Predicate:
     names = _parameters(len(loads))
-    terms: list[Expression] = [
-        Apply("mul", (Constant(load), Name(one))) for load, one in zip(loads, names, strict=True)
-    ]
+    terms = [_multiple(load, one) for load, one in zip(loads, names, strict=True)]
     return Predicate(name, names, Apply("le", (total(terms), Constant(most))))
 
 
+def _multiple(number: int, name: str) -> Expression:
+    return Name(name) if number == 1 else Apply("mul", (Constant(number), Name(name)))
+
+
 def _crews(able: Sequence[Worker], jobs: Mapping[int, TaskSpec]) -> Iterator[Constraint]:
-    """Yield, for each task that requires several robots, the constraint that exactly so many robots do it, or none."""
+    """Yield, for each task that requires several robots, the constraint that a coalition does it, or none."""
     for task, job in jobs.items():
-        scope = tuple(_does(one, job) for one in able if task in one.profit)
-        if job.robots > 1 and scope:
+        crew = [one for one in able if task in one.profit]
+        if job.robots > 1 and crew:
+            scope = tuple(_does(one, job) for one in crew)
             names = _parameters(len(scope))
-            number = total(map(Name, names))
-            body = Apply("or", tuple(Apply("eq", (number, Constant(crew))) for crew in (0, job.robots)))
+            weights, sums = coalitions([one.skills.intersection(job.team) for one in crew], job.team, job.robots)
+            number = total(_multiple(weight, name) for weight, name in zip(weights, names, strict=True))
+            body = Apply("in", (number, *map(Constant, (0, *sums))))
             yield Constraint("crew", Predicate(f"crew{job.name}", names, body), scope, scope)
+
+
+def _joint_starts(
+    starts: Mapping[str, Mapping[int, Domain]], able: Sequence[Worker], jobs: Mapping[int, TaskSpec]
+) -> Iterator[Constraint]:
+    """Yield the constraints that the robots of a joint task start it at the same time."""
+    for task, job in jobs.items():
+        waiting = [_start(one, job) for one in able if job.is_joint and task in starts[one.name]]
+        for pair in itertools.combinations(waiting, 2):
+            yield Constraint("sameStart", SAME_START, pair, pair)
 
 
 def _parameters(number: int) -> tuple[str, ...]:

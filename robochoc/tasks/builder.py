@@ -26,11 +26,12 @@ from robochoc.model.allocation import (
     tour_variable,
 )
 from robochoc.model.assembly import Extras, assemble
+from robochoc.model.coalition import can_fill
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Expression
 from robochoc.model.problem import ProblemKind, Team, Topic, Variable
 from robochoc.system.lazy_dataclass import dataclass
-from robochoc.tasks.entries import MAX_PLACES, Point, RobotEntry, Synergy, TaskEntry
+from robochoc.tasks.entries import MAX_PLACES, MAX_TEAM, Point, RobotEntry, Synergy, TaskEntry
 from robochoc.tasks.precedence import orders_of, precedence_of
 from robochoc.tasks.tours import Tour, TourSearch, round_length
 from robochoc.tasks.waypoints import Cells, in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
@@ -38,7 +39,7 @@ from robochoc.tasks.ways import MapWays, Ways
 
 MAX_CONSTRAINTS = 200_000
 """The maximum number of constraints of the team, and of tours."""
-MAX_CREW = 16
+MAX_CREW = MAX_TEAM
 """The maximum number of robots that can do a task that requires several: one constraint is over all of them."""
 NONE = "none"
 """The value of a robot without a task."""
@@ -146,17 +147,21 @@ class TaskTeamBuilder:
     def _workers(self) -> list[Worker]:
         """Return the robots with the tasks that they can do.
 
-        A task that follows one that no robot can do is impossible.
+        A task that has no team, or follows one that no robot can do, is impossible.
         """
         while True:
             self._sets = 0
             workers = [self._worker(name, robot) for name, robot in self._read.robots.items()]
-            able = {self._names[task - 1] for one in workers for task in one.profit}
+            able = {name for name, task in self._read.tasks.items() if self._can_be_done(name, task, workers)}
             more = {name for name, task in self._read.tasks.items() if name in able and not able.issuperset(task.after)}
             self._impossible |= {*self._names} - able
             if not more:
                 return workers
             self._impossible |= more
+
+    def _can_be_done(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> bool:
+        kinds = [one.skills.intersection(task.team) for one in workers if self._number[name] in one.profit]
+        return can_fill(kinds, task.team, task.robots if task.is_joint else 1)
 
     def _check_orders(self, orders: Sequence[Order], workers: Sequence[Worker]) -> None:
         """Raise `MistakeError` if the constraint on two ordered tasks would have too many variables."""
@@ -183,7 +188,7 @@ class TaskTeamBuilder:
         own = self._robot_names.allowed(name)
         if self._read.model == TasksModel.ASSIGNMENT:
             return Worker(own, own, f"{own}.{_ONLY}", profit)
-        return Worker(own, own, own, profit, robot.capacity, robot.most, together, tours)
+        return Worker(own, own, own, profit, robot.capacity, robot.most, together, tours, robot.skills)
 
     def _tours(self, name: str, robot: RobotEntry, able: dict[int, int]) -> dict[Schedule, int]:
         """Return the lengths of the robot's tours; those with the same first places are together.
@@ -222,7 +227,7 @@ class TaskTeamBuilder:
         if task.robots > 1 and able > MAX_CREW:
             what = f"the task '{shortened(name)}' requires {task.robots} robots, and {able} robots can do it"
             raise MistakeError(what, f"restrict it by needs: to at most {MAX_CREW} robots", task.line)
-        return TaskSpec(self._task_names.allowed(name), task.load, task.robots)
+        return TaskSpec(self._task_names.allowed(name), task.load, task.robots, task.team, task.is_joint)
 
     def _topics(
         self, workers: Sequence[Worker], variables: Mapping[str, Sequence[Variable]]
@@ -311,11 +316,12 @@ class TaskTeamBuilder:
                 self._notes.append(ConversionNote("left out", what))
         for name in self._names:
             if name in self._impossible:
-                self._notes.append(ConversionNote("left out", f"the task {shortened(name)}, which no robot can do"))
+                who = "team of these robots" if self._read.tasks[name].is_joint else "robot"
+                self._notes.append(ConversionNote("left out", f"the task {shortened(name)}, which no {who} can do"))
 
     def _profit(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:
         """Return a robot's profit from a task: its share of the worth minus the way; None if it cannot do the task."""
-        if not entry.needs <= robot.skills or robot.most == 0:
+        if not entry.needs <= robot.skills or (entry.team and robot.skills.isdisjoint(entry.team)) or robot.most == 0:
             return None
         if robot.capacity is not None and entry.load > robot.capacity:
             return None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
 from fractions import Fraction
@@ -17,6 +17,10 @@ Point = tuple[Fraction, ...]
 MOST = 10**12
 """The maximum of every number."""
 MAX_PLACES = 9
+MAX_TEAM = 16
+"""The maximum number of robots of a team."""
+MAX_TEAM_SKILLS = 6
+"""The maximum number of different skills of a team, since all sets of them are compared."""
 _PLANE, _SPACE = 2, 3
 _Choice = TypeVar("_Choice", bound=StrEnum)
 
@@ -60,6 +64,8 @@ class TaskEntry:
         window: The earliest and the latest beginning; a robot that arrives earlier waits. None: no latest beginning.
         duration: The time for which the task occupies each of its robots.
         robots: The number of robots required.
+        team: The number of these robots that have a skill, by skill. Empty: any robots.
+        is_joint: True if its robots start it at the same time.
         after: The tasks that end before this one begins, of which each must be done.
     """
 
@@ -72,13 +78,15 @@ class TaskEntry:
     window: tuple[Fraction, Fraction | None]
     duration: Fraction
     robots: int
+    team: Mapping[str, int]
+    is_joint: bool
     after: tuple[str, ...]
 
     @property
     def is_timed(self) -> bool:
-        """True if the task occupies a robot, or can only begin at certain times."""
+        """True if the task occupies a robot, or can only begin at certain times, or together with other robots."""
         earliest, latest = self.window
-        return bool(self.duration or earliest or latest is not None or self.after)
+        return bool(self.duration or earliest or latest is not None or self.after or self.is_joint)
 
     @property
     def latest(self) -> Fraction | None:
@@ -153,6 +161,22 @@ class EntryReader:
         if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST:
             raise self._mistake(key, node, f"write an integer from {least} to {MOST}")
         return value
+
+    def team(self, key: str) -> tuple[int, dict[str, int]] | None:
+        """Return the size of a team and its number of robots for each skill; None if the key is missing."""
+        node = self.node(key)
+        if node is None:
+            return None
+        hint = f"write {key}: {{SKILL: NUMBER}}, or {key}: NUMBER, for 1 to {MAX_TEAM} robots"
+        listed = {name_text(name): one.scalar for name, one in node.named()} if node.is_mapping else {"": node.scalar}
+        numbers = {name: one for name, one in listed.items() if isinstance(one, int) and not isinstance(one, bool)}
+        size = sum(numbers.values())
+        if len(numbers) < len(listed) or min(numbers.values(), default=0) < 1 or size > MAX_TEAM:
+            raise self._mistake(key, node, hint)
+        if len(numbers) > MAX_TEAM_SKILLS:
+            what = f"{self._what} has a {key} with {len(numbers)} skills"
+            raise MistakeError(what, f"write at most {MAX_TEAM_SKILLS}", node.line)
+        return size, numbers if node.is_mapping else {}
 
     def flag(self, key: str) -> bool:
         """Return a truth value; False if the key is missing."""
@@ -229,14 +253,32 @@ def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry
     found = {}
     for name, one in _named("tasks", node):
         with _collecting(one, mistakes):
-            entry = EntryReader(f"the task '{shortened(name)}'", one)
-            needs, worth = frozenset(entry.words("needs")), entry.required_number("worth", -MOST)
-            load, robots = entry.integer("load", 1) or 0, entry.integer("robots", 1, 1) or 1
-            deadline, duration = entry.number("deadline", None), entry.number("duration", None) or Fraction(0)
-            at, window = entry.point("at"), entry.window("window")
-            after = entry.words("after")
-            found[name] = TaskEntry(one.line, at, needs, worth, load, deadline, window, duration, robots, after)
+            found[name] = _task(f"the task '{shortened(name)}'", one)
     return found
+
+
+def _task(what: str, node: Node) -> TaskEntry:
+    entry = EntryReader(what, node)
+    robots, team = entry.integer("robots", None, 1), entry.team("team")
+    if robots is not None and team is not None:
+        raise MistakeError(
+            f"{what} has robots: and team:", "delete robots:, since a team has its own number", node.line
+        )
+    size, places = team or (robots or 1, {})
+    return TaskEntry(
+        node.line,
+        entry.point("at"),
+        frozenset(entry.words("needs")),
+        entry.required_number("worth", -MOST),
+        entry.integer("load", 1) or 0,
+        entry.number("deadline", None),
+        entry.window("window"),
+        entry.number("duration", None) or Fraction(0),
+        size,
+        places,
+        team is not None and size > 1,
+        entry.words("after"),
+    )
 
 
 def read_synergies(node: Node | None, tasks: Collection[str], mistakes: DiagnosticCollector) -> list[Synergy]:

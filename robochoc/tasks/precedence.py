@@ -15,10 +15,19 @@ MAX_STARTS = 1000
 """The maximum number of starts of a task."""
 
 
-def check_order(tasks: Mapping[str, TaskEntry], mistakes: DiagnosticCollector) -> None:
-    """Report tasks that follow unknown tasks or themselves, and ordered tasks without a window."""
+def check_order(tasks: Mapping[str, TaskEntry], mistakes: DiagnosticCollector, *, tours: bool) -> None:
+    """Report tasks that follow unknown tasks or themselves, and ordered or joint tasks without a window.
+
+    Args:
+        tasks: The tasks.
+        mistakes: Receives the mistakes.
+        tours: True if robots have tours, and so times.
+    """
     for name, task in tasks.items():
         with mistakes.at(task.line):
+            if tours and task.is_joint and task.window[1] is None:
+                what = f"the task '{shortened(name)}' has a team, which starts at the same time, and no window"
+                raise MistakeError(what, "write window: [EARLIEST, LATEST]", task.line)
             for before in task.after:
                 if before not in tasks:
                     what = f"the task '{shortened(name)}' is after '{shortened(before)}', which is not in the list"
@@ -37,10 +46,10 @@ def check_order(tasks: Mapping[str, TaskEntry], mistakes: DiagnosticCollector) -
 
 
 def precedence_of(tasks: Mapping[str, TaskEntry], step: Fraction) -> Precedence:
-    """Return which tasks precede or follow others. Raises `MistakeError` if a task has too many starts."""
+    """Return which tasks have starts that other robots see. Raises `MistakeError` if a task has too many starts."""
     number = {name: place for place, name in enumerate(tasks, start=1)}
     first = {number[before] for task in tasks.values() for before in task.after}
-    last = {number[name] for name, task in tasks.items() if task.after}
+    last = {number[name] for name, task in tasks.items() if task.after or task.is_joint}
     for name, task in tasks.items():
         latest = task.window[1] or Fraction(0)
         if number[name] in first | last and (latest - task.window[0]) / step > MAX_STARTS:

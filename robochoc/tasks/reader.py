@@ -186,5 +186,5 @@ def _check_model(read: TaskList, mistakes: DiagnosticCollector) -> None:
         with mistakes.at(task.line):
             _check_times(name, task, read)
     mistakes.finish()
-    check_order(read.tasks, mistakes)
+    check_order(read.tasks, mistakes, tours=read.tours)
     mistakes.finish()

@@ -5,9 +5,9 @@ with the same last place and the same starts, the one that is neither longer nor
 tasks; a robot that waits for the beginning of a window may have several tours that differ in this. A tour does not
 return to its start.
 
-A task that must precede others, or follow others, starts at a multiple of a unit of time, its *start*, which other
-robots can see. A task that only precedes others starts as early as possible: this is never worse for any robot. A task
-that follows others may start at any later time, too.
+A task that must precede others, or follow others, or that a team starts together, starts at a multiple of a unit of
+time, its *start*, which other robots can see. A task that only precedes others starts as early as possible: this is
+never worse for any robot. A task that follows others, or has a team, may start at any later time, too.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Precedence:
     Attributes:
         step: The unit of starts.
         first: The numbers of tasks that precede others.
-        last: The numbers of tasks that follow others.
+        last: The numbers of tasks that wait for other robots: they follow others, or have a team.
     """
 
     step: Fraction
@@ -174,7 +174,7 @@ class _Clock:
     def ends(self, number: int, start: int, way: int) -> Iterator[tuple[int | None, int]]:
         """Yield the possible starts and ends of a task after a way that begins at `start`; nothing if it is too late.
 
-        The start is None for a task that is not ordered.
+        The start is None for a task that is neither ordered nor joint.
         """
         task = self._tasks[number]
         arrival = start + way * self._per_length

@@ -39,7 +39,7 @@ class Meaning:
         self.tasks: Mapping[str, List] = told["tasks"]
         self.synergies: Sequence[List] = told.get("synergies", ())
         alone = all(one.get("most") == 1 for one in self.robots.values())
-        alone = alone and all(one.get("robots", 1) == 1 for one in self.tasks.values())
+        alone = alone and all(size_of(one) == 1 for one in self.tasks.values())
         self.model = told.get("model", "assignment" if alone else "several")
         self.is_touring = bool(told.get("tours")) and self.model == "several"
         worths = (one["worth"] for one in (*self.tasks.values(), *self.synergies))
@@ -53,14 +53,14 @@ class Meaning:
         if self.model == "assignment":
             if any(one.get("most", 1) != 1 for one in self.robots.values()):
                 yield "the model assignment allows one"
-            if any(one.get("robots", 1) > 1 for one in self.tasks.values()):
+            if any(size_of(one) > 1 for one in self.tasks.values()):
                 yield "the model assignment allows one"
             if "none" in self.tasks:
                 yield "the name 'none' is reserved"
         elif not any(self.is_able(one, task) for one in self.robots.values() for task in self.tasks.values()):
             yield "no robot can do any of the tasks"
         for task in self.tasks.values():
-            if exact(task["worth"]) * 10**self.places % task.get("robots", 1):
+            if exact(task["worth"]) * 10**self.places % size_of(task):
                 yield "cannot be divided"
 
     def best(self) -> Fraction:
@@ -84,8 +84,8 @@ class Meaning:
     def value(self, each: Sequence[tuple[tuple[str, ...], Fraction]]) -> Fraction | None:
         total = sum((own for _, own in each), Fraction())
         for name, task in self.tasks.items():
-            crew = sum(name in tasks for tasks, _ in each)
-            if crew not in (0, task.get("robots", 1)):
+            crew = [robot for robot, (tasks, _) in zip(self.robots.values(), each, strict=True) if name in tasks]
+            if crew and not is_complete(crew, task):
                 return None
             total += exact(task["worth"]) * bool(crew)
         return total
@@ -94,6 +94,9 @@ class Meaning:
         needs, has = (
             [one] if isinstance(one, str) else one for one in (task.get("needs", []), robot.get("skills", []))
         )
+        team = task.get("team")
+        if isinstance(team, dict) and {*team}.isdisjoint(has):
+            return False
         if not {*needs} <= {*has} or robot.get("most") == 0 or task.get("load", 1) > robot.get("capacity", _FAR):
             return False
         return self.length(robot.get("at"), task.get("at"), 9) <= self.time(robot, task)
@@ -125,6 +128,26 @@ class Meaning:
             if self.told.get("distance") == "streets":
                 return rounded(sum(parts, Decimal()), places)
             return rounded(sum((part * part for part in parts), Decimal()).sqrt(), places)
+
+
+def size_of(task: List) -> int:
+    """Return the number of robots that a task requires."""
+    team = task.get("team", task.get("robots", 1))
+    return sum(team.values()) if isinstance(team, dict) else team
+
+
+def is_complete(crew: Sequence[List], task: List) -> bool:
+    """Return whether robots are as many as a task requires, and each can have a place of its team."""
+    team = task.get("team")
+    if len(crew) != size_of(task):
+        return False
+    if not isinstance(team, dict):
+        return True
+    places = [skill for skill, number in team.items() for _ in range(number)]
+    skills = [[one["skills"]] if isinstance(one["skills"], str) else one["skills"] for one in crew]
+    return any(
+        all(place in has for place, has in zip(order, skills, strict=True)) for order in itertools.permutations(places)
+    )
 
 
 def rounded(number: Decimal, places: int) -> Fraction:
