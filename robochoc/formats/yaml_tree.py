@@ -60,7 +60,7 @@ class Node:
     def __init__(
         self,
         line: int,
-        value: Scalar | list[Node] | dict[Scalar, Node] = None,
+        value: Scalar | MistakeError | list[Node] | dict[Scalar, Node] = None,
         key_lines: dict[Scalar, int] | None = None,
     ) -> None:
         self.line = line
@@ -88,8 +88,15 @@ class Node:
 
     @property
     def scalar(self) -> Scalar:
-        """Return a single value, or None for an empty value, a list or a mapping."""
-        if isinstance(self._value, (list, dict)):
+        """Return a single value, or None for an empty value, a list or a mapping.
+
+        Raises:
+            MistakeError: The value is invalid, such as `.nan`. A reader may catch it, and continue with other values.
+        """
+        if isinstance(self._value, (list, dict, MistakeError)):
+            if isinstance(self._value, MistakeError):
+                self._is_read = True
+                raise self._value
             return None
         self._is_read = True
         return self._value
@@ -180,6 +187,8 @@ class Node:
                     yield self._unknown(key, path)
 
     def _unused(self, path: _Path) -> MistakeError:
+        if isinstance(self._value, MistakeError):
+            return self._value
         what = "a list" if isinstance(self._value, list) else "a mapping" if self.is_mapping else "a value"
         return MistakeError(
             f"{_written(path)}: {what} does not belong here", "delete it, or check the format", self.line
@@ -403,7 +412,8 @@ class _Composer:
     def _is_merge(self, event: Any) -> bool:  # noqa: ANN401 - a scalar's event
         return bool(event.value == "<<" and event.implicit[0] and not event.style)  # libyaml has "" for None
 
-    def _scalar(self, event: Any, line: int) -> Scalar:  # noqa: ANN401 - a scalar's event
+    def _scalar(self, event: Any, line: int) -> Scalar | MistakeError:  # noqa: ANN401 - a scalar's event
+        """Return the value, or the error for an invalid one, which `Node.scalar` raises."""
         tag = event.tag
         if tag is None or tag == "!":
             tag = str(self._plain.resolve(yaml.ScalarNode, event.value, event.implicit))  # type: ignore[no-untyped-call]
@@ -411,19 +421,18 @@ class _Composer:
             return "<<"
         if tag not in _SCALARS:
             if tag == _CORE + "timestamp":
-                raise MistakeError(
-                    f"{shortened(event.value)} is a date, which is not supported", "write it in quotes", line
-                )
+                what = f"{shortened(event.value)} is a date, which is not supported"
+                return MistakeError(what, "write it in quotes", line)
             raise _tag_mistake(tag, line)
         try:
             value = self._constructed(tag, event.value)
         except (ValueError, KeyError, OverflowError, yaml.YAMLError):
             what = f"'{shortened(event.value)}' is not a valid {tag.removeprefix(_CORE)}"
-            raise MistakeError(what, "correct the number, or write it in quotes", line) from None
+            return MistakeError(what, "correct the number, or write it in quotes", line)
         if not isinstance(value, float):
             return value
         if math.isnan(value):
-            raise MistakeError(".nan is not a number", "write a number", line)
+            return MistakeError(".nan is not a number", "write a number", line)
         return value if math.isinf(value) else Fraction(repr(value))
 
     def _constructed(self, tag: str, text: str) -> bool | int | float | str | None:

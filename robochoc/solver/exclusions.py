@@ -164,7 +164,8 @@ class _Exclusions:
         names = constraint.variables
         apart = {self._owners.get(name) for name in names}
         if constraint.model == ConstraintModel.PKC or not len(names) == len(apart) == len(("one", "other")):
-            raise UnsupportedError(f"{robot} shares {constraint.name!r}, which is not over one variable of two robots")
+            problem = f"{robot} shares {constraint.name!r}, which is not over one variable of each of two robots"
+            raise UnsupportedError(f"{problem} (in a list of tasks: delete after:, and robots: of tasks)")
         return names[0], names[1]
 
     def pairs(self, constraint: Constraint, one: str, other: str) -> tuple[tuple[Pair, Cost], ...]:

@@ -306,6 +306,7 @@ class TaskTeamBuilder:
                 own = {self._variable(one, task): self._names[task - 1] for task in one.profit}
                 starts = {task for schedule in one.tours for task, _ in schedule.starts}
                 own |= {f"{self._variable(one, task)}.{START}": f"{self._names[task - 1]}.{START}" for task in starts}
+                own |= {tour_variable(one): TOUR} if one.scheduled else {}
                 found |= {variable: f"{name}.{task}" for variable, task in own.items()}
         return {name: original for name, original in found.items() if name != original}
 

@@ -37,6 +37,7 @@ class RobotEntry:
         most: The maximum number of its tasks. None: unlimited.
         speed: The distance that it covers per unit of time.
         radius: The radius of the robot on a map, in metres.
+        has_radius: True if the entry has its own radius.
         topic: The name of the topic of its waypoints; empty: its name and `/waypoint`.
     """
 
@@ -47,6 +48,7 @@ class RobotEntry:
     most: int | None
     speed: Fraction
     radius: Fraction
+    has_radius: bool
     topic: str
 
 
@@ -134,13 +136,13 @@ class EntryReader:
             raise MistakeError(f"{self._what} has a {key} whose end is before its beginning", hint, node.line)
         return earliest, latest
 
-    def word(self, key: str) -> str:
-        """Return a word; empty if the key is missing."""
+    def word(self, key: str, form: str = "WORD") -> str:
+        """Return a word, which messages call `form`; empty if the key is missing."""
         node = self.node(key)
         if node is None:
             return ""
         if not isinstance(node.scalar, str) or not node.scalar:
-            raise self._mistake(key, node, f"write {key}: WORD")
+            raise self._mistake(key, node, f"write {key}: {form}")
         return node.scalar
 
     def number(self, key: str, default: Fraction | None, least: int = 0) -> Fraction | None:
@@ -223,7 +225,7 @@ class EntryReader:
         return Fraction(scalar)
 
     def _mistake(self, key: str, node: Node, hint: str) -> MistakeError:
-        value = f"'{shortened(scalar_text(node.scalar))}'" if node.is_scalar else "this value"
+        value = f"'{shortened(name_text(node.scalar))}'" if node.is_scalar else "this value"
         return MistakeError(f"{self._what} cannot have {value} as '{key}'", hint, node.line)
 
 
@@ -243,8 +245,9 @@ def read_robots(node: Node, radius: Fraction, mistakes: DiagnosticCollector) -> 
                 raise MistakeError(f"the robot '{shortened(name)}' has the speed 0", "write a number above 0", one.line)
             has = frozenset(entry.words("skills"))
             room, most = entry.integer("capacity", None), entry.integer("most", None)
-            own, topic = entry.number("radius", radius) or Fraction(0), entry.word("topic")
-            found[name] = RobotEntry(one.line, entry.point("at"), has, room, most, speed, own, topic)
+            own, has_own = entry.number("radius", radius) or Fraction(0), entry.node("radius") is not None
+            topic = entry.word("topic", "NAME")
+            found[name] = RobotEntry(one.line, entry.point("at"), has, room, most, speed, own, has_own, topic)
     return found
 
 

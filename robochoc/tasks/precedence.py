@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from fractions import Fraction
 from graphlib import CycleError, TopologicalSorter
+from itertools import chain
+from math import ceil, floor
 
 from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, shortened, suggestion
 from robochoc.model.allocation import Order
@@ -15,28 +17,32 @@ MAX_STARTS = 1000
 """The maximum number of starts of a task."""
 
 
-def check_order(tasks: Mapping[str, TaskEntry], mistakes: DiagnosticCollector, *, tours: bool) -> None:
-    """Report tasks that follow unknown tasks or themselves, and ordered or joint tasks without a window.
+def check_order(
+    tasks: Mapping[str, TaskEntry],
+    names: Collection[str],
+    step: Fraction,
+    mistakes: DiagnosticCollector,
+    *,
+    tours: bool,
+) -> None:
+    """Report unknown predecessors, cycles, and ordered or joint tasks without starts, or with too many of them.
 
     Args:
-        tasks: The tasks.
-        mistakes: Receives the mistakes.
+        tasks: The valid tasks.
+        names: The names of all tasks.
+        step: The unit of starts.
+        mistakes: The errors found so far.
         tours: True if robots have tours, and so times.
     """
+    ordered = {*chain.from_iterable((name, *task.after) for name, task in tasks.items() if task.after)}
     for name, task in tasks.items():
         with mistakes.at(task.line):
-            if tours and task.is_joint and task.window[1] is None:
-                what = f"the task '{shortened(name)}' has a team, which starts at the same time, and no window"
-                raise MistakeError(what, "write window: [EARLIEST, LATEST]", task.line)
             for before in task.after:
-                if before not in tasks:
+                if before not in names:
                     what = f"the task '{shortened(name)}' is after '{shortened(before)}', which is not in the list"
-                    raise MistakeError(what, suggestion(before, tasks, "tasks"), task.line)
-                for ordered in (before, name):
-                    if tasks[ordered].window[1] is None:
-                        what = f"the task '{shortened(ordered)}' precedes or follows another task, and has no window"
-                        raise MistakeError(what, "write window: [EARLIEST, LATEST]", tasks[ordered].line)
-    mistakes.finish()
+                    raise MistakeError(what, suggestion(before, names, "tasks"))
+            if name in ordered or (tours and task.is_joint):
+                _check_starts(name, task, step)
     try:
         TopologicalSorter({name: task.after for name, task in tasks.items()}).prepare()
     except CycleError as error:
@@ -45,16 +51,27 @@ def check_order(tasks: Mapping[str, TaskEntry], mistakes: DiagnosticCollector, *
         mistakes.add(tasks[cycle[0]].line, what, "delete one after:")
 
 
+def _check_starts(name: str, task: TaskEntry, step: Fraction) -> None:
+    """Raise `MistakeError` if an ordered task has no start in its window, or too many starts."""
+    (earliest, latest), subject = task.window, f"the task '{shortened(name)}'"
+    reason = "has a team, which starts at the same time," if task.is_joint else "precedes or follows another task,"
+    if latest is None:
+        what = f"{subject} {reason} and has no window"
+        raise MistakeError(what, "write window: [EARLIEST, LATEST]")
+    starts = floor(latest / step) - ceil(earliest / step) + 1
+    if starts < 1:
+        what = f"{subject} {reason} and its window has no multiple of step: {float(step):g}"
+        raise MistakeError(what, "write a smaller step:, or a longer window:")
+    if starts > MAX_STARTS:
+        what = f"{subject} has {starts:,} starts in its window; at most {MAX_STARTS:,} are allowed"
+        raise MistakeError(what, "write a larger step:, or a shorter window:")
+
+
 def precedence_of(tasks: Mapping[str, TaskEntry], step: Fraction) -> Precedence:
-    """Return which tasks have starts that other robots see. Raises `MistakeError` if a task has too many starts."""
+    """Return which tasks have starts that other robots see."""
     number = {name: place for place, name in enumerate(tasks, start=1)}
     first = {number[before] for task in tasks.values() for before in task.after}
     last = {number[name] for name, task in tasks.items() if task.after or task.is_joint}
-    for name, task in tasks.items():
-        latest = task.window[1] or Fraction(0)
-        if number[name] in first | last and (latest - task.window[0]) / step > MAX_STARTS:
-            what = f"the task '{shortened(name)}' has more than {MAX_STARTS:,} starts in its window"
-            raise MistakeError(what, "write a larger step:, or a shorter window:", task.line)
     return Precedence(step, frozenset(first), frozenset(last))
 
 

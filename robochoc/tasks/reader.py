@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from enum import StrEnum
 from fractions import Fraction
 from pathlib import Path
+from typing import TypeVar
 
 from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
 from robochoc.formats.dialects.dialect import ImportOptions, ImportResult
 from robochoc.formats.dialects.pydcop.files import file_text
-from robochoc.formats.names import check_word
 from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
 from robochoc.model.allocation import Distance, TasksModel
 from robochoc.tasks.builder import TaskList, TaskTeamBuilder
@@ -18,6 +19,7 @@ from robochoc.tasks.entries import (
     MAX_PLACES,
     EntryReader,
     RobotEntry,
+    Synergy,
     TaskEntry,
     name_text,
     read_robots,
@@ -31,6 +33,9 @@ RADIUS_M = Fraction(1, 5)
 """The default radius of robots on a map."""
 MAX_NUMBER = 1000
 """The maximum number of robots, and of tasks."""
+_TOPIC = re.compile(r"/?[A-Za-z]\w*(?:/[A-Za-z]\w*)*", re.ASCII)
+"""A legal ROS name. Other names would be published under a changed one."""
+_T = TypeVar("_T")
 
 
 class Measure(StrEnum):
@@ -75,32 +80,55 @@ def _read(text: str, path: Path, mistakes: DiagnosticCollector) -> TaskList:
         mistakes.finish()
         return found
 
-    read_list = read_yaml(text, read, "a list has robots and tasks")
-    _check_model(read_list, mistakes)
-    return read_list
+    return read_yaml(text, read, "a list has robots and tasks")
 
 
 def _list(head: EntryReader, path: Path, mistakes: DiagnosticCollector) -> TaskList:
+    """Return the content of a list. It is incomplete if errors were added to `mistakes`."""
+
+    def or_default(read: Callable[[], _T], default: _T) -> _T:
+        try:
+            return read()
+        except MistakeError as mistake:
+            mistakes.add(mistake.line, mistake.message, mistake.hint)
+            return default
+
     listed = head.required_node("tasks")
-    robots = read_robots(head.required_node("robots"), head.number("radius", RADIUS_M) or Fraction(0), mistakes)
+    usual = or_default(lambda: head.number("radius", RADIUS_M) or Fraction(0), RADIUS_M)
+    robots = read_robots(head.required_node("robots"), usual, mistakes)
     tasks = read_tasks(listed, mistakes)
     for what, entries in (("robots", robots), ("tasks", tasks)):
         if len(entries) > MAX_NUMBER:
             raise MistakeError(f"has {len(entries)} {what}", f"write at most {MAX_NUMBER}")
-    synergies = read_synergies(head.node("synergies"), [name_text(name) for name, _ in listed.named()], mistakes)
-    model = head.choice("model", TasksModel) or _model(robots, tasks)
+    names = [name_text(name) for name, _ in listed.named()]
+    synergies = or_default(lambda: read_synergies(head.node("synergies"), names, mistakes), list[Synergy]())
+    model = or_default(lambda: head.choice("model", TasksModel), None) or _model(robots, tasks)
+    places = or_default(lambda: _places(head), 0)
+    step = or_default(lambda: _step(head), Fraction(1))
+    tours = or_default(lambda: head.flag("tours"), default=True) and model != TasksModel.ASSIGNMENT
+    _check_topics(robots, mistakes)
+    name = " ".join(or_default(lambda: head.words("name"), ())) or path.stem
+    _check_points([*robots.values(), *tasks.values()], mistakes)
+    straight: Ways = PlainWays(Distance.STRAIGHT)
+    ways = or_default(lambda: _ways(head, path.parent, robots, tasks, mistakes), straight)
+    found = TaskList(name, model, ways, places, robots, tasks, synergies, tours, step)
+    _check_model(found, mistakes)
+    check_order(tasks, names, step, mistakes, tours=tours)
+    return found
+
+
+def _places(head: EntryReader) -> int:
     places = head.integer("places", 0) or 0
     if places > MAX_PLACES:
         raise MistakeError(f"has costs with {places} decimal places", f"write places: {MAX_PLACES} or less")
-    tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
-    _check_topics(robots, mistakes)
-    name = " ".join(head.words("name")) or path.stem
-    _check_points([*robots.values(), *tasks.values()], mistakes)
-    ways = _ways(head, path.parent, robots, tasks, mistakes)
+    return places
+
+
+def _step(head: EntryReader) -> Fraction:
     step = head.number("step", Fraction(1)) or Fraction(0)
     if not step:
         raise MistakeError("the list has the step 0", "write a number above 0", head.required_node("step").line)
-    return TaskList(name, model, ways, places, robots, tasks, synergies, tours, step)
+    return step
 
 
 def _check_topics(robots: Mapping[str, RobotEntry], mistakes: DiagnosticCollector) -> None:
@@ -110,11 +138,14 @@ def _check_topics(robots: Mapping[str, RobotEntry], mistakes: DiagnosticCollecto
         if not robot.topic:
             continue
         with mistakes.at(robot.line):
-            check_word(robot.topic)
-            if owner := owners.get(robot.topic):
+            if not _TOPIC.fullmatch(robot.topic):
+                what = f"the robot '{shortened(name)}' cannot have the topic '{shortened(robot.topic)}'"
+                raise MistakeError(what, "write words of letters, digits and _, as in /ann/waypoint")
+            topic = robot.topic.removeprefix("/")
+            if owner := owners.get(topic):
                 what = f"the robots '{shortened(owner)}' and '{shortened(name)}' have the same topic"
                 raise MistakeError(what, "give each robot its own topic")
-            owners[robot.topic] = name
+            owners[topic] = name
 
 
 def _ways(
@@ -125,23 +156,25 @@ def _ways(
     mistakes: DiagnosticCollector,
 ) -> Ways:
     """Return the ways given by `map` and `distance`. Raises `MistakeError`."""
-    name, measure = head.word("map"), head.choice("distance", Measure)
+    name, measure = head.word("map", "FILE"), head.choice("distance", Measure)
     if name:
         node = head.required_node("map")
         if measure not in (None, Measure.MAP):
             raise MistakeError(f"has a map and distance: {measure}", "delete one of them", node.line)
-        mistakes.finish()
-        ways = MapWays(map_at(name, folder, node.line), robots, tasks)
+        try:
+            ways = MapWays(map_at(name, folder, node.line), robots, tasks)
+        except InvalidInputError:
+            mistakes.finish()
+            raise
         ways.check(mistakes)
-        mistakes.finish()
         return ways
     if measure == Measure.MAP:
         raise MistakeError("has distance: map, but no map", "write map: FILE", head.required_node("distance").line)
-    usual = head.number("radius", RADIUS_M)
-    lines = [node.line for node in [head.node("radius")] if node]
-    lines += [one.line for one in robots.values() if one.radius != usual]
-    if lines:
-        raise MistakeError("has a radius, but no map", "write map: FILE, or delete the radius", lines[0])
+    owners = {f"the robot '{shortened(name)}'": one.line for name, one in robots.items() if one.has_radius}
+    if usual := head.node("radius"):
+        owners["the list"] = usual.line
+    for owner, line in owners.items():
+        mistakes.add(line, f"{owner} has a radius, but there is no map", "write map: FILE, or delete the radius")
     return PlainWays(Distance(measure or Distance.STRAIGHT))
 
 
@@ -185,6 +218,3 @@ def _check_model(read: TaskList, mistakes: DiagnosticCollector) -> None:
     for name, task in read.tasks.items():
         with mistakes.at(task.line):
             _check_times(name, task, read)
-    mistakes.finish()
-    check_order(read.tasks, mistakes, tours=read.tours)
-    mistakes.finish()

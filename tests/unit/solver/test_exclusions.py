@@ -79,11 +79,16 @@ def test_a_team_that_shares_exclusions_alone_has_no_fault() -> None:
     assert allocation_fault(team_of({"A": (0, 1)}, [])) == ""
 
 
+NOT_A_PAIR = (
+    "which is not over one variable of each of two robots (in a list of tasks: delete after:, and robots: of tasks)"
+)
+
+
 @pytest.mark.parametrize(
     ("domains", "constraints", "fault"),
     [
         ({"A": (0, 1), "B": (0, 1), "C": (0, 1)}, [conflicts("A", "B", "C", rows=[(1, 1, 1)])],
-         "RC shares 'r', which is not over one variable of two robots"),
+         f"RC shares 'r', {NOT_A_PAIR}"),
         ({"A": (0, 1), "B": (0, 1)}, [soft("A", "B", rows={(1, 1): 4})],
          "'s' costs 4 for A = 1 and B = 1: it is not only an exclusion"),
         (
@@ -108,7 +113,7 @@ def test_what_is_no_task_allocation_is_told(
 def test_a_partially_known_constraint_is_no_exclusion() -> None:
     parts = Constraint("p", NOT_THE_SAME, ("A", "B"), ("A", "B"), ConstraintModel.PKC)
     fault = allocation_fault(team_of({"A": (0, 1), "B": (0, 1)}, [parts]))
-    assert fault == "RB shares 'p', which is not over one variable of two robots"
+    assert fault == f"RB shares 'p', {NOT_A_PAIR}"
 
 
 def test_too_many_pairs_of_values_are_refused_before_any_is_looked_at() -> None:

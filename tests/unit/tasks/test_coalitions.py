@@ -101,7 +101,11 @@ def test_coalitions_are_those_with_a_place_for_each_robot(kinds: list[frozenset[
 @pytest.mark.parametrize(
     ("now", "then", "told"),
     [
-        (", window: [0, 20]", "", "8: the task 'lift' has a team, which starts at the same time, and no window (write"),
+        (
+            ", window: [0, 20]",
+            "",
+            "8: the task 'lift' has a team, which starts at the same time, and has no window (write",
+        ),
         (
             "worth: 60",
             "robots: 2, worth: 60",

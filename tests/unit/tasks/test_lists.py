@@ -93,7 +93,7 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
     [
         ("skills: [camera]", "skill: [camera]", "3: unknown key 'skill' in robots.bob (did you mean 'skills'?)"),
         ("most: 2", "most: 2.5", "3: the robot 'bob' cannot have '2.5' as 'most' (write an integer"),
-        ("most: 2", "most: yes", "3: the robot 'bob' cannot have 'True' as 'most'"),
+        ("most: 2", "most: yes", "3: the robot 'bob' cannot have 'yes' as 'most'"),
         ("most: 2", "speed: 0", "3: the robot 'bob' has the speed 0 (write a number above 0)"),
         ("at: [8, 1]", "at: [8]", "3: the robot 'bob' cannot have this value as 'at' (write at: [X, Y]"),
         ("at: [8, 1]", "at: [8, x]", "3: the robot 'bob' cannot have 'x' as 'at'"),
@@ -136,6 +136,34 @@ def test_what_is_wrong_is_told_with_its_line(now: str, then: str, told: str | No
 def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
     text = LIST.replace("most: 2", "most: -1").replace("worth: 12", "worth: much").replace("load: 2", "load: 2")
     assert len(mistakes(text, tmp_path).splitlines()) == 2
+
+
+def test_errors_of_all_kinds_are_reported_together(tmp_path: Path) -> None:
+    text = """radius: 0.3
+map: ""
+tours: 1
+robots:
+  ann: {at: [0, 0], topic: yes}
+  bob: {at: [0, 0], topic: /bob/x?y}
+  cid: {at: [0, 0, 1]}
+tasks:
+  a: {worth: 4, after: a, window: [1, 5]}
+  b: {worth: 4, window: [.nan, 5]}
+  c: {worth: 4, after: [zz, b], window: [1, 5]}
+synergies: [{tasks: [a, b], worth: 2020-01-01}]
+"""
+    lines = mistakes(text, tmp_path).splitlines()
+    assert [(line.partition(":")[0], line.partition(": ")[2].partition(" (")[0]) for line in lines] == [
+        ("2", "the file cannot have '' as 'map'"),
+        ("3", "the file cannot have '1' as 'tours'"),
+        ("5", "the robot 'ann' cannot have 'yes' as 'topic'"),
+        ("6", "the robot 'bob' cannot have the topic '/bob/x?y'"),
+        ("7", "a place has a different number of coordinates than the places before it"),
+        ("9", "the order of tasks is a cycle: a, a"),
+        ("10", ".nan is not a number"),
+        ("11", "the task 'c' is after 'zz', which is not in the list"),
+        ("12", "2020-01-01 is a date, which is not supported"),
+    ]
 
 
 @looped(

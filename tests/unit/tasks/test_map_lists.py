@@ -119,9 +119,9 @@ def test_the_map_is_in_the_folder(tmp_path: Path) -> None:
             f"map: {BUILDING}\nradius: 1000",
             "more than 100 pixels of this map (use a smaller radius)",
         ),
-        (f"map: {BUILDING}", "radius: 0.3", "1: has a radius, but no map"),
+        (f"map: {BUILDING}", "radius: 0.3", "1: the list has a radius, but there is no map"),
         (f"map: {BUILDING}", "distance: map", "1: has distance: map, but no map (write map: FILE)"),
-        (f"map: {BUILDING}\n", "", "4: has a radius, but no map"),
+        (f"map: {BUILDING}\n", "", "4: the robot 'bob' has a radius, but there is no map"),
     ],
 )
 def test_mistakes_have_their_line(now: str, then: str, told: str, tmp_path: Path) -> None:

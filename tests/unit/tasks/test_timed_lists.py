@@ -87,7 +87,12 @@ def test_a_task_after_one_that_nobody_can_do_is_left_out(tmp_path: Path) -> None
         ),
         ("tours: yes", "model: assignment", "has after:, which the model assignment does not support"),
         ("tours: yes", "tours: yes\nstep: 0", "2: the list has the step 0 (write a number above 0)"),
-        ("tours: yes", "tours: yes\nstep: 0.001", "the task 'unlock' has more than 1,000 starts in its window"),
+        ("tours: yes", "tours: yes\nstep: 0.001", "the task 'unlock' has 12,001 starts in its window; at most 1,000"),
+        (
+            "tours: yes",
+            "tours: yes\nstep: 13",
+            "8: the task 'carry' precedes or follows another task, and its window has no multiple of step: 13",
+        ),
     ],
 )
 def test_mistakes_in_times_have_their_line(now: str, then: str, told: str, tmp_path: Path) -> None:
