@@ -146,7 +146,7 @@ class AgentsContainer:
 
     _type: str = ""
     _agents: dict[str, tuple[Path | None, bool]] = field(default_factory=dict)
-    _main: Address | None = None
+    _main: tuple[Address, ...] = ()
     _listen: Address | None = None
     _authority: Path | None = None
     _identities: dict[str, tuple[Path | None, str | None]] = field(default_factory=dict)
@@ -182,14 +182,17 @@ class AgentsContainer:
         """Set the address of the master, on a robot's machine.
 
         Args:
-            place: `HOST` or `HOST:PORT`.
+            place: `HOST` or `HOST:PORT`; several addresses by priority, separated by commas, if there are standby
+                masters.
 
         Raises:
-            AddressError: if `place` is not an address.
+            AddressError: if `place` is not an address, or an address is repeated.
         """
-        from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
+        from robochoc.run.networked.address import Address, check_different  # noqa: PLC0415 - an extra
 
-        self._main = Address.parse(place)
+        places = Address.parse_all(place)
+        check_different(places)
+        self._main = places
 
     def set_listen(self, place: str) -> None:
         """Set the address at which the master listens. By default, only this machine can connect (loopback).
@@ -258,16 +261,16 @@ class AgentsContainer:
     def _join(self) -> dict[str, Ending]:
         from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - robots' machines only
 
-        if self._main is None or not self._agents:
+        if not self._main or not self._agents:
             raise ValueError(
                 "the container has no agents or no master: call add_agent(name, file)"
                 " and set_main_container(host) first"
             )
         with ThreadPoolExecutor(len(self._agents)) as pool:
-            running = {name: pool.submit(self._robot, name, self._main) for name in self._agents}
+            running = {name: pool.submit(self._robot, name) for name in self._agents}
             return {name: robot.result() for name, robot in running.items()}
 
-    def _robot(self, name: str, main: Address) -> Ending:
+    def _robot(self, name: str) -> Ending:
         from robochoc.communication.network.robot_settings import RobotSettings  # noqa: PLC0415 - an extra
         from robochoc.run.networked.join import PATIENCE_S, identity_of, join  # noqa: PLC0415 - the same
         from robochoc.solver.compile import Compiler  # noqa: PLC0415 - the same
@@ -276,9 +279,9 @@ class AgentsContainer:
         if file is None or file.stem != name:
             raise ValueError(f"the file of {name} must be called {name}.xml, not {file}")
         robot = read_robot(file)
-        identity = identity_of(name, main, *self._identities.get(name, (None, None)))
+        identity = identity_of(name, self._main[0], *self._identities.get(name, (None, None)))
         with errors_in_python(("identity",)), Compiler() as compiler:
-            return join(robot, (main,), identity, RobotSettings(PATIENCE_S, sniffed=sniff), compiler)
+            return join(robot, self._main, identity, RobotSettings(PATIENCE_S, sniffed=sniff), compiler)
 
 
 def protocol_called(word: str) -> str:

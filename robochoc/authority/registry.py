@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from enum import StrEnum
@@ -22,6 +23,7 @@ from robochoc.system.files import write_atomically
 
 PRIVATE = 0o600
 _FILE, _LOCK = "registry.json", "lock"
+_RETRY_S = 0.02
 
 
 class AuthorityError(RobochocError):
@@ -156,11 +158,30 @@ class Registry:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[None]:
-    """Lock `folder` against all other processes and threads during the block."""
+def locked(folder: Path, wait_s: float | None = None) -> Iterator[None]:
+    """Lock `folder` against all other processes and threads during the block.
+
+    Raises `TimeoutError` if the folder is still locked after `wait_s` seconds (None: wait without a limit).
+    """
     descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        if wait_s is None:
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        else:
+            _lock_within(descriptor, time.monotonic() + wait_s)
         yield
     finally:
         os.close(descriptor)
+
+
+def _lock_within(descriptor: int, until: float) -> None:
+    """Lock an open file. Raises `TimeoutError` if it is still locked at `until`, on the monotonic clock."""
+    while True:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                raise TimeoutError from None
+            time.sleep(_RETRY_S)
+        else:
+            return

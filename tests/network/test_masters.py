@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import stat
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from robochoc.authority.admission import InMemoryAuthority
-from robochoc.authority.registry import Right, Role
+from robochoc.authority.registry import Right, Role, locked
 from robochoc.communication.network.control_messages import (
     Accepted,
     AcceptedDecision,
@@ -31,8 +33,10 @@ from robochoc.communication.network.masters import SILENCE_S, Masters
 from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.robot_votes import KEPT_S, RobotVotes, VotesError
 from robochoc.communication.network.standbys import CopiedAdmission, Standbys
+from robochoc.run.networked.address import Address
+from robochoc.run.networked.standby import LeaderWatch, NoLeaderError, StandbyPlan
 from tests.support.deployments import TRIANGLE
-from tests.support.ports import LOOPBACK
+from tests.support.ports import LOOPBACK, free_port
 from tests.support.sparse_teams import profiles_of
 
 A, B, C = (f"127.0.0.1:{port}" for port in (7447, 7457, 7467))
@@ -146,6 +150,25 @@ def test_votes_that_cannot_be_stored_are_not_sent(tmp_path: Path) -> None:
             RobotVotes(file).promise(Lead(FIRST, "m", TEAM), private=False)
 
 
+def test_two_processes_of_a_robot_have_common_votes(tmp_path: Path) -> None:
+    first, second = (RobotVotes(tmp_path / "votes.json", several=True) for _ in range(2))
+    assert first.promise(Lead(FIRST, "m", TEAM), private=False).promised == FIRST
+    assert second.promise(Lead(SECOND, "m", TEAM), private=False).promised == SECOND
+    assert first.accept(Propose(FIRST, DECISION)) == Accepted(FIRST, SECOND), "the other process votes for another one"
+    assert second.accept(Propose(SECOND, DECISION)) == Accepted(SECOND, SECOND)
+    accepted = AcceptedDecision(SECOND, DECISION)
+    assert first.promise(Lead(SECOND, "m", TEAM), private=True) == Promised(SECOND, SECOND, accepted, {})
+
+
+def test_a_process_that_locks_the_votes_does_not_stop_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robochoc.communication.network.robot_votes.LOCKED_S", 0.05)
+    with locked(tmp_path), pytest.raises(VotesError, match=r"another process of this robot has locked it for 0\.05 s"):
+        RobotVotes(tmp_path / "votes.json").promise(Lead(FIRST, "m", TEAM), private=False)
+    RobotVotes(tmp_path / "votes.json").promise(Lead(FIRST, "m", TEAM), private=False)
+
+
 # Votes for a master
 
 
@@ -194,6 +217,12 @@ def test_a_closed_team_admits_no_robots_of_another() -> None:
     assert NO_TERM < FIRST
 
 
+def test_an_impossible_term_does_not_stop_later_masters() -> None:
+    votes = MasterVotes("a", "MASTER")
+    assert "which no master can have reached" in votes.admit(Standing("", (), Term(2**64 - 1, "x")), closed=False)
+    assert votes.start(TEAM).term == FIRST
+
+
 # Standby masters
 
 
@@ -232,6 +261,32 @@ def test_a_standby_master_receives_the_rules_of_the_authority() -> None:
     assert not standbys.waiting
 
 
+def watch_of(folder: Path, *leaders: Address) -> LeaderWatch:
+    authority = InMemoryAuthority(TEAM)
+    identity = replace(authority.master_identity((LOOPBACK,)), folder=folder)
+    return LeaderWatch(StandbyPlan(leaders, identity))
+
+
+def test_a_new_standby_master_waits_for_an_answer(tmp_path: Path) -> None:
+    place = Address(LOOPBACK, free_port(LOOPBACK))
+    with watch_of(tmp_path, place) as watch, pytest.raises(NoLeaderError, match=f"no answer from {place} for 0.1 s"):
+        watch.wait(0.1)
+
+
+def test_standby_masters_follow_a_master_that_has_resigned_one_by_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robochoc.run.networked.standby.time", SimpleNamespace(monotonic=lambda: 100.0))
+    first = Address(LOOPBACK, free_port(LOOPBACK))
+    answer = StandbyAnswer({}, (), resigned=True, closed=True)
+    for leaders, wait_s in (((first,), 0.0), ((first, Address(LOOPBACK, 1)), 1.0)):
+        watch = watch_of(tmp_path, *leaders)
+        watch._began = 0.0  # noqa: SLF001 - no threads
+        watch._note(first, answer)  # noqa: SLF001 - no threads
+        assert (watch.is_led, watch.has_closed) == (False, True)
+        assert watch.wait_s - watch._silent_s() == wait_s  # noqa: SLF001 - no threads
+
+
 # A master whose robots have left
 
 
@@ -258,6 +313,16 @@ def test_a_master_ends_its_term_if_a_robot_has_left_it_and_returns() -> None:
         assert [type(message) for message in sent] == [Welcome, RegistrationDenied, RegistrationDenied]
         with pytest.raises(NoMajorityError, match="RA has left this master for another one"):
             register("second", Standing(mission, TEAM, FIRST))
+
+
+def test_a_master_to_which_no_robot_comes_after_a_takeover(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.communication.network.master.COMING_S", 0)
+    authority = InMemoryAuthority(TEAM)
+    master = Master(authority, authority.master_identity((LOOPBACK,)), f"{LOOPBACK}:7447", NetworkMembers())
+    assert not master.gather(deadline=0.0)
+    master.takes_over = True
+    with pytest.raises(NoMajorityError, match="no robot has come to this master for 0 s: its run has ended elsewhere"):
+        master.gather()
 
 
 def test_a_master_steps_down_only_without_robots_of_an_earlier_run() -> None:

@@ -8,6 +8,7 @@ import socket
 from collections.abc import Iterator
 from contextlib import closing
 from itertools import pairwise
+from typing import IO
 
 import pytest
 from hypothesis import given
@@ -176,6 +177,23 @@ def test_a_router_that_no_longer_responds_is_killed() -> None:
         process.send_signal(signal.SIGSTOP)
         wait_until(lambda: stopped.failure != "", "it is not noticed")
         assert stopped.failure == "did not respond for 0.5 s"
+
+
+def test_a_router_is_replaced_without_an_interruption(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A master that ends without a router could not announce its end."""
+    changing = Router(free_endpoint(), IDENTITY, None, 1000)
+    found = []
+    wait_until_ready = changing._wait_until_ready  # noqa: SLF001 - while it is opened
+
+    def noted(output: IO[bytes]) -> bytes:
+        found.append(signal.SIGTERM in signal.pthread_sigmask(signal.SIG_BLOCK, ()))
+        return wait_until_ready(output)
+
+    monkeypatch.setattr(changing, "_wait_until_ready", noted)
+    with closing(changing):
+        changing.open({"A": ()})
+        changing.open({"A": (), "B": ()})
+    assert found == [False, True]
 
 
 def test_a_router_that_does_not_come_is_given_up_and_said_to_be_late(monkeypatch: pytest.MonkeyPatch) -> None:

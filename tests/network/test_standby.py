@@ -117,6 +117,8 @@ def test_a_minority_does_not_decide(site: Deployment) -> None:
         (["--as", "B"], "add --standby HOST:PORT"),
         (["--standby", "127.0.0.1:1,127.0.0.1:1", "--as", "B"], "127.0.0.1:1 is given twice: remove one"),
         (["--standby", "?"], "is not of the form HOST:PORT"),
+        (["--standby", "127.0.0.1:7447", "--as", "B"], "the address of this master"),
+        (["--standby", "127.0.0.1:1", "--as", "B", "--authority", "x"], "--authority is only for the first master"),
     ],
 )
 def test_options_that_make_no_standby(words: list[str], why: str) -> None:

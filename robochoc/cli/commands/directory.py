@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +12,7 @@ import click
 
 from robochoc.cli.options.network import (
     identity_option,
-    master_option,
+    masters_option,
     network_errors_as_failures,
     patience_option,
     token_options,
@@ -22,7 +25,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@master_option
+@masters_option("--master", "places", "Address of the master; several, if there are standby masters.", required=True)
 @click.option("--as", "name", required=True, metavar="NAME", help="Your enrolled name (--role observer is sufficient).")
 @token_options()
 @identity_option
@@ -42,7 +45,7 @@ if TYPE_CHECKING:
 @click.option("--sl", is_flag=True, help="Print the answer in FIPA-SL0, as it is received.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per agent.")
 def directory(
-    place: Address,
+    places: tuple[Address, ...],
     name: str,
     token: str | None,
     identity: Path | None,
@@ -59,18 +62,26 @@ def directory(
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     if sl and as_json:
         raise click.UsageError("--sl cannot be used with --json; remove one")
-    with network_errors_as_failures(place):
+    with network_errors_as_failures(places[0]):
         from robochoc.run.networked.directory_query import agents_in, query_directory, search_request, watch_directory
         from robochoc.run.networked.join import identity_of
+        from robochoc.run.networked.leader_search import at_leader
 
-        words = search_request(place, given["slots"], given["at_most"])
+        words = partial(search_request, slots=given["slots"], at_most=given["at_most"])
+        words(places[0])  # an invalid template is reported before the token is used
         patience_s = given["patience_s"]
-        proof = identity_of(name, place, identity, token, patience_s)
+        proof = identity_of(name, places[0], identity, token, patience_s)
+
+        def watch(place: Address) -> Iterator[str]:
+            """Wait for the first notice, which comes at once, and return all notices."""
+            notices = watch_directory(place, proof, words(place), patience_s)
+            return chain([next(notices)], notices)
+
         if watching:
-            for answer in watch_directory(place, proof, words, patience_s):
+            for answer in at_leader(places, patience_s, watch):
                 _print_answer(answer, sl=sl, as_json=as_json)
             return
-        answer = query_directory(place, proof, words, patience_s)
+        answer = at_leader(places, patience_s, lambda place: query_directory(place, proof, words(place), patience_s))
         if sl or as_json:
             _print_answer(answer, sl=sl, as_json=as_json)
         else:

@@ -207,7 +207,10 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
         patience_s=given.pop("patience_s"),
         survive=given.pop("on_loss") == "withdraw",
     )
-    standby = _standby(given.pop("leaders"), given.pop("own_name"), given.pop("identity"), given.pop("token"))
+    leaders = given.pop("leaders")
+    if leaders:
+        _refuse_for_standby(leaders, given["place"], folder)
+    standby = _standby(leaders, given.pop("own_name"), given.pop("identity"), given.pop("token"))
     withdraw, start = given.pop("withdraw"), given.pop("start")
     return MasterPlan(
         authority=folder or default_authority_folder(),
@@ -220,6 +223,14 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
         name=team.resolve().name if team else "team",
         **given,
     )
+
+
+def _refuse_for_standby(leaders: tuple[Address, ...], place: Address, authority: Path | None) -> None:
+    """Raise `UsageError` if a standby master would follow itself, or has an Authority."""
+    if place in leaders:
+        raise click.UsageError(f"--standby contains {place}, the address of this master (--listen): remove it there")
+    if authority:
+        raise click.UsageError("--authority is only for the first master: remove it, or --standby")
 
 
 def _standby(

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from robochoc.cli.options.network import (
-    AddressType,
     identity_option,
+    masters_option,
     network_errors_as_failures,
     patience_option,
     token_options,
@@ -45,12 +46,11 @@ NAME = "Sniffer"
 _MASTER_ONLY = {"as": "name", "identity": "identity", "journal": "copy", "no-page": "no_page"}
 """The options that require --master, and their arguments."""
 _OPTIONS = (
-    click.option(
+    masters_option(
         "--master",
-        "place",
-        type=AddressType(),
-        metavar="HOST:PORT",
-        help="Address of a master that runs with --sniffable.",
+        "places",
+        "Address of a master that runs with --sniffable; several, if there are standby masters.",
+        required=False,
     ),
     click.option(
         "--as",
@@ -158,7 +158,7 @@ def _follows_master(journal: Path | None, folder: Path | None, asked: Mapping[st
 
     Raises `UsageError` if both or neither are given, or if an option cannot be combined with them.
     """
-    if asked["place"] is None:
+    if not asked["places"]:
         if journal is None:
             raise click.UsageError("give a JOURNAL, or --master HOST:PORT to follow a run")
         useless = [f"--{option}" for option, name in _MASTER_ONLY.items() if asked[name]]
@@ -170,7 +170,7 @@ def _follows_master(journal: Path | None, folder: Path | None, asked: Mapping[st
         raise click.UsageError("--team requires a JOURNAL: a master does not send the robots' files")
     elif asked["no_page"] and asked["copy"] is None:
         raise click.UsageError("--no-page requires --journal FILE: otherwise there is no output")
-    return asked["place"] is not None
+    return bool(asked["places"])
 
 
 @dataclass(frozen=True)
@@ -185,19 +185,21 @@ class _PageOptions:
 def _sniff_master(
     page: _PageOptions,
     *,
-    place: Address,
+    places: tuple[Address, ...],
     copy: Path | None,
     patience_s: float,
     no_page: bool,
     **given: Any,  # noqa: ANN401 - the sniffer's identity
 ) -> int:
-    """Follow the run of the master at `place` to its end, keep the page until Ctrl-C, and return the exit status."""
+    """Follow the run of the leading master to its end, keep the page until Ctrl-C, and return the exit status."""
     from robochoc.formats import on_one_line
 
-    with network_errors_as_failures(place), ExitStack() as stack:
-        identity = _identity(place, patience_s, **given)
-        target = _JournalTarget(place, None if no_page else page, copy, stack)
-        ending = _receive(place, identity, patience_s, target)
+    with network_errors_as_failures(places[0]), ExitStack() as stack:
+        from robochoc.run.networked.leader_search import at_leader
+
+        identity = _identity(places[0], patience_s, **given)
+        target = _JournalTarget(None if no_page else page, copy, stack)
+        ending = at_leader(places, patience_s, lambda place: _receive(place, identity, patience_s, target))
         click.echo(on_one_line(f"{ending.why}; {target.summary}"), err=True)
         target.wait()
     return 0 if ending.over else LOST
@@ -218,7 +220,7 @@ def _receive(place: Address, identity: Identity, patience_s: float, target: _Jou
     from robochoc.sniffer.remote import receive
 
     try:
-        return receive(place, identity, target.write, patience_s=patience_s, granted=target.start)
+        return receive(place, identity, target.write, patience_s=patience_s, granted=partial(target.start, place))
     except _JournalWriteError as error:
         raise Failure(INVALID, f"{error} (free some space, or name another file)") from error
 
@@ -230,8 +232,7 @@ class _JournalWriteError(Exception):
 class _JournalTarget:
     """The targets for a received journal: an unnamed file that the page's process reads, and the user's file."""
 
-    def __init__(self, place: Address, page: _PageOptions | None, copy: Path | None, stack: ExitStack) -> None:
-        self._place = place
+    def __init__(self, page: _PageOptions | None, copy: Path | None, stack: ExitStack) -> None:
         self._page = page
         self._copy = copy
         self._stack = stack
@@ -239,8 +240,8 @@ class _JournalTarget:
         self._viewer: Viewer | None = None
         self._size = 0
 
-    def start(self) -> None:
-        """Open the targets after the master has granted access."""
+    def start(self, place: Address) -> None:
+        """Open the targets after the master at `place` has granted access."""
         from robochoc.formats import on_one_line
         from robochoc.journal.journal import JournalFile
 
@@ -249,7 +250,7 @@ class _JournalTarget:
             self._stack.callback(file.close)
             self._sinks.append(file.write)
         if self._page is None:
-            click.echo(on_one_line(f"following the run at {self._place} into {self._copy}"), err=True)
+            click.echo(on_one_line(f"following the run at {place} into {self._copy}"), err=True)
             return
         from robochoc.sniffer.viewer import Viewer
         from robochoc.system.temporary_files import unnamed_file
@@ -268,7 +269,7 @@ class _JournalTarget:
             why = f"port {self._page.port}: {error.strerror} (use another --port, or omit it)"
             raise Failure(USAGE, why) from error
         self._viewer = self._stack.enter_context(viewer)
-        click.echo(f"{viewer.url} shows the run at {self._place} on this machine; Ctrl-C ends it", err=True)
+        click.echo(f"{viewer.url} shows the run at {place} on this machine; Ctrl-C ends it", err=True)
 
     def write(self, blocks: bytes) -> None:
         """Write complete blocks to all targets. Raises `_JournalWriteError`."""

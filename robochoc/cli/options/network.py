@@ -53,19 +53,27 @@ class AddressList(click.ParamType["tuple[Address, ...]"]):
         self, value: str | tuple[Address, ...], param: click.Parameter | None, ctx: click.Context | None
     ) -> tuple[Address, ...]:
         """Return the addresses."""
+        from robochoc.run.networked.address import Address, AddressError
+
         if isinstance(value, tuple):
             return value
-        return tuple(AddressType().convert(text.strip(), param, ctx) for text in value.split(","))
+        try:
+            return Address.parse_all(value)
+        except AddressError as bad:
+            self.fail(str(bad), param, ctx)
 
 
 def _joined(
     _context: click.Context, param: click.Parameter, value: tuple[tuple[Address, ...], ...]
 ) -> tuple[Address, ...]:
     """Return all addresses. The same address twice is rejected."""
+    from robochoc.run.networked.address import AddressError, check_different
+
     places = tuple(place for places in value for place in places)
-    twice = next((place for place in places if places.count(place) > 1), None)
-    if twice:
-        raise click.BadParameter(f"{twice} is given twice: remove one", param=param)
+    try:
+        check_different(places)
+    except AddressError as repeated:
+        raise click.BadParameter(str(repeated), param=param) from None
     return places
 
 
@@ -83,9 +91,6 @@ def masters_option(name: str, argument: str, text: str, *, required: bool) -> Ca
     )
 
 
-master_option = click.option(
-    "--master", "place", type=AddressType(), required=True, metavar="HOST:PORT", help="Address of the master."
-)
 authority_option = click.option(
     "--authority",
     "folder",
@@ -213,6 +218,7 @@ def _statuses() -> dict[int, tuple[type[Exception], ...]]:
         from robochoc.communication.network.transport import CannotConnectError
         from robochoc.run.networked.directory_query import NoAnswerError, TemplateError
         from robochoc.run.networked.master_run import TeamIncompleteError
+        from robochoc.run.networked.standby import NoLeaderError
     except ModuleNotFoundError as missing:
         package = (missing.name or "").partition(".")[0]
         if package not in _EXTRA:
@@ -222,6 +228,6 @@ def _statuses() -> dict[int, tuple[type[Exception], ...]]:
     return {
         INVALID: (IdentityError, AuthorityError, TokenError),
         USAGE: (HostNameError, InvalidNameError, RouterError, TemplateError),
-        LIMIT: (TeamIncompleteError,),
+        LIMIT: (NoLeaderError, TeamIncompleteError),
         LOST: (CannotConnectError, EnrolmentError, NoAnswerError),
     }

@@ -356,6 +356,7 @@ class StandbyAnswer(_Message, frozen=True):
         over: The result of the run in words, if it is over.
         failed: True if the run is over, and was not completed.
         resigned: True if this master does not lead any more, so that another one may.
+        closed: True if the team is complete, so that its robots look for another master if this one is gone.
     """
 
     names: dict[str, tuple[str, ...]]
@@ -363,6 +364,7 @@ class StandbyAnswer(_Message, frozen=True):
     over: str = ""
     failed: bool = False
     resigned: bool = False
+    closed: bool = False
 
 
 # From robot to robot

@@ -26,7 +26,7 @@ from robochoc.communication.network.control_messages import (
 )
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.master_control import HELD_S, MasterControl
-from robochoc.communication.network.master_votes import SupersededError
+from robochoc.communication.network.master_votes import NoMajorityError, SupersededError
 from robochoc.communication.search_result import RobotsLostError, SearchResult
 from robochoc.communication.session import is_past
 from robochoc.protocols.traits import Traits
@@ -34,6 +34,8 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.errors import UnsupportedError
 
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
+COMING_S = 45.0
+"""The longest wait for the first robot after a takeover, in seconds. Robots look for a master for 30 s by default."""
 
 
 class Master(MasterControl):
@@ -49,6 +51,7 @@ class Master(MasterControl):
         robot.
         """
         until = math.inf if deadline is None else deadline  # people start the robots
+        self._listens_since = time.monotonic()
         self._serve_until(lambda: self.members.complete or self._is_gathered(), until)
         if self._is_to_step_down:
             raise SupersededError("a master with a higher priority leads")
@@ -58,7 +61,7 @@ class Master(MasterControl):
                 self._send(name, DomainRequest(variables))
             self._serve_until(lambda before=unseen: self.members.unseen() != before, until)  # type: ignore[misc]
             unseen = self.members.unseen()
-        self.members.closed = self.members.complete and not unseen
+        self.members.closed = self._standbys.closed = self.members.complete and not unseen
         invalid = next(self.members.invalid_scopes(), None) if self.members.closed else None
         if invalid:
             raise UnsupportedError(invalid)
@@ -69,12 +72,14 @@ class Master(MasterControl):
 
         Raises:
             RobotsLostError: if robots of another master's team do not come, and the run does not survive that.
-            NoMajorityError: if fewer than a majority of this team has come.
+            NoMajorityError: if fewer than a majority of this team has come, or no robot.
         """
         if self._is_to_step_down:
             return True
         missing = sorted(set(self.votes.team) - self.members.robots.keys())
         last = max((member.since for member in self.members.robots.values()), default=None)
+        if last is None and self.takes_over and is_past(self._listens_since + COMING_S):
+            raise NoMajorityError(f"no robot has come to this master for {COMING_S:g} s: its run has ended elsewhere")
         if not missing or last is None or not is_past(last + self._settings.patience_s):
             return False
         self.votes.check_team(self.members.robots)

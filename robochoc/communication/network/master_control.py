@@ -106,10 +106,12 @@ class MasterControl(MasterLoop):
         self._requests = RequestHandler(self._journal_server, self._facilitator, self._send, self.events.refuse)
         self.votes = MasterVotes(self.run, identity.name)
         self._standbys = Standbys(admission, connection.send)
-        self._heartbeat_at = 0.0
+        self._heartbeat_at = self._listens_since = 0.0
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched, self.votes)
         self.is_superseded: Callable[[], bool] = bool
         """Returns whether a master with a higher priority leads, so that this one must not close a team."""
+        self.takes_over = False
+        """True if another master has closed a team, whose robots look for a master."""
         self._dead: dict[str, str] = {}
         self._has_ended = False
         self.absent: dict[str, str] = {}

@@ -23,6 +23,8 @@ from robochoc.communication.search_result import RobotsLostError
 from robochoc.system.errors import RobochocError
 
 _NAMED = 5
+LAST_TERM = 1_000_000
+"""A term that is never reached, since a takeover needs seconds, and certificates expire after a day."""
 
 
 class NoMajorityError(RobotsLostError):
@@ -76,6 +78,8 @@ class MasterVotes:
         """
         if standing is None:
             return ""
+        if standing.promised.number > LAST_TERM:
+            return f"it has promised term {standing.promised.number}, which no master can have reached"
         self.is_needed = True
         self._seen.add(standing.promised)
         if standing.mission in {"", self.mission}:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 
 import msgspec
 
+from robochoc.authority.registry import locked
 from robochoc.communication.network.control_messages import (
     Accepted,
     AcceptedDecision,
@@ -26,6 +28,8 @@ KEPT_S = 7 * 24 * 3600.0
 """The time for which votes are stored, in seconds. A mission ends earlier, since certificates expire."""
 MOST_RUNS = 16
 """The maximum number of runs of a mission whose values a robot stores."""
+LOCKED_S = 5.0
+"""The longest wait for another process of the same robot that stores its votes, in seconds."""
 _PRIVATE = 0o600
 
 
@@ -91,17 +95,13 @@ class RobotVotes:
     def promise(self, order: Lead, *, private: bool) -> Promised:
         """Answer the request of a master to lead. Raises `VotesError`."""
         if order.mission != self.mission:
-            self._join(order)
-        votes = self._votes.promise(order.term)
-        if votes is not None:
-            self._store(votes)
+            self.mission, self._team, self._votes = order.mission, order.team, Votes()
+        self._vote(lambda votes: votes.promise(order.term))
         return Promised(order.term, self._votes.promised, self._accepted, {} if private else dict(self._values))
 
     def accept(self, order: Propose) -> Accepted:
         """Answer a proposal. Raises `VotesError`."""
-        votes = self._votes.accept(order.term, order.decision)
-        if votes is not None:
-            self._store(votes)
+        self._vote(lambda votes: votes.accept(order.term, order.decision))
         return Accepted(order.term, self._votes.promised)
 
     @property
@@ -109,14 +109,33 @@ class RobotVotes:
         accepted = self._votes.accepted
         return None if accepted is None else AcceptedDecision(accepted.term, accepted.decision)
 
-    def _join(self, order: Lead) -> None:
-        """Take part in another mission, with the votes that were stored for it."""
-        known = self._read().missions.get(order.mission)
-        self.mission, self._team, self._votes = order.mission, order.team, Votes()
-        if known is not None:
-            accepted = None if known.accepted is None else Acceptance(*known.accepted)
-            self._team, self._votes = known.team, Votes(known.promised, accepted)
-            self._values = known.values | self._values
+    def _vote(self, change: Callable[[Votes[TeamDecision]], Votes[TeamDecision] | None]) -> None:
+        """Store the votes after `change`, unless it returns None.
+
+        The stored votes count, since another process of this robot may have voted for another master in the meantime.
+        """
+        with self._locked():
+            known = self._read().missions.get(self.mission)
+            if known is not None:
+                accepted = None if known.accepted is None else Acceptance(*known.accepted)
+                self._team, self._votes = known.team, Votes(known.promised, accepted)
+                self._values = known.values | self._values
+            votes = change(self._votes)
+            if votes is not None:
+                self._store(votes)
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        """Lock the file against other processes of this robot. Raises `VotesError` if it stays locked."""
+        if self._file is None:
+            yield
+            return
+        try:
+            with locked(self._file.parent, LOCKED_S):
+                yield
+        except TimeoutError:
+            why = f"another process of this robot has locked it for {LOCKED_S:g} s: end that process"
+            raise VotesError(f"{self._file}: {why}") from None
 
     def _store(self, votes: Votes[TeamDecision]) -> None:
         self._votes = votes

@@ -16,6 +16,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import nullcontext
 from typing import IO, NamedTuple, cast
 
 from robochoc.authority.identity import Identity
@@ -113,8 +114,16 @@ class Router:
         self._is_silent = False
 
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
-        """Listen, with these rules (see `access_control`) instead of the previous rules. Raises `RouterError`."""
-        self.close()
+        """Listen, with these rules (see `access_control`) instead of the previous rules. Raises `RouterError`.
+
+        Ctrl-C and SIGTERM wait until a router with new rules listens: a master without a router could not announce its
+        end.
+        """
+        with signals_delayed() if self._process else nullcontext():
+            self.close()
+            self._open(reach, sniffers)
+
+    def _open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None) -> None:
         with signals_delayed():
             self._process = process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
                 [sys.executable, "-P", "-m", _PROCESS],  # -P: ignore modules in the working directory

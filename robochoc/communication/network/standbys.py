@@ -16,10 +16,12 @@ class Standbys:
 
     Attributes:
         waiting: The standby masters that do not know yet that the run is over.
+        closed: True if the team of this master is complete.
     """
 
     def __init__(self, admission: Admission, send: Callable[[str, StandbyAnswer], None]) -> None:
         self.waiting: set[str] = set()
+        self.closed = False
         self._admission = admission
         self._send = send
         self._end = ("", False)
@@ -50,7 +52,8 @@ class Standbys:
 
     def _answer(self) -> StandbyAnswer:
         names = {str(role): self._named(role) for role in Role}
-        return StandbyAnswer(names, self._admission.names(right=Right.SNIFF), *self._end)
+        sniffers = self._admission.names(right=Right.SNIFF)
+        return StandbyAnswer(names, sniffers, *self._end, closed=self.closed)
 
     def _named(self, role: Role) -> tuple[str, ...]:
         names = self._admission.names(role, invited=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ipaddress
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from robochoc.system.errors import RobochocError
@@ -38,6 +39,11 @@ class Address(NamedTuple):
             raise AddressError(f"{text!r} is not of the form HOST:PORT, such as 192.168.1.14:{DEFAULT_PORT}")
         return cls(host, int(port) if port else DEFAULT_PORT)
 
+    @classmethod
+    def parse_all(cls, text: str) -> tuple[Address, ...]:
+        """Parse addresses that are separated by commas. Raises `AddressError`."""
+        return tuple(cls.parse(part.strip()) for part in text.split(","))
+
     @property
     def enrolment_port(self) -> int:
         """The port for redeeming tokens."""
@@ -53,6 +59,13 @@ class Address(NamedTuple):
 
     def __str__(self) -> str:
         return f"[{self.host}]:{self.port}" if ":" in self.host else f"{self.host}:{self.port}"
+
+
+def check_different(places: Sequence[Address]) -> None:
+    """Raise `AddressError` if an address is repeated."""
+    twice = next((place for place in places if places.count(place) > 1), None)
+    if twice:
+        raise AddressError(f"{twice} is given twice: remove one")
 
 
 def _is_host(host: str) -> bool:

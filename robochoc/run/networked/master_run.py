@@ -202,7 +202,12 @@ def run_master(
 def _refuse_other_hosts(identity: Identity, hosts: Sequence[str]) -> None:
     """Raise `IdentityError` if robots would not accept a standby master at one of `hosts`."""
     if unknown := [host for host in hosts if host not in identity.hosts]:
-        known = ", ".join(identity.hosts) or "no address"
+        if not identity.hosts:
+            raise IdentityError(
+                f"{identity.name} is not enrolled as a master: choose a name of its own for this master, and enrol it,"
+                f" with robochoc authority enrol NAME --role master --host {unknown[0]}"
+            )
+        known = ", ".join(identity.hosts)
         raise IdentityError(
             f"{identity.name} is certified for {known}, not for {', '.join(unknown)}: enrol it again, with"
             f" robochoc authority enrol {identity.name} --role master --host {unknown[0]}"
@@ -218,14 +223,15 @@ def _stand_by(
 ) -> MasterResult:
     """Lead the run as soon as no master with a higher priority leads. Follow a master that returns before the search.
 
-    Raises `RunOverElsewhereError` and the errors of `run`.
+    Raises `RunOverElsewhereError`, `NoLeaderError`, and the errors of `run`.
     """
     with LeaderWatch(standby) as watch:
         while True:
             plan.following()
-            watch.wait()
+            watch.wait(plan.gather_s)
             master = opened(watch.admission, standby.identity)
             master.is_superseded = lambda: watch.is_led
+            master.takes_over = watch.has_closed
             with master:
                 listening()
                 try:

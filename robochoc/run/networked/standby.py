@@ -6,7 +6,6 @@ the role `master`, but not the Authority's key. It listens only while it leads.
 
 from __future__ import annotations
 
-import math
 import threading
 import time
 from collections.abc import Callable
@@ -57,6 +56,10 @@ class RunOverElsewhereError(RobochocError):
     def __init__(self, place: Address, answer: StandbyAnswer) -> None:
         super().__init__(f"the master at {place} has ended the run: {on_one_line(answer.over, LONGEST_REASON)}")
         self.failed = answer.failed
+
+
+class NoLeaderError(RobochocError):
+    """Raised if no master has ever answered a standby master, which therefore does not know the robots."""
 
 
 class _Follower:
@@ -139,7 +142,7 @@ class LeaderWatch:
         self._followers: list[_Follower] = []
         self._file = plan.identity.folder / ADMISSION
         self._answer = _stored(self._file)
-        self._has_resigned = False
+        self._resigned_at: float | None = None
         self._over: RunOverElsewhereError | None = None
 
     def __enter__(self) -> Self:
@@ -160,35 +163,53 @@ class LeaderWatch:
         return self._silent_s() < SILENCE_S
 
     @property
+    def has_closed(self) -> bool:
+        """True if the team was complete at the last answer of a leading master."""
+        return self._answer is not None and self._answer.closed
+
+    @property
     def admission(self) -> CopiedAdmission:
         """The Authority's rules, as in the last answer of a leading master."""
         if self._answer is None:
             raise AssertionError
         return CopiedAdmission(self._answer)
 
-    def wait(self) -> None:
+    def wait(self, gather_s: float | None = None) -> None:
         """Wait until no master with a higher priority leads.
 
-        A standby master that has never received an answer waits for one, since it does not know whom to admit.
+        A standby master that has never received an answer waits for one, since it does not know whom to admit: for
+        `gather_s` seconds (None: without a limit).
 
         Raises:
+            NoLeaderError: if there was no answer in time.
             RunOverElsewhereError: if the run is over.
         """
-        wait_s = SILENCE_S + _AFTER_S * (len(self._plan.leaders) - 1)
-        while self._answer is None or self._silent_s() < wait_s:
+        while self._answer is None or self._silent_s() < self.wait_s:
             if self._over:
                 raise self._over
+            if self._answer is None and gather_s is not None and time.monotonic() - self._began > gather_s:
+                leaders = ", ".join(map(str, self._plan.leaders))
+                raise NoLeaderError(
+                    f"no answer from {leaders} for {gather_s:g} s: a new standby master receives the names of the"
+                    " robots from another master; start the first one, and check that this one is enrolled there"
+                )
             time.sleep(_CHECK_S)
 
+    @property
+    def wait_s(self) -> float:
+        """The time without an answer after which this master leads, in seconds."""
+        return SILENCE_S + _AFTER_S * (len(self._plan.leaders) - 1)
+
     def _silent_s(self) -> float:
+        """Return the time without an answer. A master that has resigned counts as silent for as long as necessary."""
         times = [one.answered_at for one in self._followers if one.answered_at is not None]
-        began = -math.inf if self._has_resigned else self._began
+        began = self._began if self._resigned_at is None else self._resigned_at - SILENCE_S
         return time.monotonic() - max([began, *times])
 
     def _note(self, place: Address, answer: StandbyAnswer) -> None:
         """Store an answer. Called by the threads of the followers."""
         self.place = place
-        self._has_resigned = answer.resigned
+        self._resigned_at = time.monotonic() if answer.resigned else None
         self._over = RunOverElsewhereError(place, answer) if answer.over else None
         if self._answer is None or (answer.names, answer.sniffers) != (self._answer.names, self._answer.sniffers):
             with suppress(OSError):  # it is still in memory
@@ -198,11 +219,10 @@ class LeaderWatch:
 
 def _stored(file: Path) -> StandbyAnswer | None:
     try:
-        return msgspec.structs.replace(
-            msgspec.msgpack.decode(file.read_bytes(), type=StandbyAnswer), over="", failed=False, resigned=False
-        )
+        answer = msgspec.msgpack.decode(file.read_bytes(), type=StandbyAnswer)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         return None
+    return StandbyAnswer(answer.names, answer.sniffers)
 
 
-__all__ = ["LeaderWatch", "RunOverElsewhereError", "StandbyPlan"]
+__all__ = ["LeaderWatch", "NoLeaderError", "RunOverElsewhereError", "StandbyPlan"]
