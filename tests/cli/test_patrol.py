@@ -29,6 +29,8 @@ def test_the_example_has_soft_and_hard_constraints() -> None:
 
 WITHOUT_ANSWER = {"async-maxsum", "bounded-maxsum"}
 """Without a repair: no cycles of which the best is taken, and their last values break something hard here."""
+PROVEN = {"adpop"}
+"""Incomplete protocols whose result meets their own bound here."""
 
 
 def test_every_protocol_that_minimises_comes_to_the_tutorials_answer() -> None:
@@ -40,7 +42,7 @@ def test_every_protocol_that_minimises_comes_to_the_tutorials_answer() -> None:
                 if protocol in WITHOUT_ANSWER:
                     bare = solve(read_team(PATROL), replace(options, repair=False))
                     assert (bare.verdict, bare.assignment) == (Verdict.UNKNOWN, {})
-                complete = protocol_named(protocol).traits.complete
+                complete = protocol in PROVEN or protocol_named(protocol).traits.complete
                 assert outcome.verdict is (Verdict.OPTIMAL if complete else Verdict.SOLUTION)
                 assert (outcome.assignment, outcome.cost) == (BEST, 6) or not complete
                 assert outcome.verified
