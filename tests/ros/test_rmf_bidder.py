@@ -90,6 +90,13 @@ def test_trips_that_wait_are_planned_together() -> None:
     assert bidder.orders == {"one": ("t0", "t2", "t1")}
 
 
+def test_a_repeated_notice_gets_the_same_bid() -> None:
+    """A different bid would look like that of a second bidder with the same name."""
+    bidder = Bidder(FLEET)
+    first = bid_of(bidder, notice("t", "a", "b"))
+    assert bid_of(bidder, notice("t", "a", "b"), 5.0) == first
+
+
 def test_dry_runs_are_not_stored() -> None:
     bidder = Bidder(FLEET)
     assert bid_of(bidder, notice("t", "a", dry_run=True)).has_proposal

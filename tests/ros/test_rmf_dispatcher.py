@@ -12,6 +12,7 @@ from robochoc.ros.rmf import dispatcher as subject
 from robochoc.ros.rmf.allocation import allocate, cheapest_first
 from robochoc.ros.rmf.dispatcher import NOBODY, Dispatcher
 from robochoc.ros.rmf.fleet_file import RmfFleet, RobotSpec
+from robochoc.ros.rmf.fleets import CONFLICT_S
 from robochoc.ros.rmf.messages import (
     ApiRequest,
     ApiResponse,
@@ -330,6 +331,33 @@ def test_bids_without_a_cost_do_not_count(cost: float) -> None:
     one.receive(bid("patrol.dispatch-x1", cost=cost), 0)
     one.tick(3)
     assert not [c for c in sent(one, DispatchCommand) if isinstance(c, DispatchCommand) and c.fleet_name != NOBODY]
+
+
+def test_two_bidders_of_one_name_get_no_further_task() -> None:
+    """The first task is at both. As soon as their bids differ, the dispatcher refuses both, and says why."""
+    net = network(PlayedFleet("carts", lambda _: 1.0))
+    twin = PlayedFleet("carts", lambda _: 2.0)
+    net.fleets = {**net.fleets, "twin": twin}
+    for number in range(3):
+        net.request([patrol_request(number)])
+        net.run(100)
+    states = net.dispatcher.states.finished
+    assert [TaskStatus(state.status).name for state in states] == ["DISPATCHED", "FAILED", "FAILED"]
+    assert "two bidders have the fleet name carts" in states[1].errors[0]
+    del net.fleets["twin"]
+    net.run(CONFLICT_S)
+    net.now_s += CONFLICT_S
+    net.request([patrol_request(4)])
+    net.run(100)
+    assert net.dispatcher.states.finished[-1].status == TaskStatus.DISPATCHED
+
+
+def test_long_errors_of_fleets_are_cut_off() -> None:
+    one = dispatcher()
+    one.receive(patrol_request(1), 0)
+    one.receive(BidResponse("patrol.dispatch-x1", has_proposal=False, errors=("x" * 60_000,) * 90), 0)
+    one.tick(5)
+    assert sum(map(len, one.states.active[0].errors)) < 50_000
 
 
 def test_memory_is_bounded(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -81,6 +81,11 @@ def test_malformed_messages_are_ignored(fields: dict[str, object]) -> None:
     assert message_of("/other", fields) is None
 
 
+def test_a_time_beyond_64_bits_is_malformed() -> None:
+    proposal = {"fleet_name": "f", "finish_time": {"sec": 10**400, "nanosec": 0}}
+    assert message_of("/rmf_task/bid_response", {"task_id": "t", "has_proposal": True, "proposal": proposal}) is None
+
+
 def test_layouts_are_those_of_rmf() -> None:
     """The fields of the public definitions, in their order, and the size of the simplest ones in CDR."""
     layouts = {kind: [name for name, _ in types_of(2).layout(kind)] for _, kind in TOPICS.values()}

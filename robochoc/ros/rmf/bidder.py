@@ -74,6 +74,11 @@ class _Task(NamedTuple):
     trip: Trip
 
 
+class _Bid(NamedTuple):
+    task: _Task
+    response: BidResponse
+
+
 class Bidder:
     """Bids for `fleet`. Each method takes the time in seconds, which never decreases, and `drain` returns messages.
 
@@ -86,7 +91,7 @@ class Bidder:
     def __init__(self, fleet: RmfFleet, *, epoch_ns: int = 0, protocol: str = AUTO) -> None:
         self._fleet, self._epoch_ns, self._protocol = fleet, epoch_ns, protocol
         self._robots = {name: _Robot(spec.at, spec.speed_ms) for name, spec in fleet.robots.items()}
-        self._bids: dict[str, _Task] = {}
+        self._bids: dict[str, _Bid] = {}
         self._tasks: dict[str, _Task] = {}
         """The tasks that wait or are underway, in the order of their awards."""
         self._ended: dict[str, None] = {}
@@ -133,6 +138,9 @@ class Bidder:
         task_id = notice.task_id
         if not task_id or task_id in self._tasks or task_id in self._ended:
             return
+        if task_id in self._bids:  # a second, different bid would look like that of another bidder
+            self._outgoing.append(self._bids[task_id].response)
+            return
         try:
             request = read_task(notice.request)
             if request.fleet_name not in (None, self._fleet.name):
@@ -147,10 +155,10 @@ class Bidder:
         before, after = self._plan(now_s), self._plan(now_s, task_id, task.trip)
         end_ns = self._epoch_ns + round(after.ends_s[task_id] * _NS)
         proposal = BidProposal(self._fleet.name, after.robot_of(task_id), before.cost_s, after.cost_s, end_ns)
-        self._outgoing.append(BidResponse(task_id, has_proposal=True, proposal=proposal))
+        response = BidResponse(task_id, has_proposal=True, proposal=proposal)
+        self._outgoing.append(response)
         if not notice.dry_run:
-            self._bids.pop(task_id, None)
-            self._bids[task_id] = task
+            self._bids[task_id] = _Bid(task, response)
             if len(self._bids) > BIDS_MAX:
                 del self._bids[next(iter(self._bids))]
 
@@ -186,9 +194,9 @@ class Bidder:
         if command.type != CommandType.AWARD:
             error = error_json(4, "Unsupported type", f"the command has the type {command.type}")
             return DispatchAck(number, success=False, errors=(error,))
-        task = self._bids.pop(task_id, None)
-        if task is not None:
-            self._accept(task_id, task, now_s)
+        bid = self._bids.pop(task_id, None)
+        if bid is not None:
+            self._accept(task_id, bid.task, now_s)
         elif task_id not in self._tasks and task_id not in self._ended:
             error = error_json(OUT_OF_ORDER, "Invalid sequence", f"there is no bid for {task_id}")
             return DispatchAck(number, success=False, errors=(error,))

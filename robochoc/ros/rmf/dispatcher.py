@@ -24,6 +24,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Mapping
 
+from robochoc.ros.rmf.fleets import Fleets
 from robochoc.ros.rmf.messages import (
     ApiRequest,
     ApiResponse,
@@ -61,7 +62,6 @@ FINISHED_MAX = 100
 """The number of finished tasks in `DispatchStates`, as in RMF."""
 ANSWERS_MAX = 1000
 """The number of stored answers to requests, which are repeated for repeated requests."""
-FLEETS_MAX = 100
 NOBODY = "robochoc-no-fleet"
 """The name of no fleet. On a command for it, all fleets drop their bids for the task."""
 _OVERDUE_ROUNDS = 5
@@ -71,10 +71,9 @@ _REFUSAL = 4
 _LONGEST = 8
 _ATTEMPTS = 3
 """The number of times that a task is asked for before its round goes on without it."""
-_SILENT_NOTICES = 3
-"""A fleet that has not bid for this number of notices is not waited for."""
 _LINGER_S = 3600.0
 _NS = 10**9
+_CONFLICT = "two bidders have the fleet name {}, and both would execute the task: give each its own name"
 
 Allocate = Callable[[Mapping[str, Mapping[str, float]], set[str]], Mapping[str, str]]
 """Returns the fleet of tasks, each fleet at most once, from the costs by task and fleet, and the tasks to prefer."""
@@ -102,8 +101,7 @@ class Dispatcher:
         self._tasks: dict[str, Task] = {}
         self._finished: dict[str, Task] = {}
         self._answers: dict[str, ApiResponse] = {}
-        self._fleets: dict[str, int] = {}
-        """The known fleets, each with the number of notices since its last bid."""
+        self._fleets = Fleets()
         self._round: Round | None = None
         self._commands: dict[int, PendingCommand] = {}
         self._numbers = self._rounds = 0
@@ -119,7 +117,7 @@ class Dispatcher:
             case ApiRequest():
                 self._answer(message, now_s)
             case BidResponse():
-                self._store_bid(message)
+                self._store_bid(message, now_s)
             case DispatchAck():
                 self._acknowledged(message, now_s)
             case _:
@@ -209,31 +207,40 @@ class Dispatcher:
 
     # Bids
 
-    def _store_bid(self, response: BidResponse) -> None:
-        current = self._round
-        if current is None:
-            return
-        notice = current.notices.get(response.task_id)
-        if current.present and current.present.notice_id == response.task_id:
-            notice = current.present
+    def _store_bid(self, response: BidResponse, now_s: float) -> None:
+        one, notice = response.proposal, self._notice_of(response.task_id)
+        is_bid = response.has_proposal and one.is_valid
+        if is_bid and (notice is not None or self._is_own(response.task_id)):
+            self._fleets.add(one.fleet_name)
+            if "?" not in response.task_id:
+                self._fleets.compare_bid(response.task_id, one, now_s)
         if notice is None:
             return
-        one, task = response.proposal, notice.task
-        if not (response.has_proposal and one.is_valid):
+        if not is_bid:
             notice.refusals += 1
-            task.add_errors(*response.errors)
-            return
-        if one.fleet_name in self._fleets or len(self._fleets) < FLEETS_MAX:
-            self._fleets[one.fleet_name] = 0
-        if task.request.fleet_name in (None, one.fleet_name):
+            notice.task.add_errors(*response.errors)
+        elif self._fleets.has_conflict(one.fleet_name, now_s):
+            notice.refusals += notice.proposals.pop(one.fleet_name, None) is None
+            notice.task.add_errors(error_json(NO_BIDS, "conflict", _CONFLICT.format(one.fleet_name)))
+        elif notice.task.request.fleet_name in (None, one.fleet_name):
             notice.proposals[one.fleet_name] = one
+
+    def _is_own(self, notice_id: str) -> bool:
+        """Return whether a notice is one of this dispatcher, possibly an earlier one."""
+        return f".dispatch-{self._prefix}" in notice_id
+
+    def _notice_of(self, notice_id: str) -> Notice | None:
+        """Return the notice of the present round with an id."""
+        current = self._round
+        if current is None:
+            return None
+        if current.present and current.present.notice_id == notice_id:
+            return current.present
+        return current.notices.get(notice_id)
 
     def _ask(self, notice: Notice, *, dry_run: bool) -> None:
         """Ask for bids."""
-        for fleet in [*self._fleets]:
-            self._fleets[fleet] += 1
-            if self._fleets[fleet] > _SILENT_NOTICES:
-                del self._fleets[fleet]
+        self._fleets.ask()
         window = round(notice.window_s * _NS)
         self._outgoing.append(BidNotice(notice.task.text, notice.notice_id, window, dry_run))
 
@@ -390,7 +397,7 @@ class Dispatcher:
         """Withdraw an award that was not acknowledged. The command is repeated until the fleet answers again."""
         pending = self._commands.pop(number)
         fleet, task = pending.command.fleet_name, pending.task
-        self._fleets.pop(fleet, None)
+        self._fleets.forget(fleet)
         self._command(CommandType.REMOVE, task, fleet, now_s)
         self._renew(task)
         self._failed(task, now_s, error_json(NO_BIDS, "timeout", f"{fleet} has not acknowledged the award"))

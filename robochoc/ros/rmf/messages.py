@@ -17,6 +17,7 @@ REQUEST_CHARACTERS_MAX = 64 * 1024
 """The maximum length of a request for a task, in characters of JSON."""
 _Name = Annotated[str, msgspec.Meta(max_length=256)]
 _Json = Annotated[str, msgspec.Meta(max_length=REQUEST_CHARACTERS_MAX)]
+_Integer = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 _Errors = Annotated[tuple[_Json, ...], msgspec.Meta(max_length=100)]
 
 
@@ -75,7 +76,7 @@ class BidProposal(msgspec.Struct, frozen=True):
     expected_robot_name: _Name = ""
     prev_cost: float = 0.0
     new_cost: float = 0.0
-    finish_time: int = 0
+    finish_time: _Integer = 0
 
     @property
     def added_cost(self) -> float:
@@ -102,15 +103,15 @@ class DispatchCommand(msgspec.Struct, frozen=True):
 
     fleet_name: _Name
     task_id: _Name
-    dispatch_id: Annotated[int, msgspec.Meta(ge=0)]
-    timestamp: int
-    type: int
+    dispatch_id: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
+    timestamp: _Integer
+    type: _Integer
 
 
 class DispatchAck(msgspec.Struct, frozen=True):
     """A fleet's answer to the command `dispatch_id`."""
 
-    dispatch_id: int
+    dispatch_id: _Integer
     success: bool
     errors: _Errors = ()
 

@@ -17,6 +17,8 @@ from robochoc.ros.rmf.messages import (
 from robochoc.ros.rmf.task_request import TaskRequest
 
 ERRORS_MAX = 20
+ERROR_CHARACTERS_MAX = 2000
+"""The maximum length of a stored error; the rest is cut off. States of all tasks must fit into a message."""
 
 
 class Settings(msgspec.Struct, frozen=True):
@@ -84,7 +86,7 @@ class Task:
 
     def add_errors(self, *errors: str) -> None:
         """Store errors."""
-        self.errors = [*self.errors, *errors][-ERRORS_MAX:]
+        self.errors = [*self.errors, *(one[:ERROR_CHARACTERS_MAX] for one in errors)][-ERRORS_MAX:]
 
     @property
     def state(self) -> DispatchState:
