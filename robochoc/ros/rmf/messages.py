@@ -13,11 +13,11 @@ import msgspec
 from robochoc.robots.sink import Fields
 
 _SECOND_NS = 10**9
+_INTEGER_MIN, _INTEGER_MAX = -(2**63), 2**64 - 1
 REQUEST_CHARACTERS_MAX = 64 * 1024
 """The maximum length of a request for a task, in characters of JSON."""
 _Name = Annotated[str, msgspec.Meta(max_length=256)]
 _Json = Annotated[str, msgspec.Meta(max_length=REQUEST_CHARACTERS_MAX)]
-_Integer = Annotated[int, msgspec.Meta(ge=-(2**63), le=2**63 - 1)]
 _Errors = Annotated[tuple[_Json, ...], msgspec.Meta(max_length=100)]
 
 
@@ -76,7 +76,7 @@ class BidProposal(msgspec.Struct, frozen=True):
     expected_robot_name: _Name = ""
     prev_cost: float = 0.0
     new_cost: float = 0.0
-    finish_time: _Integer = 0
+    finish_time: int = 0
 
     @property
     def added_cost(self) -> float:
@@ -103,15 +103,15 @@ class DispatchCommand(msgspec.Struct, frozen=True):
 
     fleet_name: _Name
     task_id: _Name
-    dispatch_id: Annotated[int, msgspec.Meta(ge=0, le=2**63 - 1)]
-    timestamp: _Integer
-    type: _Integer
+    dispatch_id: Annotated[int, msgspec.Meta(ge=0)]
+    timestamp: int
+    type: int
 
 
 class DispatchAck(msgspec.Struct, frozen=True):
     """A fleet's answer to the command `dispatch_id`."""
 
-    dispatch_id: _Integer
+    dispatch_id: int
     success: bool
     errors: _Errors = ()
 
@@ -191,10 +191,12 @@ def message_of(topic: str, fields: Fields) -> Message | None:
 
 
 def _is_sendable(value: object) -> bool:
-    """Return whether all texts in a value can be sent again: with an id that is not, no answer is possible."""
+    """Return whether all texts and integers in a value can be sent again: otherwise no answer is possible."""
     match value:
         case str():
             return _is_text(value)
+        case int():
+            return _INTEGER_MIN <= value <= _INTEGER_MAX
         case Mapping():
             return all(map(_is_sendable, value.values()))
         case list() | tuple():
