@@ -16,7 +16,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.inference import maxsum_factor
 from robochoc.protocols.inference.maxsum import MaxSum, MaxSumSettings, Q, R
-from robochoc.protocols.inference.maxsum_factor import MOST, Factor, from_zero
+from robochoc.protocols.inference.maxsum_factor import MOST, Factor, from_zero, without_each
 from robochoc.protocols.message import Value
 from robochoc.protocols.shared.cycles import Domain
 from robochoc.run import Options, Runtime, solve
@@ -256,15 +256,41 @@ def test_what_a_half_answers_is_in_the_q_to_the_other_one() -> None:
     assert robot.edges == [[1, 0], [1, 0], [2, 0], [2, 0]]  # each half answers 1.5 and 0.5
 
 
+def test_reweighted_functions_are_divided_and_their_r_counts_less_but_is_left_out_as_a_whole() -> None:
+    """Of the function [[3, 1], [4, 6]] divided by a half, B's values cost 6 and 2; C's function adds a half of R."""
+    robot = informed(reweight=0.5)
+    replies(robot, ("RC", R([[4, 2]])))
+    assert robot.factors[0].charges.tolist() == [[6, 2], [8, 12]]
+    assert value(robot) == (2,)
+    assert robot.edges == [[0, 1], [1, 0]]  # z is [5, 2]: without [6, 2] it is [-1, 0], without [4, 2] it is [1, 0]
+
+
+def test_a_weight_of_one_is_plain_max_sum() -> None:
+    rows, preferred = [[3.0, 1.0], [5.0, 2.0]], [0.5, 0.0]
+    z = [8.5, 3.0]
+    assert without_each(preferred, rows, z, weight=1) == without_each(preferred, rows, z) == [[5.5, 2.0], [3.5, 1.0]]
+
+
+def test_a_reweighted_value_that_is_out_stays_out_and_nothing_is_subtracted_from_infinity() -> None:
+    rows, z = [[INFINITE, 2.0], [4.0, 6.0]], [INFINITE, 4.0]
+    assert without_each([0.0, 0.0], rows, z, weight=0.5) == [[2.0, 2.0], [INFINITE, -2.0]]
+
+
+def test_invalid_weights_are_refused() -> None:
+    for wrong in (0, -1, 1.5, float("nan")):
+        with pytest.raises(ValueError, match="reweight is"):
+            MaxSumSettings(reweight=wrong)
+
+
 @count("teams", 50, 300)
-def test_split_or_not_what_is_proven_is_true_and_no_cycle_is_cheaper_than_the_optimum(teams: int) -> None:
+def test_split_reweighted_or_not_what_is_proven_is_true_and_no_cycle_is_cheaper_than_the_optimum(teams: int) -> None:
     chance, proofs = Random("split"), 0
     for seed in range(teams):
         team = random_cost_team(chance)
         if all(domains_of(team).values()):
             least = least_cost(team)
-            split = chance.choice((0, 0.1, 0.4, 0.5))
-            result = played(team, MaxSum, any_schedule(chance), seed, cycles=8, split=split)
+            split, weight = chance.choice((0, 0.1, 0.4, 0.5)), chance.choice((1, 0.7, 0.3, 0.001))
+            result = played(team, MaxSum, any_schedule(chance), seed, cycles=8, split=split, reweight=weight)
             if result.verdict is Verdict.NO_SOLUTION:
                 proofs += 1
                 assert least == INFINITE
@@ -273,11 +299,13 @@ def test_split_or_not_what_is_proven_is_true_and_no_cycle_is_cheaper_than_the_op
     assert proofs > teams // 30
 
 
-def test_where_functions_are_to_be_split_there_is_no_form_as_arrays() -> None:
+def test_where_functions_are_to_be_split_or_reweighted_there_is_no_form_as_arrays() -> None:
     team = random_cost_team(Random(1), n_ary=False)
     options = Options(protocol="maxsum", runtime=Runtime.ARRAYS, settings={"split": "0.4"})
-    with pytest.raises(UnsupportedError, match="maxsum with --set split has no array implementation"):
-        solve(team, options)
+    for settings in (options.settings, {"reweight": "0.5"}):
+        (name,) = settings
+        with pytest.raises(UnsupportedError, match=f"maxsum with --set {name} has no array implementation"):
+            solve(team, replace(options, settings=settings))
     assert solve(team, replace(options, settings={"split": "0"})).verdict is not Verdict.UNKNOWN
 
 

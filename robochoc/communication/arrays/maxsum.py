@@ -193,7 +193,7 @@ class ArrayMaxSum(CycleRun):
     """A run of Max-Sum.
 
     Raises:
-        UnsupportedError: if functions are to be split.
+        UnsupportedError: if functions are to be split or reweighted.
     """
 
     in_blocks = True
@@ -202,8 +202,10 @@ class ArrayMaxSum(CycleRun):
     def __init__(
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
-        if cast("MaxSumSettings", settings).split:
-            raise UnsupportedError("maxsum with --set split has no array implementation: use --runtime simulator")
+        chosen = cast("MaxSumSettings", settings)
+        for name, used in (("split", chosen.split > 0), ("reweight", chosen.reweight != 1)):
+            if used:
+                raise UnsupportedError(f"maxsum with --set {name} has no array implementation: use --runtime simulator")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
         self._alone = [self._cost_alone(group) for group in layout.groups]
         self._factors = [] if layout.empty.size else factors_of(layout)

@@ -10,11 +10,13 @@ the cost of each value in all other functions. A robot chooses the value with th
   `split`); elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot whose
   values all cost `inf` proves that there is no solution.
 - **Parameters (`--set`)**: `damping` (the weight of the last Q in a new one; default 0.5), `preference` (the maximum
-  random charge of a value; default 0.01), `split` (each function becomes two; default 0: no splitting), `cycles`
-  (default 100).
+  random charge of a value; default 0.01), `split` (each function becomes two; default 0: no splitting), `reweight` (the
+  weight of functions in tree-reweighted Max-Sum; default 1: plain Max-Sum), `cycles` (default 100).
 - **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
   the max-sum algorithm", AAMAS 2008, Section 4; for damping and splitting: Cohen, Galiki, Zivan: "Governing convergence
-  of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
+  of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020; for reweighting: Wainwright, Jaakkola, Willsky:
+  "MAP estimation via agreement on trees: message-passing and linear programming", IEEE Transactions on Information
+  Theory 51(11), 2005.
 
 The methods correspond to the first paper's equations:
 
@@ -23,6 +25,7 @@ The methods correspond to the first paper's equations:
     Z, and the value (3)               `_z`, `_decide`
     preferences gamma                  `preferred`
     split constraint factor graph      `_split`
+    edge appearance probability        `reweight`
 
 The lowest-priority robot in the scope of a function holds it, because only this robot knows the constraint. Messages
 between nodes of the same robot are not sent. In a cycle all functions send R, then all variables send Q. All messages
@@ -36,6 +39,13 @@ With `split`, each function becomes two: the first has a share of each entry, dr
 second has the rest. 0.5 makes equal halves; below 0.5 they differ a little. Both are nodes in the graph, so a robot's Q
 to one of them contains the other's R. That works like damping: the search settles sooner. The halves form a cycle, so
 on a tree the result is no longer sure to be optimal.
+
+With `reweight` below 1, Max-Sum is tree-reweighted: the tables of functions are divided by this weight; R counts in Z
+with this weight, and a robot's Q to a function is Z without the whole R of this function. In the paper, a weight is the
+probability that a random spanning tree contains the function, so each function has its own weight, which no robot
+knows. Here all functions have the same weight: in a graph with n robots and m functions, the mean is (n - 1) / m. On a
+tree it is 1, and other weights may miss the optimum. On most graphs with cycles, weights below 1 make answers more
+expensive. No bound is reported, although the paper's messages yield one.
 
 Choices that the paper leaves open, and differences:
 
@@ -64,7 +74,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import message as wire
 from robochoc.protocols.acts import Act, Performative
-from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, without_each
+from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, weighted, without_each
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.anytime import AnytimeMessage
 from robochoc.protocols.shared.cycles import CycleProtocol, CycleSettings, Domain
@@ -76,16 +86,21 @@ from robochoc.system.compiling import mypyc_attr
 MAX_SPLIT = 0.5
 """With this share, both halves of a function are equal."""
 
+LEAST_WEIGHT = 0.001
+"""The minimum weight of functions: with lower ones, a division of costs would lose the last digits of others."""
+
 
 class MaxSumSettings(CycleSettings, frozen=True):
     """`damping`: the weight of the last Q. `preference`: its maximum for a value. `cycles`: the number of cycles.
 
     `split`: each function becomes two, and the share of each entry is drawn from `split` to 1 - `split`. 0: no split.
+    `reweight`: the weight of functions in tree-reweighted Max-Sum. 1: plain Max-Sum.
     """
 
     damping: float = 0.5
     preference: float = 0.01
     split: float = 0.0
+    reweight: float = 1.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -95,6 +110,8 @@ class MaxSumSettings(CycleSettings, frozen=True):
             raise ValueError(f"preference is {self.preference:g}; it must be a number, 0 or more")
         if not 0 <= self.split <= MAX_SPLIT:
             raise ValueError(f"split is {self.split:g}; it must be from 0 (none) to {MAX_SPLIT:g} (halves)")
+        if not LEAST_WEIGHT <= self.reweight <= 1:
+            raise ValueError(f"reweight is {self.reweight:g}; it must be from {LEAST_WEIGHT:g} to 1 (plain Max-Sum)")
 
 
 class R(wire.Message, frozen=True):
@@ -212,7 +229,9 @@ class MaxSum(FactorGraphProtocol):
         domains = self._domains
         self._made = True
         self._shape = []
-        self.factors = self._split(Factor.joined(self.problem.tables(domains), of_values=self.settings.split > 0))
+        factors = self._split(Factor.joined(self.problem.tables(domains), of_values=self.settings.split > 0))
+        weight = self.settings.reweight
+        self.factors = factors if weight == 1 else [factor.divided(weight) for factor in factors]
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
         self._last_q = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
 
@@ -296,12 +315,12 @@ class MaxSum(FactorGraphProtocol):
         self.listen(self.above, self._receive_q)
 
     def _z(self, rows: Sequence[Row]) -> Row:
-        """Return the cost of each value: its preference and the sum of all `rows` (Z)."""
-        return total(self.preferred, rows)
+        """Return the cost of each value: its preference and the weighted sum of all `rows` (Z)."""
+        return total(self.preferred, weighted(rows, self.settings.reweight))
 
     def _q(self, rows: Sequence[Row], z: Row, *, damped: bool) -> list[Row]:
         """Return, for each of `rows`, the cost of each value without that row (Q)."""
-        fresh = without_each(self.preferred, rows, z)
+        fresh = without_each(self.preferred, rows, z, weight=self.settings.reweight)
         damping = self.settings.damping
         if not damped or not damping:
             return [from_zero(row) for row in fresh]

@@ -64,6 +64,10 @@ class Factor:
         """
         return Factor(self.agents, self.charges * shares), Factor(self.agents, self.charges * (1 - shares))
 
+    def divided(self, weight: float) -> Factor:
+        """Return this function with all costs divided by `weight`."""
+        return Factor(self.agents, self.charges / weight, self._codes)
+
     def r(self, q: Sequence[Row]) -> list[Row]:
         """Return the minimum cost of each robot's values, given the Q of the others, in the order of the axes."""
         if not self._codes:
@@ -120,14 +124,26 @@ def total(first: Row, rows: Iterable[Row]) -> Row:
     return first
 
 
-def without_each(first: Row, rows: Sequence[Row], z: Row) -> list[Row]:
-    """Return, for each of `rows`, `z` without this row; `z` is the sum of `first` and all rows.
+def weighted(rows: Sequence[Row], weight: float) -> Sequence[Row]:
+    """Return `rows` with all entries multiplied by `weight`."""
+    return rows if weight == 1 else [[weight * entry for entry in row] for row in rows]
 
-    Nothing is subtracted from infinity.
+
+def without_each(first: Row, rows: Sequence[Row], z: Row, *, weight: float = 1) -> list[Row]:
+    """Return, for each of `rows`, `z` without this row; `z` is the sum of `first` and all rows times `weight`.
+
+    Nothing is subtracted from infinity: entries that are infinite in a row are left out of the sum.
     """
     if INFINITE in z:
-        return [total(first, [*rows[:place], *rows[place + 1 :]]) for place in range(len(rows))]
+        counted = weighted(rows, weight)
+        found = [total(first, [*counted[:place], *counted[place + 1 :]]) for place in range(len(rows))]
+        return found if weight == 1 else [_lowered(*pair, 1 - weight) for pair in zip(found, rows, strict=True)]
     return [list(map(sub, z, row)) for row in rows]
+
+
+def _lowered(row: Row, by: Row, share: float) -> Row:
+    """Return `row` minus the `share` of the finite entries in `by`."""
+    return [entry if less == INFINITE else entry - share * less for entry, less in zip(row, by, strict=True)]
 
 
 def from_zero(row: Row) -> Row:
