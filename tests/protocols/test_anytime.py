@@ -50,10 +50,10 @@ IN_CYCLES = [
 REPORTS = {"Place", "Step", "Paid", "Best"}
 
 
-def path(size: int) -> Team:
+def path(size: int, **domains: tuple[int, ...]) -> Team:
     names = [f"X{number:02}" for number in range(size)]
     constraints = [Constraint("C", DIFFERENT, pair, pair) for pair in itertools.pairwise(names)]
-    return team_of(dict.fromkeys(names, (1, 2, 3)), constraints)
+    return team_of({**dict.fromkeys(names, (1, 2, 3)), **domains}, constraints)
 
 
 def run(team: Team, name: str, chance: Random, seed: int, price: float | None = None, **settings: str) -> SearchResult:
@@ -254,6 +254,15 @@ def test_what_cannot_be_is_refused() -> None:
     with pytest.raises(ValueError, match="--set anytime=yes"):
         it.receive("RX00", Step((1,)))
     it.receive("RX00", Value((1,)))
+
+
+def test_robots_without_values_ignore_places() -> None:
+    it = robot_of(DSA, path(3, X01=()), "RX01")
+    it.settings = read_settings(DSA, {"anytime": "yes"})  # type: ignore[assignment, misc]
+    started(it)
+    assert it.verdict is Verdict.NO_SOLUTION
+    it.receive("RX00", Place("RX00", 0, None, None, None))
+    assert it.outbox == []
 
 
 def test_if_all_steps_break_something_the_last_values_stay() -> None:

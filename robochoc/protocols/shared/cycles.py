@@ -300,10 +300,10 @@ class CycleProtocol(Protocol):
 
     def _receive_report(self, sender: str, message: Place | Step | Paid | Best) -> None:
         """Process a message about the best cycle; start the search once the tree is complete."""
-        if self._anytime is None:
-            raise ValueError(f"{sender} looks for the best cycle, this robot does not: use --set anytime=yes for all")
         if self.verdict is not None:
             return
+        if self._anytime is None:
+            raise ValueError(f"{sender} looks for the best cycle, this robot does not: use --set anytime=yes for all")
         self._send_each(self._anytime.receive(sender, message))
         if self.cycle < 0 and self._then is None and self._anytime.tree.height is not None:
             self.start_cycles()
