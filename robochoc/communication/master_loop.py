@@ -39,12 +39,14 @@ class MasterLoop(ABC):
     """The interval between two checks for lost robots, in seconds."""
     longest_turn_s: float = 1.0
     """The longest turn of the loop that counts as waiting, in seconds: the clock of a suspended machine jumps."""
+    wave_s: float = 0.0
+    """The least interval between two waves, in seconds."""
 
     def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
         self._progress = progress
         self._kills = KillSchedule()
         self._kill: Callable[[str], None] | None = None
-        self._shown = self._checked = 0.0
+        self._shown = self._checked = self._waved = 0.0
         self._turned = self._waited_s = 0.0
         self._began = time.monotonic()
 
@@ -108,7 +110,8 @@ class MasterLoop(ABC):
             self._turned = now
             watch = self.watch if is_searching else None
             kill_s = self._kills.wait_s(now) if is_searching else None  # only then robots are killed
-            self._serve_once(now, deadline, kill_s, None if watch is None else watch.wait_s(now))
+            wave_s = max(0.0, self._waved + self.wave_s - now) if self.state.wave_due else None
+            self._serve_once(now, deadline, kill_s, wave_s, None if watch is None else watch.wait_s(now))
             self._detect_end(now)
             if is_searching:
                 self._kill_due()
@@ -156,7 +159,7 @@ class MasterLoop(ABC):
                 self._kill(name)
 
     def _detect_end(self, now: float) -> None:
-        """Start a wave if it could prove quiescence, or if the progress report needs the message count.
+        """Start a wave if it could prove quiescence, or if a progress report or a limit needs the message count.
 
         A search that can never continue ends.
         """
@@ -164,13 +167,17 @@ class MasterLoop(ABC):
         if state.is_stalled(self._waited_s, self._transit_s):
             self._end_stalled()
             return
-        wanted = self._progress is not None and now - self._shown >= TICK_S
-        if self._progress and wanted:
+        wanted = now - self._shown >= TICK_S and (self._progress is not None or state.max_messages is not None)
+        if wanted:
             self._shown = now
+        if self._progress and wanted:
             stage = f"waiting for {names}" if (names := state.awaited(self._waited_s)) else ""
             self._progress(Progress(state.counters.sent, time.monotonic() - self._began, stage))
         if state.start_continuation():
             self._send_all(GoOn())
+        if now - self._waved < self.wave_s and not state.counters.quiescent:
+            return
         wave = state.next_wave(wanted=wanted and state.searching)
         if wave is not None:
+            self._waved = now
             self._send_all(CounterWave(wave))

@@ -80,6 +80,11 @@ class FourCounters:
         """True if a wave is due: all counters are known, the sums are equal, and no wave is open."""
         return not self._unanswered and not self._unreported and self._total.sent == self._total.received
 
+    @property
+    def is_changed(self) -> bool:
+        """True if the sums differ from those before the latest wave, or some counters are unknown."""
+        return bool(self._unreported) or self._total != self._before
+
     def start_wave(self) -> int:
         """Open a wave and return its number, which must be sent to every robot. Call only if no wave is open."""
         self._wave += 1

@@ -174,9 +174,11 @@ class SearchState:
     @property
     def wave_due(self) -> bool:
         """True if a wave could prove quiescence, or show that the message limit is reached or the search is stuck."""
-        if self.counters.is_wave_open:
+        counters = self.counters
+        if counters.is_wave_open:
             return False
-        return bool(self._asked) or (self.ordered and (self.counters.due or self.max_messages is not None))
+        over = self.max_messages is not None and counters.is_changed
+        return bool(self._asked) or (self.ordered and (counters.due or over))
 
     @property
     def silent(self) -> tuple[str, ...]:

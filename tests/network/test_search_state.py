@@ -141,10 +141,13 @@ def test_what_is_under_way_is_not_quiet() -> None:
 
 def test_a_limit_on_messages_breaks_off() -> None:
     state = begun(AuditedSearchState(1, ROBOTS, max_messages=9))
-    assert state.wave_due  # how many there are is asked for all the time
+    assert state.wave_due
     waved(state, 2, 0)
     assert not enough(state)
-    waved(state, 3, 0)
+    assert state.wave_due  # after each change
+    waved(state, 2, 0)
+    assert state.next_wave() is None  # without one, only from time to time
+    all_hear(state, Counters(1, state.next_wave(wanted=True) or 0, 3, 0))
     assert state.broken_off
     assert state.result(0).verdict is Verdict.UNKNOWN
 

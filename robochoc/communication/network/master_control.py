@@ -47,6 +47,7 @@ from robochoc.communication.network.members import Member, NetworkMembers
 from robochoc.communication.network.registrar import Registrar
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.standbys import Standbys
+from robochoc.communication.robot_loop import IDLE_S
 from robochoc.communication.search_result import Progress, RobotsLostError
 from robochoc.journal.events import Observer
 from robochoc.solver.errors import TooLargeError, UnsupportedError
@@ -61,6 +62,10 @@ zenoh detects after `transport.HEARTBEAT_S` (5 s) that the last frame from a sen
 waits 10 s for a busy machine that does not answer. So the master waits longer than this for reports after a verdict,
 and before it decides that messages are lost.
 """
+
+
+WAVE_S = IDLE_S
+"""The least interval between two waves, in seconds: robots that answer each one stay far below their quotas."""
 
 
 class MasterControl(MasterLoop):
@@ -78,6 +83,7 @@ class MasterControl(MasterLoop):
     """
 
     state: AuditedSearchState
+    wave_s = WAVE_S
 
     def __init__(
         self,
