@@ -22,10 +22,15 @@ PAGE = {0, 2}
 
 
 class Truth:
-    """The least cost of a team, or the largest utility, by brute force, in the user's numbers."""
+    """The least cost of a team, or the largest utility, by brute force, in the user's numbers.
 
-    def __init__(self, team: Team) -> None:
+    The constants in the files of `lost` robots do not count.
+    """
+
+    def __init__(self, team: Team, lost: Collection[str] = ()) -> None:
         self.team = team
+        left = without_robots(team, lost)
+        self._not_counted = _constant(team) - (_constant(left) if left.robots else 0)
         self.sign = -1 if common_units(robot.costs for robot in team.robots).maximize else 1
         self._counted = normalized(team)
 
@@ -33,7 +38,9 @@ class Truth:
         """Return what the best solution of the others costs; None: there is none."""
         rest = without_robots(self._counted, without)
         least = minimum_cost(rest) if rest.robots else 0
-        return None if least == INFINITE else Fraction(str(user_cost(self._counted, least, without)))
+        if least == INFINITE:
+            return None
+        return Fraction(str(user_cost(self._counted, least, without))) - self._not_counted
 
     def withdrawal(self, without: Collection[str] = ()) -> tuple[int, Fraction]:
         """Return the least weight of robots that have to withdraw, and the least cost of the others then."""
@@ -56,8 +63,7 @@ class Truth:
 
     def paid(self, assignment: dict[str, int], without: Collection[str] = ()) -> Fraction | None:
         """Return what an assignment costs, constraint by constraint; None: it breaks one."""
-        units = common_units(robot.costs for robot in self.team.robots)
-        total = Fraction(units.constant, 10**units.places)
+        total = _constant(self.team) - self._not_counted
         for robot in self.team.robots:
             parts = [one for child in robot.children for one in child.constraints]
             for constraint in (*robot.private, *robot.shared, *parts):
@@ -75,9 +81,9 @@ class Truth:
 
 def check_answer(team: Team, found: dict[str, Any], words: Sequence[str], what: str) -> None:
     """Check a JSON result of `team`, which does not change. Robots may be lost."""
-    truth, verdict = Truth(team), found["verdict"]
-    gone = {*found["withdrawn"]}
+    verdict, gone = found["verdict"], {*found["withdrawn"]}
     lost = gone & {name for epoch in (found, *found["epochs"]) for name in epoch.get("lost", ())}
+    truth = Truth(team, lost)
     assert verdict in {"unknown", "no-solution"} or found["verified"], what
     if verdict == "unknown":
         assert found["reason"], what
@@ -145,6 +151,11 @@ def check_journal(path: Path, words: Sequence[str], what: str) -> None:
     measured = robochoc_within("privacy", path, "--no-cache")
     assert measured.returncode in PAGE or nothing, f"{what}{measured.stderr}"
     path.unlink()
+
+
+def _constant(team: Team) -> Fraction:
+    units = common_units(robot.costs for robot in team.robots)
+    return Fraction(units.constant, 10**units.places)
 
 
 def _cost(found: dict[str, Any]) -> Fraction:
