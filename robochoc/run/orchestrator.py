@@ -150,9 +150,8 @@ def _check_costs(team: Team, outcome: Outcome) -> None:
     Raises:
         RefutedError: if a cost is wrong.
     """
-    if not outcome.epochs:
+    if not outcome.epochs and not outcome.lost:
         check_user_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
-        return
     for events, epoch in enumerate(outcome.epochs):
         if epoch.lost:
             return

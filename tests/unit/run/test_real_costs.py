@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
@@ -37,7 +38,7 @@ from robochoc.model.problem import (
 )
 from robochoc.model.team_edits import without_robots
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
+from robochoc.run.options import OnLoss, Options, Preprocess, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
@@ -195,6 +196,16 @@ def test_a_constant_counts_while_its_robot_is_there(protocol: str) -> None:
     runtime = Runtime.PROCESSES if protocol == "central" else Runtime.SIMULATOR
     outcome = solve(replace(start, scenario=events), Options(protocol=protocol, runtime=runtime))
     assert [epoch.cost for epoch in outcome.epochs] == [96, 1094, 998]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="robots are killed")
+def test_the_constant_of_a_robot_lost_in_the_preprocessing_does_not_count() -> None:
+    domains = {"a": [Variable("x", BITS)], "b": [Variable("y", BITS)]}
+    costly = [soft("c", ("x", "y"), _00=3)]
+    team = assemble("t", domains, costly, kind=ProblemKind.DISWCSP, costs=CostUnits(constant=100))
+    options = Options(protocol="dpop", on_loss=OnLoss.WITHDRAW, preprocess=Preprocess.AC, kill=(Kill("a", 0.0),))
+    outcome = solve(team, options)
+    assert outcome.cost == (0 if outcome.lost else 101)
 
 
 # Robots that come back, by a scenario or after a loss: costs and symbols are those of the whole team
