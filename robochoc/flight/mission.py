@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -52,12 +53,23 @@ class Drone:
     group: int
 
 
+class GoalStop(NamedTuple):
+    """A place where a robot does a task, and the variable of the task."""
+
+    at: Point
+    task: str
+
+
 @dataclass(frozen=True)
 class Goal:
     """The goal of a drone: a place in the air, or on the ground if it `lands`."""
 
     at: Point
     lands: bool = False
+    stops: tuple[GoalStop, ...] = ()
+    """All places of a robot that does tasks one after the other, the first of which is `at`. Simulated flights ignore
+    the others.
+    """
 
 
 @dataclass(frozen=True)

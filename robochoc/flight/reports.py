@@ -55,4 +55,13 @@ class PoseReport:
     at_s: float = 0.0
 
 
-Report = BlockedReport | ClearedReport | OutOfOrderReport | BatteryReport | PoseReport
+@dataclass(frozen=True)
+class DoneReport:
+    """The robot has done the task of the variable `task`: the variable keeps its value."""
+
+    drone: str
+    task: str
+    at_s: float = 0.0
+
+
+Report = BlockedReport | ClearedReport | OutOfOrderReport | BatteryReport | PoseReport | DoneReport

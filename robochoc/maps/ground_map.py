@@ -10,6 +10,7 @@ from typing import Annotated
 
 import msgspec
 
+from robochoc.maps.stops import RobotStops
 from robochoc.system.decode_errors import describe_decode_error
 
 MAX_BYTES = 8 << 20
@@ -140,6 +141,7 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
         volume: The third dimension, if the map has one.
         walls: Walls that drones fly around; None: no walls. A map with walls has a scale.
         places: The exact places of robots in metres, by name.
+        stops: The places of robots' tasks, by the robot's name.
     """
 
     columns: _Column
@@ -151,6 +153,7 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_de
     volume: Volume | None = None
     walls: WallPixels | None = None
     places: dict[str, tuple[_Metres, _Metres]] = {}
+    stops: dict[str, RobotStops] = {}
 
     def x_and_y(self, column: int, row: int) -> tuple[int, int]:
         """Return the x and y of topics in a column and a row."""

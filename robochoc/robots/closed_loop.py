@@ -6,6 +6,7 @@ the problem, together with further reports within `TOGETHER_S`, opens the next e
 
 from __future__ import annotations
 
+import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -13,11 +14,13 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from robochoc.flight.crafts import crafts_of
+from robochoc.flight.layout import Point
 from robochoc.flight.mission import (
     UNIT_M,
     VAST_M,
     Drone,
     Goal,
+    GoalStop,
     Leg,
     Mission,
     MissionBuilder,
@@ -25,7 +28,7 @@ from robochoc.flight.mission import (
     check_scale,
     mission_of,
 )
-from robochoc.flight.reports import Report
+from robochoc.flight.reports import DoneReport, Report
 from robochoc.maps.ground_map import GroundMap
 from robochoc.model.change import apply_possible_changes
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
@@ -42,6 +45,8 @@ TOGETHER_S = 0.5
 """The time after a report that changes the problem in which reports belong to the same event, in seconds."""
 
 
+_SAME_M = 1e-3
+"""Places within this distance are the same, in metres."""
 _FLOWN = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
@@ -66,6 +71,9 @@ class Feedback(ABC):
     def notes(self) -> list[str]:
         """Sentences about messages that could not be used."""
         return []
+
+    def check(self) -> None:  # noqa: B027 - simulations need no sink
+        """Raise `SourceError` if the source lacks a sink. It is called when all sinks are open."""
 
     @abstractmethod
     def now_ns(self) -> int:
@@ -130,6 +138,10 @@ class ClosedLoop:
         self._situation: Situation | None = None
         self._legs: list[Leg] = []
         self._goals: dict[int, Goal] = {}
+        self._assignment: Assignment = {}
+        """The last published assignment."""
+        self._done: list[Change] = []
+        """Changes by which tasks remain done. They open no epoch, but belong to the next event."""
         self._improved: Leg | None = None
         """The last improved decision published in the current epoch."""
         self._news: ReportedChanges | None = None
@@ -138,6 +150,7 @@ class ClosedLoop:
         self.events = []
         self.publishers = publishers
         if feedback:
+            feedback.check()
             feedback.publishers = [one for one in publishers if feedback.simulated or not one.live]
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
@@ -147,7 +160,7 @@ class ClosedLoop:
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
         leg, self._improved = self._improved, None
         if leg is None or epoch.verdict not in _FLOWN:
-            leg = builder.leg(epoch)
+            leg = self._leg(builder, epoch)
             self._legs.append(leg)
             self._decide(leg)
         elif self.feedback is not None:
@@ -165,9 +178,10 @@ class ClosedLoop:
     def publish(self, outcome: Outcome) -> None:
         """Publish the decisions of a run that was made without this loop."""
         mission = mission_of(outcome, self._team, self._scale, self._ground, exact=self._exact)
-        self._legs = [*mission.legs]
-        for leg in mission.legs:
-            self._decide(leg)
+        decisions = [epoch.assignment for epoch in outcome.epochs] or [outcome.assignment]
+        for leg, values in zip(mission.legs, decisions, strict=True):
+            self._legs.append(with_stops(leg, values, mission.drones, mission.scale, self._ground))
+            self._decide(self._legs[-1])
 
     def improve(self, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
         """Publish an improved decision during a search, with waypoints only for drones whose goals have changed.
@@ -175,7 +189,7 @@ class ClosedLoop:
         A simulation flies only the last decision of an epoch, since its time stops while the team decides.
         """
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
-        leg = builder.leg(epoch, withdrawn)
+        leg = self._leg(builder, epoch, withdrawn)
         goals = {number: goal for number, goal in leg.goals.items() if goal != self._goals.get(number)}
         self._improved = leg
         if self.feedback is None:
@@ -189,7 +203,7 @@ class ClosedLoop:
             return False
         team = self._after_known_events(team, self._past_events + (not self._lost))
         while self._news is None and (report := feedback.poll()) is not None:
-            changes = self._situation_of(builder).changes(team, report)
+            changes = self._changes(builder, team, report)
             if changes:
                 self._news = ReportedChanges([*changes], report.at_s + TOGETHER_S)
         return self._news is not None
@@ -211,6 +225,12 @@ class ClosedLoop:
         return [*received, *(self._situation.notes if self._situation else [])]
 
     # Decisions
+
+    def _leg(self, builder: MissionBuilder, epoch: EpochOutcome, withdrawn: Sequence[str] = ()) -> Leg:
+        """Return the leg of `epoch`, in which robots that do tasks have several stops, unless they are simulated."""
+        leg = builder.leg(epoch, withdrawn)
+        self._assignment = epoch.assignment
+        return with_stops(leg, epoch.assignment, builder.drones, builder.scale, self._ground) if self._exact else leg
 
     def _new_builder(self, assignment: Assignment) -> MissionBuilder:
         """Return a builder for all drones, whose homes are below their first places, or below possible places."""
@@ -238,7 +258,6 @@ class ClosedLoop:
 
     def _event_of_reports(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
         """Return the event caused by the first reports that change `team`; None if there are no such reports."""
-        situation = self._situation_of(builder)
         changes: list[Change] = []
         until_s = None
         news, self._news = self._news, None
@@ -246,17 +265,56 @@ class ClosedLoop:
             changes, until_s = news
             team, _ = apply_possible_changes(team, changes)
         while (report := feedback.next(until_s)) is not None:
-            found = situation.changes(team, report)
+            found = self._changes(builder, team, report)
             if found:
                 changes += found
                 team, _ = apply_possible_changes(team, found)
                 until_s = report.at_s + TOGETHER_S if until_s is None else until_s
-        return ScenarioEvent(tuple(changes)) if changes else None
+        if not changes:
+            return None
+        done, self._done = self._done, []
+        return ScenarioEvent((*done, *changes))
+
+    def _changes(self, builder: MissionBuilder, team: Team, report: Report) -> tuple[Change, ...]:
+        """Return the changes that a report causes now. Those of tasks that are done are stored for the next event."""
+        situation = self._situation_of(builder)
+        if isinstance(report, DoneReport):
+            self._done += [one for one in situation.done(team, report, self._assignment) if one not in self._done]
+            return ()
+        return situation.changes(team, report)
 
     def _situation_of(self, builder: MissionBuilder) -> Situation:
         if self._situation is None:
             self._situation = Situation(builder.drones, builder.scale, self._battery)
         return self._situation
+
+
+def with_stops(leg: Leg, values: Assignment, drones: Sequence[Drone], scale: float, ground: GroundMap | None) -> Leg:
+    """Return `leg` with all stops of robots that do tasks one after the other.
+
+    Args:
+        leg: The leg.
+        values: The decision.
+        drones: The drones, by number.
+        scale: The length of a unit, in metres.
+        ground: The map with the stops.
+    """
+    if ground is None or not ground.stops:
+        return leg
+    goals = dict(leg.goals)
+    for number, goal in leg.goals.items():
+        known = ground.stops.get(drones[number].robot)
+        if known is None or goal.lands:
+            continue
+        stops = [GoalStop(_scaled(one.at, scale), one.variable) for one in known.of(values)]
+        if stops and math.dist(stops[0].at, goal.at) <= _SAME_M:
+            goals[number] = replace(goal, stops=tuple(stops))
+    return replace(leg, goals=goals)
+
+
+def _scaled(at: tuple[int, int, int], scale: float) -> Point:
+    x, y, z = (part * scale for part in at)
+    return x, y, z
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:

@@ -8,7 +8,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from robochoc.flight.layout import Point
-from robochoc.flight.mission import Drone
+from robochoc.flight.mission import Drone, GoalStop
 from robochoc.system.errors import RobochocError
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -32,6 +32,13 @@ class Waypoint:
     """The time of the decision, in nanoseconds."""
     before: Point | None = None
     """The previous goal; None if the drone had none."""
+    stops: tuple[GoalStop, ...] = ()
+    """All places of a robot that does tasks one after the other; the first one is `at`."""
+
+    @property
+    def way(self) -> list[Point]:
+        """The places in order: those of all stops, or `at`."""
+        return [stop.at for stop in self.stops] or [self.at]
 
 
 Fields = Mapping[str, Any]

@@ -15,9 +15,19 @@ from typing import assert_never
 from robochoc.flight.crafts import Craft, crafts_of
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
+from robochoc.flight.reports import (
+    BatteryReport,
+    BlockedReport,
+    ClearedReport,
+    DoneReport,
+    OutOfOrderReport,
+    PoseReport,
+    Report,
+)
+from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.model.expression import Expression, Name, UndefinedValueError, evaluate, names
-from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
+from robochoc.model.problem import AddValue, Assignment, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
+from robochoc.robots.fixed_decision import changes_of_fixed
 from robochoc.system.lazy_dataclass import dataclass
 
 _Cell = tuple[int, int, int]
@@ -80,7 +90,7 @@ class Situation:
     def changes(self, team: Team, report: Report) -> tuple[Change, ...]:
         """Return the changes to `team` caused by `report`; none if the drone's robot is not in the team."""
         drone = self._drones.get(report.drone)
-        if drone is None or drone.robot not in team:
+        if drone is None or drone.robot not in team or isinstance(report, DoneReport):  # `done` needs the decision
             return ()
         match report:
             case BlockedReport(place=place):
@@ -95,6 +105,20 @@ class Situation:
                 return (RemoveAgent(drone.robot),) if self._is_down(drone, report) else ()
             case never:
                 assert_never(never)
+
+    def done(self, team: Team, report: DoneReport, values: Assignment) -> tuple[Change, ...]:
+        """Return the changes by which a task remains done, if its robot leaves, too.
+
+        The variable of the task keeps its value in `values`, the current decision. Values of other variables that a
+        hard constraint forbids together with it are removed, such as doing the same task.
+        """
+        drone = self._drones.get(report.drone)
+        name = report.task if report.task in values else f"{drone.robot if drone else ''}.{report.task}"
+        if drone is None or team.owner.get(name) != drone.robot or not values.get(name):  # 0: not its task
+            what = f"{shortened(report.drone)} reports a task as done that it does not have: {shortened(report.task)}"
+            self._note(on_one_line(what))
+            return ()
+        return tuple(changes_of_fixed(team, name, values[name]))
 
     # Obstacles
 

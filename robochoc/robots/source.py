@@ -17,6 +17,7 @@ REPORTS: Mapping[str, str] = MappingProxyType(
         "blocked": "geometry_msgs/PointStamped",
         "cleared": "geometry_msgs/PointStamped",
         "out_of_order": "std_msgs/String",
+        "done": "std_msgs/String",
     }
 )
 """The topics in a drone's namespace other than waypoints, by their last tokens, with their ROS types."""
@@ -64,6 +65,9 @@ class Source(ABC):
 
         Messages with another type on these topics are ignored.
         """
+
+    def check(self) -> None:  # noqa: B027 - most sources need no sink
+        """Raise `SourceError` if the source lacks a sink. It is called when all sinks are open."""
 
     @abstractmethod
     def next(self, wait_s: float) -> ReceivedMessage | None:

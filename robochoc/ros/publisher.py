@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone, Leg
-from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
+from robochoc.flight.reports import (
+    BatteryReport,
+    BlockedReport,
+    ClearedReport,
+    DoneReport,
+    OutOfOrderReport,
+    PoseReport,
+    Report,
+)
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.model.expression import Constant
 from robochoc.robots.mission_publisher import MissionPublisher, nanoseconds
@@ -130,6 +138,8 @@ class Publisher:
                 self._report(number, "cleared", {"header": header, "point": point(report.place)}, at_ns)
             case OutOfOrderReport():
                 self._report(number, "out_of_order", {"data": report.why}, at_ns)
+            case DoneReport():
+                self._report(number, "done", {"data": report.task}, at_ns)
             case _:
                 assert_never(report)
 
@@ -221,7 +231,8 @@ def waypoints(
     for number, goal in sorted(leg.goals.items()):
         topic, name = drones[number].topic, names.waypoint(number)
         if topic is not None and name is not None:
-            found.append(Waypoint(number, name, topic.type, goal.at, goal.lands, frame, stamp, before.get(number)))
+            before_at = before.get(number)
+            found.append(Waypoint(number, name, topic.type, goal.at, goal.lands, frame, stamp, before_at, goal.stops))
     return tuple(found)
 
 

@@ -11,7 +11,15 @@ from collections.abc import Mapping, Sequence
 
 from robochoc.flight.layout import Point
 from robochoc.flight.mission import Drone
-from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
+from robochoc.flight.reports import (
+    BatteryReport,
+    BlockedReport,
+    ClearedReport,
+    DoneReport,
+    OutOfOrderReport,
+    PoseReport,
+    Report,
+)
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.source import REPORTS, ReceivedMessage
 from robochoc.ros.names import TopicNames
@@ -58,6 +66,9 @@ class ReportDecoder:
             case "out_of_order":
                 why = received.fields.get("data")
                 return OutOfOrderReport(drone, on_one_line(why[:REASON_MAX]) if isinstance(why, str) else "", at_s)
+            case "done":
+                task = received.fields.get("data")
+                return DoneReport(drone, task, at_s) if isinstance(task, str) and len(task) <= REASON_MAX else None
             case "pose":
                 place = self._place(received, "pose", "position")
                 return None if place is None else PoseReport(drone, place, at_s)

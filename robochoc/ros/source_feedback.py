@@ -81,6 +81,10 @@ class SourceFeedback(Feedback):
             return on_one_line(f"{topic} does not belong to a drone of this team, and was ignored (expected: {listed})")
         return ""
 
+    def check(self) -> None:
+        """Raise `SourceError` if the source lacks a sink."""
+        self._source.check()
+
     def now_ns(self) -> int:
         """Return the present time according to the wall clock, the recording, or `/clock`."""
         if self._sim is not None:

@@ -125,7 +125,11 @@ def header(waypoint: Waypoint) -> Fields:
 
 
 def _pose(waypoint: Waypoint) -> Fields:
-    return {"position": point(waypoint.at), "orientation": UPRIGHT}
+    return _pose_at(waypoint.at)
+
+
+def _pose_at(at: Point) -> Fields:
+    return {"position": point(at), "orientation": UPRIGHT}
 
 
 def _transform(waypoint: Waypoint) -> Fields:
@@ -150,9 +154,9 @@ def _transforms(waypoint: Waypoint) -> Fields:
 
 
 def _path(waypoint: Waypoint) -> Fields:
-    """Return the straight path from the previous goal, if there is one."""
-    places = [waypoint.at] if waypoint.before is None else [waypoint.before, waypoint.at]
-    stops = [{"header": header(waypoint), "pose": {"position": point(at), "orientation": UPRIGHT}} for at in places]
+    """Return the straight path from the previous goal, if there is one, through all stops."""
+    places = [*([] if waypoint.before is None else [waypoint.before]), *waypoint.way]
+    stops = [{"header": header(waypoint), "pose": _pose_at(at)} for at in places]
     return {"header": header(waypoint), "poses": stops}
 
 
@@ -176,7 +180,9 @@ def _trajectory(waypoint: Waypoint) -> Fields:
 def _text(waypoint: Waypoint) -> Fields:
     """Return the waypoint as JSON on one line, for programs without ROS messages."""
     place = dict(zip("xyz", waypoint.at, strict=True))
-    return {"data": json.dumps({"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands})}
+    fields = {"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands}
+    stops = [{**dict(zip("xyz", stop.at, strict=True)), "task": stop.task} for stop in waypoint.stops]
+    return {"data": json.dumps({**fields, "stops": stops} if stops else fields)}
 
 
 _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
@@ -192,7 +198,7 @@ _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
         "geometry_msgs/Transform": _transform,
         "geometry_msgs/Point32": _point,
         "geometry_msgs/Pose2D": lambda waypoint: {"x": waypoint.at[0], "y": waypoint.at[1]},
-        "geometry_msgs/PoseArray": _with_header("poses", lambda waypoint: [_pose(waypoint)]),
+        "geometry_msgs/PoseArray": _with_header("poses", lambda waypoint: [*map(_pose_at, waypoint.way)]),
         "nav_msgs/Odometry": _odometry,
         "nav_msgs/Path": _path,
         "std_msgs/Float32": lambda waypoint: {"data": waypoint.at[2]},

@@ -6,6 +6,9 @@ import itertools
 import re
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import msgspec
 
 from robochoc.formats.definitions import check_topic
 from robochoc.formats.diagnostics import MistakeError, shortened
@@ -33,9 +36,14 @@ from robochoc.model.problem import ProblemKind, Team, Topic, Variable
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.tasks.entries import MAX_PLACES, MAX_TEAM, Point, RobotEntry, Synergy, TaskEntry
 from robochoc.tasks.precedence import orders_of, precedence_of
+from robochoc.tasks.stops import stops_of_choice, stops_of_tours, within_limit
 from robochoc.tasks.tours import Tour, TourSearch, round_length
 from robochoc.tasks.waypoints import Cells, in_units, of_choice, of_nearest, of_tours, unit_of, waypoint_topic
 from robochoc.tasks.ways import MapWays, Ways
+
+if TYPE_CHECKING:
+    from robochoc.maps.ground_map import GroundMap
+    from robochoc.maps.stops import RobotStops
 
 MAX_CONSTRAINTS = 200_000
 """The maximum number of constraints of the team, and of tours."""
@@ -135,7 +143,7 @@ class TaskTeamBuilder:
             raise MistakeError(what, "write fewer robots, or fewer tasks")
         name = re.sub(r"[^A-Za-z0-9_.-]+", "_", options.name or read.name)[:100].strip("._-") or "team"
         units = CostUnits(maximize=True, places=self._scale.places)
-        ground = self._ground()
+        ground = self._ground(workers)
         topics = self._topics(workers, variables) if ground or self._unit == 1 else {}
         team: Team = assemble(
             name, variables, listed, kind=ProblemKind.DISWCSP, costs=units, extras=Extras(topics=topics)
@@ -256,41 +264,67 @@ class TaskTeamBuilder:
     def _waypoint(self, worker: Worker, entry: RobotEntry) -> tuple[Expression, ...] | None:
         """Return the formulas for the place to which a robot goes first; None if they would be too long."""
         home = in_units(entry.at, self._unit)
-        places = {
+        places = self._places(worker)
+        if self._read.model == TasksModel.ASSIGNMENT:
+            return of_choice(worker.variable, places, home)
+        if self._read.tours:
+            first = [self._first(one, home) for one in self._tours_of[worker.name]]
+            return of_tours(tour_variable(worker), [home, *first], len(home))
+        nearest = self._nearest(entry, places)
+        return of_nearest([(self._variable(worker, task), places[task]) for task in nearest], home)
+
+    def _places(self, worker: Worker) -> dict[int, Cells]:
+        """Return the places of the tasks that a robot can do, by number."""
+        return {
             self._number[name]: in_units(task.at, self._unit)
             for name, task in self._read.tasks.items()
             if task.at and self._number[name] in worker.profit
         }
-        if self._read.model == TasksModel.ASSIGNMENT:
-            return of_choice(worker.variable, places, home)
-        names = {task: self._variable(worker, task) for task in places}
-        if self._read.tours:
-            first = [self._first(one, home) for one in self._tours_of[worker.name]]
-            return of_tours(tour_variable(worker), [home, *first], len(home))
+
+    def _nearest(self, entry: RobotEntry, places: Mapping[int, Cells]) -> list[int]:
+        """Return the tasks with places, the nearest to the robot first."""
         tasks = list(self._read.tasks.values())
-        nearest = sorted(places, key=lambda task: self._way(entry, entry.at, tasks[task - 1].at, MAX_PLACES) or 0)
-        return of_nearest([(names[task], places[task]) for task in nearest], home)
+        return sorted(places, key=lambda task: self._way(entry, entry.at, tasks[task - 1].at, MAX_PLACES) or 0)
+
+    def _stops(self, worker: Worker, entry: RobotEntry) -> RobotStops:
+        places = self._places(worker)
+        if self._read.model == TasksModel.ASSIGNMENT:
+            return stops_of_choice(worker.variable, places)
+        names = {task: self._variable(worker, task) for task in places}
+        tours = self._tours_of.get(worker.name, [])
+        return stops_of_tours(names, places, self._nearest(entry, places), tour_variable(worker), tours)
 
     def _first(self, tour: Tour, home: Cells) -> Cells:
         """Return the first place of a tour."""
         entries = [self._read.tasks[self._names[task - 1]] for task in tour.order]
         return next((in_units(one.at, self._unit) for one in entries if one.at), home)
 
-    def _ground(self) -> bytes:
+    def _ground(self, workers: Sequence[Worker]) -> bytes:
         """Return the content of `map.json`; empty if no robot has a position, or a position is too far away."""
-        robots = {self._robot_names.allowed(name): one.at for name, one in self._read.robots.items() if one.at}
+        robots = {self._robot_names.allowed(name): one for name, one in self._read.robots.items() if one.at}
         if not robots:
             return b""
         from robochoc.maps.ground_map import ground_map_json  # noqa: PLC0415 - start-up
-        from robochoc.tasks.ground import plain_ground  # noqa: PLC0415 - the same
+
+        ground = self._plain_or_walled_ground({name: one.at for name, one in robots.items()})
+        if ground is None:
+            return b""
+        stops = {one.name: self._stops(one, robots[one.name]) for one in workers if one.name in robots and one.profit}
+        if within_limit(stops):
+            return ground_map_json(msgspec.structs.replace(ground, stops=stops))
+        what = "the tours in map.json, which are too many, so that robots are sent to their first places only"
+        self._notes.append(ConversionNote("map", what))
+        return ground_map_json(ground)
+
+    def _plain_or_walled_ground(self, robots: Mapping[str, Point]) -> GroundMap | None:
+        from robochoc.tasks.ground import plain_ground  # noqa: PLC0415 - start-up
 
         if isinstance(self._read.ways, MapWays):
             try:
-                return ground_map_json(self._read.ways.ground(robots, self._unit))
+                return self._read.ways.ground(robots, self._unit)
             except ValueError as error:
                 self._notes.append(ConversionNote("map", f"the map, so that flights have no walls: {error}"))
-        ground = plain_ground(robots, self._read.points, self._unit)
-        return ground_map_json(ground) if ground else b""
+        return plain_ground(robots, self._read.points, self._unit)
 
     def _variable(self, worker: Worker, task: int) -> str:
         """Return the name of the variable that is 1 if a robot does a task, in the model with several tasks."""

@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
+from robochoc.flight.mission import GoalStop
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.robots.source import SourceError
 from robochoc.ros.commands import nav2
@@ -83,6 +84,41 @@ def test_without_a_source_a_failure_ends_the_run() -> None:
     assert "Nose is out of order: its goal was rejected; the others are stopped" in done.stderr
 
 
+TOURS = """tours: yes
+distance: streets
+robots:
+  ann: {at: [0, 0], most: 3}
+  bob: {at: [9, 9], most: 3}
+  cid: {at: [0, 9], most: 3}
+tasks:
+  near: {at: [4, 0], worth: 9}
+  far: {at: [6, 0.5], worth: 12}
+  top: {at: [5, 9], worth: 12}
+  mid: {at: [5, 5], worth: 14}
+"""
+
+
+def test_robots_go_to_all_their_tasks_and_done_ones_remain_done(tmp_path: Path) -> None:
+    (tmp_path / "tasks.yaml").write_text(TOURS)
+    place = f"dds:{free_domain()}"
+    words = ["--runtime", "simulator", "--protocol", "cbba", "--ros", f"nav2:{place}", "--situation", f"nav2:{place}"]
+    with PlayedRobots(place, {"/ann": "drives", "/bob": "aborts later", "/cid": "drives"}) as robots:
+        given = ["solve", str(tmp_path / "tasks.yaml"), *words, "--report-timeout", "1", "--json"]
+        done = CliRunner().invoke(cli, given, catch_exceptions=False)
+        events = robots.past()
+    assert done.exit_code == 0, done.stderr
+    goals = {name: [goal[:2] for other, what, goal, *_ in events if (other, what) == (name, "goal")] for name in ROBOTS}
+    assert goals["/ann"][:2] == [[4.0, 0.0], [6.0, 0.5]], "all stops, in order"
+    assert goals["/bob"] == [[5.0, 9.0], [5.0, 5.0]]
+    others = [*goals["/ann"], *goals["/cid"]]
+    assert [5.0, 5.0] in others, "the task that bob has not done"
+    assert [5.0, 9.0] not in others, "bob has left, and its first task remains done"
+    assert len(goals["/ann"]) == len({*map(tuple, goals["/ann"])}), "no task is done twice"
+
+
+ROBOTS = ("/ann", "/bob", "/cid")
+
+
 def test_a_robot_without_a_server(tmp_path: Path) -> None:
     (tmp_path / "robots.yaml").write_text("patience: 1\n")
     done = solved(f"{tmp_path}/robots.yaml@dds:{free_domain()}")
@@ -94,6 +130,7 @@ def test_a_robot_without_a_server(tmp_path: Path) -> None:
     ("place", "told"),
     lambda: [
         ("dcps:5", "'dcps' is not a middleware; use dds, rmw_zenoh, rosbridge, as in dds:5"),
+        ("robots@dds:5", "'robots' is not the name of a YAML file; expected FILE.yaml@MIDDLEWARE"),
         ("dds:900", "'900' is not a DDS domain"),
         ("dds:5?wait=3", "'wait' is not an option of DDS"),
         ("rosbridge://127.0.0.1:1", "no rosbridge listens at"),
@@ -111,7 +148,7 @@ def test_places_that_are_none(place: str, told: str) -> None:
 def test_a_source_needs_the_sink() -> None:
     source = Nav2Source(f"dds:{free_domain()}")
     with source, pytest.raises(SourceError, match="give --ros the same text as --situation"):
-        source.next(0)
+        source.check()
 
 
 # Files
@@ -341,6 +378,32 @@ def test_a_new_decision_replaces_the_goal(played: Played) -> None:
     assert played.poll() is RobotPhase.SENT, "the end of the goal before means nothing"
     played.actions.put(GoalPhase.SUCCEEDED)
     assert played.poll() is RobotPhase.ARRIVED
+
+
+def tour(*xs: float) -> Target:
+    stops = tuple(GoalStop((x, 2.0, 0.0), f"task{x:g}") for x in xs)
+    return Target(stops[0].at, False, "map", 7, stops)
+
+
+def test_a_tour_continues_after_a_decision_that_does_not_change_it(played: Played) -> None:
+    def arrive() -> None:
+        played.actions.put(GoalPhase.SUCCEEDED)
+        played.poll()
+
+    played.commander.command({"Nose": tour(1, 2, 3)})
+    arrive()
+    assert played.reports == [("Nose", "done", {"data": "task1"})]
+    assert len(played.actions.sent) == 2
+    played.commander.command({"Nose": tour(1, 2, 3)})
+    assert len(played.actions.sent) == 2, "it is on its way to the second stop"
+    played.commander.command({"Nose": tour(1, 3)})
+    assert played.actions.sent[-1][2]["pose"]["pose"]["position"]["x"] == 3
+    arrive()
+    assert played.poll() is RobotPhase.ARRIVED
+    played.commander.command({"Nose": tour(3, 1)})
+    assert played.poll() is RobotPhase.ARRIVED, "it has done both"
+    assert len(played.actions.sent) == 3
+    assert [fields["data"] for _, _, fields in played.reports] == ["task1", "task3"]
 
 
 def test_a_robot_that_withdraws_stops(played: Played) -> None:

@@ -38,6 +38,7 @@ MANNERS = {
     "keeps driving": "it never arrives",
     "rejects": "it rejects every goal",
     "aborts": "it aborts every goal after some steps",
+    "aborts later": "it arrives at its first goal, and aborts every later one after some steps",
     "mute": "it answers nothing",
     "falls silent": "it accepts goals, and then sends nothing",
     "twice": "as 'drives', but everything is sent twice",
@@ -126,6 +127,9 @@ class Robot:
         match self.manner:
             case "aborts":
                 self._end(self.goal, ABORTED)
+            case "aborts later":
+                self.at = self.to
+                self._end(self.goal, ABORTED if SUCCEEDED in self.results.values() else SUCCEEDED)
             case "unknown status":
                 self._end(self.goal, 77)
             case "vanishes":

@@ -48,7 +48,7 @@ class CommandSink(Sink):
     def decide(self, waypoints: Sequence[Waypoint]) -> None:
         """Send the robots to their waypoints."""
         targets = {
-            self._names[one.drone]: Target(one.at, one.lands, one.frame, one.stamp)
+            self._names[one.drone]: Target(one.at, one.lands, one.frame, one.stamp, one.stops)
             for one in waypoints
             if self._names[one.drone] in self._commander.robots
         }
@@ -132,11 +132,14 @@ class CommandSource(Source):
         if self._put not in self._commander.observers:
             self._commander.observers.append(self._put)
 
-    def next(self, wait_s: float) -> ReceivedMessage | None:
-        """Return the oldest report; None if none arrives within `wait_s`."""
+    def check(self) -> None:
+        """Raise `SourceError` if no sink in the same place commands robots."""
         if not self._commander.robots:
             problem = f"no robots are commanded in {self._commander.where}"
             raise SourceError(on_one_line(f"{problem}: give --ros the same text as --situation"))
+
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        """Return the oldest report; None if none arrives within `wait_s`."""
         until = time.monotonic() + wait_s
         while True:
             try:

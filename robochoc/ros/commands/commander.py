@@ -5,9 +5,11 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from dataclasses import field, replace
 from enum import Enum, auto
 
 from robochoc.flight.layout import Point
+from robochoc.flight.mission import GoalStop
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.robots.sink import Fields, SinkError
 from robochoc.system.lazy_dataclass import dataclass
@@ -45,6 +47,8 @@ class Target:
     frame: str
     stamp: int
     """The time of the decision, in nanoseconds."""
+    stops: tuple[GoalStop, ...] = ()
+    """All places of a robot that does tasks one after the other; the first one is `at`."""
 
 
 @dataclass
@@ -55,6 +59,10 @@ class CommandedRobot:
     namespace: str
     phase: RobotPhase = RobotPhase.IDLE
     target: Target | None = None
+    left: list[GoalStop] = field(default_factory=list)
+    """The stops at which the robot has not been; it is on its way to the first one."""
+    done: set[str] = field(default_factory=set)
+    """The tasks at whose places the robot has been."""
     sent_s: float = 0.0
     """The time of the last command."""
     heard_s: float = 0.0
@@ -70,6 +78,13 @@ class CommandedRobot:
     def is_busy(self) -> bool:
         """True if the robot is on its way."""
         return self.phase in {RobotPhase.SENT, RobotPhase.MOVING}
+
+    def continues(self, target: Target) -> bool:
+        """Return whether a robot with this new target continues on its way, or stays at its place."""
+        if self.target is None or self.target.lands != target.lands:
+            return False
+        left = [stop for stop in target.stops if stop.task not in self.done]
+        return left == self.left and (bool(target.stops) or self.target.at == target.at)
 
 
 class Commander(ABC):
@@ -112,13 +127,32 @@ class Commander(ABC):
         """Send robots to their targets. A robot that already has the same target continues."""
         for name, target in targets.items():
             robot = self.robots[name]
-            is_same = robot.target is not None and (robot.target.at, robot.target.lands) == (target.at, target.lands)
-            if robot.phase is RobotPhase.OUT or (is_same and robot.phase is not RobotPhase.IDLE):
+            if robot.phase is RobotPhase.OUT or (robot.phase is not RobotPhase.IDLE and robot.continues(target)):
                 continue
             robot.target = target
-            robot.sent_s = robot.heard_s = time.monotonic()
-            robot.phase = RobotPhase.SENT
-            self._start(robot, target)
+            robot.left = [stop for stop in target.stops if stop.task not in robot.done]
+            if target.stops and not robot.left:
+                self._stop(robot)
+                robot.phase = RobotPhase.ARRIVED
+            else:
+                self._send(robot, target)
+
+    def _send(self, robot: CommandedRobot, target: Target) -> None:
+        """Send a robot to its target, or to the first of the stops that are left."""
+        robot.sent_s = robot.heard_s = time.monotonic()
+        robot.phase = RobotPhase.SENT
+        self._start(robot, replace(target, at=robot.left[0].at) if robot.left else target)
+
+    def _arrive(self, robot: CommandedRobot) -> None:
+        """Handle the arrival of a robot: report that its task is done, and send it to its next stop."""
+        if robot.left:
+            task = robot.left.pop(0).task
+            robot.done.add(task)
+            self._report(robot, "done", {"data": task})
+        if robot.left and robot.target is not None:
+            self._send(robot, replace(robot.target, stamp=0))  # 0: the latest transforms, not those of the decision
+        else:
+            robot.phase = RobotPhase.ARRIVED
 
     def poll(self, wait_s: float) -> None:
         """Handle everything that has arrived, or the first event to arrive within `wait_s` seconds."""

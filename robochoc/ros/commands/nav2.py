@@ -145,7 +145,7 @@ class Nav2Commander(Commander):
                 if isinstance(pose := event.fields.get("current_pose"), Mapping):
                     self._pose(robot, pose)
             case GoalPhase.SUCCEEDED:
-                robot.phase = RobotPhase.ARRIVED
+                self._arrive(robot)
             case _:
                 self._fail(robot, _failure(event))
 

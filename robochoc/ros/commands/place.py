@@ -38,6 +38,10 @@ class CommandPlace(NamedTuple):
         """
         found = _FORM.fullmatch(text)
         file, options, middleware = found.groups() if found else (None, None, text)
+        before, at, _ = middleware.partition("@")
+        if at and ":" not in before:
+            problem = f"{shortened(before)!r} is not the name of a YAML file"
+            raise SinkError(on_one_line(f"{problem}; expected FILE.yaml@MIDDLEWARE"))
         try:
             pairs = parse_qsl(
                 options or "", keep_blank_values=True, strict_parsing=bool(options), max_num_fields=_OPTIONS_MAX

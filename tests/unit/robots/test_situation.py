@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -14,7 +15,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from robochoc.flight.reports import BatteryReport, BlockedReport, ClearedReport, OutOfOrderReport, PoseReport, Report
+from robochoc.flight.reports import (
+    BatteryReport,
+    BlockedReport,
+    ClearedReport,
+    DoneReport,
+    OutOfOrderReport,
+    PoseReport,
+    Report,
+)
 from robochoc.model.change import apply_changes
 from robochoc.model.expression import Expression, Type, parse
 from robochoc.model.problem import (
@@ -34,6 +43,7 @@ from robochoc.robots.source import ReceivedMessage
 from robochoc.ros.report_decoder import ReportDecoder
 from tests.support.cases import looped
 from tests.support.problems import team_of
+from tests.support.task_lists import imported
 
 HUGE = Domain("huge", (range(10**9),))
 LEVELS = Domain("levels", (range(1, 5),))
@@ -114,6 +124,29 @@ def test_another_obstacle_keeps_what_one_gives_back() -> None:
 def test_out_of_order_takes_the_robot_once() -> None:
     assert after(pair(), OutOfOrderReport("B", "motor 2")) == (RemoveAgent("B"),)
     assert after(pair(), OutOfOrderReport("B"), OutOfOrderReport("B"), BlockedReport("B", (1, 1, 1))) == ()
+
+
+def test_a_task_that_is_done_remains_done(tmp_path: Path) -> None:
+    lists = ["robots: {a: , b: }\ntasks: {dig: {worth: 5}, lay: {worth: 5}}\n"]
+    lists.append(lists[0] + "model: assignment\n")
+    for text, variable, kept in zip(lists, ("a.dig", "a.task"), (1, 1), strict=True):
+        team = imported(text, tmp_path).team
+        values = {name: kept if name == variable else 0 for name in team.variables}
+        changes = situation(team).done(team, DoneReport("a", variable.partition(".")[2]), values)
+        after = apply_changes(team, changes)
+        assert [*after.variables[variable].domain] == [kept]
+        other = variable.replace("a.", "b.")
+        assert kept not in after.variables[other].domain
+        assert 0 in after.variables[other].domain
+
+
+def test_a_task_of_another_robot_is_not_done(tmp_path: Path) -> None:
+    team = imported("robots: {a: , b: }\ntasks: {dig: {worth: 5}}\n", tmp_path).team
+    for report in (DoneReport("a", "b.dig"), DoneReport("a", "dig"), DoneReport("a", "x\x1b"), DoneReport("c", "dig")):
+        known = situation(team)
+        assert known.done(team, report, {"a.dig": 0, "b.dig": 1}) == ()
+        assert "reports a task as done that it does not have" in known.notes[0]
+        assert known.notes[0].isprintable()
 
 
 @looped(("level", "leaves"), [(0.19, True), (0.0, True), (0.2, False), (1.0, False), (-1.0, False)])
@@ -331,7 +364,7 @@ def test_a_place_in_another_frame_is_no_place_of_ours() -> None:
 def test_all_that_drones_may_report_is_listened_to() -> None:
     topics = ReportDecoder(drones_of(pair()), "map").topics
     assert topics["/A/battery"] == "sensor_msgs/BatteryState"
-    assert len(topics) == 10
+    assert len(topics) == 12
 
 
 def test_two_drones_of_one_name_cannot_be_told_apart() -> None:

@@ -14,7 +14,7 @@ from robochoc.flight.mission import mission_of
 from robochoc.formats import read_team, write_team
 from robochoc.formats.problems import read_problem
 from robochoc.formats.team_reader import GROUND_FILE
-from robochoc.maps.ground_map import read_ground_map
+from robochoc.maps.ground_map import GroundMap, read_ground_map
 from robochoc.model.constraint import Relation
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Robot
@@ -73,6 +73,19 @@ def first_places(meaning: Meaning, robot: dict[str, Any], tasks: tuple[str, ...]
     return {first for first, length in found.items() if length == min(found.values())}
 
 
+def check_stops(ground: GroundMap, team_robot: Robot, tasks: tuple[str, ...], values: dict[str, int]) -> None:
+    """Assert that the stops are the places of these tasks, and begin with the waypoint."""
+    scale = ground.scale or 1.0
+    known = ground.stops.get(team_robot.name)
+    assert known or not tasks
+    stops = known.of(values) if known else []
+    assert {one.variable.rpartition(".")[2] for one in stops} <= {*tasks, "task"}
+    assert len({(one.variable, one.value) for one in stops}) == len(stops)
+    assert all(values[one.variable] == one.value for one in stops)
+    if stops:
+        assert tuple(part * scale for part in stops[0].at) == place_of(team_robot, values, scale)
+
+
 def test_waypoints_are_the_first_places_of_random_lists(tmp_path: Path) -> None:
     chance, checked = Random("waypoints"), 0
     for _ in range(60):
@@ -83,7 +96,8 @@ def test_waypoints_are_the_first_places_of_random_lists(tmp_path: Path) -> None:
         if team is None:
             continue
         files = imported(path.read_text(), tmp_path).files
-        scale = read_ground_map(files[GROUND_FILE]).scale if files else 1.0
+        ground = read_ground_map(files[GROUND_FILE]) if files else None
+        scale = ground.scale if ground else 1.0
         meaning = Meaning(told)
         for name, robot in meaning.robots.items():
             mine = team.get(name)
@@ -92,6 +106,8 @@ def test_waypoints_are_the_first_places_of_random_lists(tmp_path: Path) -> None:
                 continue
             for tasks, values in sets_of(meaning, dict(robot), mine):
                 found = place_of(mine, values, scale or 1.0)
+                if ground is not None:
+                    check_stops(ground, mine, tasks, values)
                 expected = first_places(meaning, dict(robot), tasks)
                 rounded = {tuple(round(part, 6) for part in (*one, 0.0)[:3]) for one in expected}
                 assert tuple(round(part, 6) for part in found) in rounded, f"{name} {tasks}\n{path.read_text()}"
