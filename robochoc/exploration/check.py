@@ -5,7 +5,7 @@ from __future__ import annotations
 import textwrap
 import time
 from collections.abc import Callable, Generator, Iterable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from functools import partial
 from typing import NamedTuple
 
@@ -178,13 +178,19 @@ class CheckedTeam(NamedTuple):
         }
 
 
+Explored = Generator[tuple[tuple[Team, Case], Exploration], None, None]
+"""Teams with what was explored, in the order of the teams."""
+
+
 def checked(
     teams: Iterable[Team],
     options: CheckOptions,
     deadline: float | None = None,
     *,
     jobs: int = 1,
+    cluster: str | None = None,
     show: Callable[[int, int], None] | None = None,
+    notice: Callable[[str], object] | None = None,
 ) -> Generator[CheckedTeam, None, None]:
     """Yield each of `teams` with what was explored, up to the `deadline` on the monotonic clock.
 
@@ -196,24 +202,51 @@ def checked(
         deadline: The end of the time, on the monotonic clock. None: no limit.
         jobs: The number of teams that are explored at the same time, each in its own process. Results and their order
             do not depend on it.
+        cluster: The scheduler of a Dask cluster whose workers explore the teams: see `cluster_client.connect`. None:
+            processes of this machine do.
         show: Called from time to time with the number of explored teams, and of the states so far.
+        notice: Called with a text if the cluster has no workers yet.
 
     Raises:
         UnsupportedError: if the protocol does not accept a team, or does not tolerate lost messages, crashes or events.
         ChildDiedError: if a process was killed.
+        ClusterLostError: if the cluster cannot be reached or is lost, or a team has killed several of its workers.
     """
     _refuse_untolerated(options)
 
-    def explored(item: tuple[Team, Case], report: Callable[[int], None]) -> Exploration:
-        def is_over(states: int) -> bool:
-            report(states)
-            return stop_requested() or (deadline is not None and time.monotonic() > deadline)
+    def is_over() -> bool:
+        return stop_requested() or (deadline is not None and time.monotonic() > deadline)
 
-        return explore(item[1], options, is_over)
+    cases = cases_of(teams, options)
+    if cluster is None:
+        results = _explored_here(cases, options, jobs, is_over, show)
+    else:
+        from robochoc.exploration.cluster import explored_on_cluster  # noqa: PLC0415 - an extra
+
+        results = explored_on_cluster(cluster, cases, options, is_over, show, notice)
+    with closing(results):
+        for (team, case), exploration in results:
+            yield CheckedTeam(team, case, exploration)
+
+
+def _explored_here(
+    cases: Iterable[tuple[Team, Case]],
+    options: CheckOptions,
+    jobs: int,
+    is_over: Callable[[], bool],
+    show: Callable[[int, int], None] | None,
+) -> Explored:
+    """Explore the teams in processes of this machine."""
+
+    def explored(item: tuple[Team, Case], report: Callable[[int], None]) -> Exploration:
+        def is_over_now(states: int) -> bool:
+            report(states)
+            return is_over()
+
+        return explore(item[1], options, is_over_now)
 
     with ParallelMap(explored, jobs, show) as processes:
-        for (team, case), exploration in processes.results(cases_of(teams, options)):
-            yield CheckedTeam(team, case, exploration)
+        yield from processes.results(cases)
 
 
 def _refuse_untolerated(options: CheckOptions) -> None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from robochoc.cli.options.cluster import cluster_option, on_cluster
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.solve import protocol_settings, settings_option
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 MOST_TEAMS, MOST_ROBOTS, MOST_VALUES = 1_000_000, 6, 6
 
 _SECTIONS: Sections = {
-    COMMON: ("--set", "--timeout", "--states", "--jobs", "--journal", "--html", "--json", "--help"),
+    COMMON: ("--set", "--timeout", "--states", "--jobs", "--cluster", "--journal", "--html", "--json", "--help"),
     "Random teams": ("--teams", "--robots", "--values", "--seed"),
     "Arrival and loss of messages": ("--packets", "--loss"),
     "Changes of the problem": ("--crash", "--rejoin", "--event"),
@@ -75,6 +76,7 @@ _SECTIONS: Sections = {
     "--jobs", type=WholeNumber(1, 1024), metavar="N",
     help="Number of teams explored at the same time.  [default: one per processor]",
 )  # fmt: skip
+@cluster_option
 @click.option("--timeout", type=Number(0, min_open=True), metavar="SECONDS", help="Time limit of the command.")
 @click.option("--journal", type=OutputFile(), metavar="FILE", help="Write the run that leads to the first fault.")
 @click.option(
@@ -99,6 +101,7 @@ def check(  # noqa: PLR0913 - options, by name
     event: int,
     settings_given: tuple[str, ...],
     jobs: int | None,
+    cluster: str | None,
     timeout: float | None,
     journal: Path | None,
     html: Path | None,
@@ -141,13 +144,15 @@ def check(  # noqa: PLR0913 - options, by name
         count = len(folders) or teams
         with (
             _reported_if_interrupted(lambda: _print_found(found, count, as_json=as_json)),
+            on_cluster(cluster),
             errors_as_failures(protocol),
             _progress_of(protocol, count, as_json=as_json) as show,
         ):
             plan = FaultPlan(crash, rejoin, event)
             options = CheckOptions(protocol_named(protocol), run, states, packets=packets, losses=loss, plan=plan)
             problems = _teams(folders, (teams, robots, values, seed), options)
-            results = checked(problems, options, deadline, jobs=jobs or usable_processors(), show=show)
+            jobs, notice = jobs or usable_processors(), partial(click.echo, err=True)
+            results = checked(problems, options, deadline, jobs=jobs, cluster=cluster, show=show, notice=notice)
             with closing(results):
                 _collect(results, found, as_json=as_json)
         if not as_json:

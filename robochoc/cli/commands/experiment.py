@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from robochoc.cli.options.cluster import cluster_option, on_cluster
 from robochoc.cli.options.paths import InputPath, OutputFile
 from robochoc.cli.options.value_types import WholeNumber
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid_input_fails
@@ -51,16 +52,16 @@ def experiment() -> None:
     help="Also rerun the runs with this status. May be given more than once.",
 )
 @click.option("--dry-run", is_flag=True, help="Show the number of runs without running any.")
-@click.option(
-    "--scheduler", metavar="ADDRESS", help="Run on the Dask cluster at this address, such as tcp://10.0.0.1:8786."
-)
-@click.option("--dask", type=InputPath(), metavar="FILE", help="Run on the Dask cluster of this scheduler file (JSON).")
+@cluster_option
+@click.option("--scheduler", metavar="ADDRESS", hidden=True, help="Older spelling of --cluster ADDRESS.")
+@click.option("--dask", type=InputPath(), metavar="FILE", hidden=True, help="Older spelling of --cluster FILE.")
 @invalid_input_fails
 def run(
     study: Path,
     output: Path | None,
     jobs: int | None,
     again: tuple[str, ...],
+    cluster: str | None,
     scheduler: str | None,
     dask: Path | None,
     *,
@@ -83,13 +84,13 @@ def run(
     if dry_run:
         _show_plan(read, path, again)
         return
-    workers = _workers(scheduler, dask)
-    if workers and any(setup.runtime not in {"simulator", "arrays"} for setup, *_ in read.setups):
+    place = _cluster_of(cluster, scheduler, dask)
+    if place and any(setup.runtime not in {"simulator", "arrays"} for setup, *_ in read.setups):
         click.echo(
             f"{read.name}: runs with one process per robot are executed on this machine, not on the cluster", err=True
         )
-    with open_store(path) as store, _cluster_loss_as_failure(workers):
-        ended = carry_out(read, store, jobs, workers, again)
+    with on_cluster(place), open_store(path) as store:
+        ended = carry_out(read, store, jobs, _workers(place), again)
     click.echo(ended_line(read.name, ended), err=True)
     click.echo(f"{path}: next: {shlex.join(['robochoc', 'experiment', 'show', str(path)])}", err=True)
 
@@ -244,23 +245,24 @@ def require_modules(user: str, *modules: str) -> None:
             raise Failure(USAGE, f"{user} require {name}, which is not installed: pip install 'robochoc[experiments]'")
 
 
-def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None], Workers] | None:
-    """Return a factory for a cluster's workers, or None for workers on this machine."""
-    if scheduler is None and dask is None:
-        return None
-    if scheduler is not None and dask is not None:
-        raise click.UsageError("--scheduler and --dask both name a cluster; remove one.")
-    from importlib.util import find_spec
+def _cluster_of(cluster: str | None, scheduler: str | None, dask: Path | None) -> str | None:
+    """Return the place of the cluster. `scheduler` and `dask` are older spellings of `--cluster`."""
+    address = f"tcp://{scheduler}" if scheduler and "://" not in scheduler else scheduler
+    places = [place for place in (cluster, address, dask and str(dask)) if place]
+    if len(places) > 1:
+        raise click.UsageError("--cluster, --scheduler and --dask all name a cluster; use --cluster only.")
+    return places[0] if places else None
 
-    if find_spec("distributed") is None:
-        raise Failure(USAGE, "a cluster requires Dask, which is not installed: pip install 'robochoc[cluster]'")
-    if dask is not None and not dask.is_file():
-        raise Failure(INVALID, f"{dask} is not a file; name the file of 'dask scheduler --scheduler-file'")
+
+def _workers(cluster: str | None) -> Callable[[int | None], Workers] | None:
+    """Return a factory for a cluster's workers, or None for workers on this machine."""
+    if cluster is None:
+        return None
     from functools import partial
 
     from robochoc.experiments.cluster import ClusterWorkers
 
-    return partial(ClusterWorkers, scheduler, dask, notice=partial(click.echo, err=True))
+    return partial(ClusterWorkers, cluster, notice=partial(click.echo, err=True))
 
 
 def _show_plan(study: Study, path: Path, again: Sequence[str]) -> None:
@@ -268,23 +270,6 @@ def _show_plan(study: Study, path: Path, again: Sequence[str]) -> None:
 
     for line in plan_lines(study, path, again):
         click.echo(line)
-
-
-@contextmanager
-def _cluster_loss_as_failure(workers: object) -> Iterator[None]:
-    """Convert the loss of a cluster, if one is used, to a `Failure`."""
-    if workers is None:
-        yield
-        return
-    import logging
-
-    from robochoc.communication.arrays.cluster_client import SchedulerLostError
-
-    logging.disable(logging.CRITICAL)  # Dask would log the loss of a scheduler with a traceback
-    try:
-        yield
-    except SchedulerLostError as lost:
-        raise Failure(LOST, str(lost)) from None
 
 
 @contextmanager

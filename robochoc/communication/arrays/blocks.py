@@ -12,7 +12,6 @@ import json
 import time
 from collections import Counter
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from importlib.util import find_spec
 from typing import Any, NamedTuple, Protocol
 
 import msgspec
@@ -24,10 +23,10 @@ from robochoc.communication.arrays.border import Border, Item, Shared
 from robochoc.communication.arrays.cycle_run import CycleChange, CycleRun, cycles_of
 from robochoc.communication.arrays.description import Description, KnownConstraints
 from robochoc.communication.arrays.layout import ArrayLayout, IntegerCosts, cost_form
+from robochoc.communication.cluster_client import require_dask
 from robochoc.communication.search_result import ClusterLostError
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.shared.cycles import CycleCount
-from robochoc.solver.errors import UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 
 MOST_LEVELS = 10_000
@@ -357,8 +356,7 @@ def _report(block: Block, run: CycleRun, wall_s: float, *, is_over: bool) -> Blo
 
 def run_on_cluster(place: str, description: Description, run: RunBlock) -> BlockReport:
     """See `cluster_blocks.run_on_cluster`. Raises `UnsupportedError` if Dask is not installed."""
-    if find_spec("distributed") is None:
-        raise UnsupportedError("--cluster requires Dask, which is not installed: pip install 'robochoc[cluster]'")
+    require_dask()
     from robochoc.communication.arrays import cluster_blocks  # noqa: PLC0415 - an extra
 
     return cluster_blocks.run_on_cluster(place, description, run)

@@ -13,13 +13,12 @@ from collections import defaultdict
 from collections.abc import Collection, Mapping
 from contextlib import suppress
 from functools import partial
-from pathlib import Path
 
 from distributed import CancelledError, Client, Future, Status, Worker, fire_and_forget, get_worker, secede, wait
 
 from robochoc.communication.arrays.blocks import Block, BlockLostError, BlockReport, RunBlock, joined, split_team
-from robochoc.communication.arrays.cluster_client import SchedulerLostError, connect
 from robochoc.communication.arrays.description import Description
+from robochoc.communication.cluster_client import SchedulerLostError, connect
 from robochoc.communication.search_result import ClusterLostError
 from robochoc.system.stopping import stop_requested
 
@@ -37,7 +36,7 @@ def run_on_cluster(place: str, description: Description, run: RunBlock) -> Block
     """Run a team on the workers of a cluster, one block each, and return the report of all robots.
 
     Args:
-        place: The address of the cluster's scheduler, such as `tcp://10.0.0.1:8786`, or the path of its JSON file.
+        place: The cluster's scheduler: see `connect`.
         description: The team.
         run: How to run each block.
 
@@ -46,8 +45,7 @@ def run_on_cluster(place: str, description: Description, run: RunBlock) -> Block
         SchedulerLostError: if the scheduler cannot be reached, or is lost.
         UnsupportedError: if costs are too large.
     """
-    address, file = (place, None) if "://" in place else (None, Path(place))
-    with connect(address, file, "robochoc arrays") as client, client.as_current():
+    with connect(place, "robochoc arrays") as client, client.as_current():
         workers = sorted(_workers(client))
         if not workers:
             raise BlockLostError(f"the cluster at {place} has no workers: start workers by `dask worker`")

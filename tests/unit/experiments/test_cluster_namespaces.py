@@ -48,7 +48,7 @@ def test_machines_that_share_nothing_give_the_same_results(runner: list[str], tm
     text = SMALL.replace("[problems]", '[[problems]]\npath = "teams/queens"\n[[problems]]')
     path = tmp_path / "study.toml"
     path.write_text(text)
-    words = [PROGRAM, "experiment", "run", str(path), "--scheduler", f"tcp://10.9.2.1:{PORT}"]
+    words = [PROGRAM, "experiment", "run", str(path), "--cluster", f"tcp://10.9.2.1:{PORT}"]
     with running([*runner, *words], tmp_path / "run") as run:
         assert run.status() == 0, run.errors()
     there = path.with_suffix(".sqlite")

@@ -86,8 +86,8 @@ def test_generated_problems_are_made_there() -> None:
 def test_what_is_no_file_of_a_scheduler_is_told(content: str, said: str, tmp_path: Path) -> None:
     cluster = pytest.importorskip("robochoc.experiments.cluster")
     (tmp_path / "cluster.json").write_text(content)
-    lost = pytest.importorskip("robochoc.communication.arrays.cluster_client").SchedulerLostError
-    with pytest.raises(lost, match=said), cluster.ClusterWorkers(None, tmp_path / "cluster.json"):
+    lost = pytest.importorskip("robochoc.communication.cluster_client").SchedulerLostError
+    with pytest.raises(lost, match=said), cluster.ClusterWorkers(str(tmp_path / "cluster.json")):
         pass
 
 
@@ -101,7 +101,7 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
 def test_a_cluster_gives_the_same_results(cluster: Cluster, tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text(SMALL)
-    done = robochoc_program("experiment", "run", path, "--dask", cluster.file)
+    done = robochoc_program("experiment", "run", path, "--cluster", cluster.file)
     assert done == (0, "")
     assert comparable(path.with_suffix(".sqlite")) == comparable(results_of(SMALL))
 
@@ -111,7 +111,7 @@ def test_a_cluster_whose_workers_are_killed_gives_the_same_results(cluster: Clus
     text = SMALL.replace("1..3", "1..40")
     path = tmp_path / "study.toml"
     path.write_text(text)
-    with running([PROGRAM, "experiment", "run", str(path), "--dask", str(cluster.file)], tmp_path / "run") as run:
+    with running([PROGRAM, "experiment", "run", str(path), "--cluster", str(cluster.file)], tmp_path / "run") as run:
         for number in range(4):
             time.sleep(random.Random(number).uniform(0.5, 2))
             victim = cluster.workers.pop(0)
@@ -126,7 +126,7 @@ def test_a_study_whose_scheduler_is_killed_goes_on(cluster: Cluster, tmp_path: P
     text = SMALL.replace("1..3", "1..60")
     path = tmp_path / "study.toml"
     path.write_text(text)
-    with running([PROGRAM, "experiment", "run", str(path), "--dask", str(cluster.file)], tmp_path / "run") as run:
+    with running([PROGRAM, "experiment", "run", str(path), "--cluster", str(cluster.file)], tmp_path / "run") as run:
         wait_until(lambda: _rows(path) > 0 or run.is_over, "no row comes back")
         cluster.scheduler.strike(signal.SIGKILL)
         run.end()
