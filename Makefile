@@ -10,7 +10,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs docs-version test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz simulate mutate lint type format bench journals lock sbom release audit nox test-newest clean
+.PHONY: demo demo-11 docs docs-version test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz simulate mutate lint type format bench benchmark-set leaderboard journals lock sbom release audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -175,6 +175,19 @@ format: $(READY)
 # .venv/bin/python benchmarks/run.py --write peers peers_costs network sniffer. Nor are the studies: benchmarks/run.py --help names them.
 bench: $(READY)  ## figures into benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
+
+# The same list each time: the digests of all instances, and their optima, each proved by two solvers.
+benchmark-set: $(READY)  ## robochoc/leaderboard/instances.json anew: half an hour of CPU
+	$(BIN)/python -m robochoc.leaderboard.certificates robochoc/leaderboard/instances.json
+
+# OF="--size small" takes a part of the set; BUDGET, ENTRANTS and JOBS change the rest.
+ENTRANTS ?= dpop sfb bnb-adopt maxsum dsa mgm mgm2 gdba abt afc-ng dba
+BUDGET ?= messages=20000,time=60
+OF ?=
+leaderboard: $(READY)  ## protocols on the benchmark set: out/leaderboard/results.json, out/leaderboard/site/index.html
+	@mkdir -p out/leaderboard
+	$(BIN)/robochoc leaderboard run $(ENTRANTS) --budget $(BUDGET) $(OF) --jobs $(JOBS) -o out/leaderboard/results.json
+	$(BIN)/robochoc leaderboard show out/leaderboard/results.json --html out/leaderboard/site
 
 journals: $(READY)  ## rewrite the golden journals: a changed one is a changed protocol
 	$(BIN)/python -m tests.support.golden

@@ -41,6 +41,7 @@ COMMANDS = {
     "generate": ("generate", "Write a team of a problem family."),
     "import": ("import_", "Convert files of FRODO, pyDCOP, XCSP3, ... to teams."),
     "journal": ("journal", "Summarise or export a journal."),
+    "leaderboard": ("leaderboard", "Compare protocols on the benchmark set."),
     "master": ("master", "Lead a team whose robots run on other machines."),
     "play": ("play", "Play a team in rounds: programs, people and protocols."),
     "privacy": ("privacy", "Measure how much robots learned about each other in a run."),
@@ -61,8 +62,8 @@ The lines are stored here so that `robochoc --help` need not import any command.
 
 POSIX_COMMANDS = frozenset(
     [
-        *("app", "authority", "capacity", "compare", "directory", "experiment", "master", "play", "rmf", "robot"),
-        *("serve", "sniff"),
+        *("app", "authority", "capacity", "compare", "directory", "experiment", "leaderboard", "master", "play"),
+        *("rmf", "robot", "serve", "sniff"),
     ]
 )
 """The commands that start or signal other processes, lock files, or use a network."""

@@ -20,6 +20,11 @@ def digest_of_team(team: Team) -> str:
     return _digest(team_files(team).items())
 
 
+def sha256_of_team(team: Team) -> str:
+    """Return the SHA-256 of the team's canonical form: the names, lengths and contents of the robots' files."""
+    return _hashed(hashlib.sha256(), team_files(team).items())
+
+
 def digest_of_files(path: Path) -> str:
     """Return the digest of the names and contents of a team's files, or of a single file. Raises `OSError`."""
     files = sorted(path.iterdir()) if path.is_dir() else [path]
@@ -47,7 +52,10 @@ def _python_files(module: ModuleType | None) -> list[Path]:
 
 
 def _digest(files: Iterable[tuple[str, bytes]]) -> str:
-    content = hashlib.blake2b(digest_size=_BYTES)
+    return _hashed(hashlib.blake2b(digest_size=_BYTES), files)
+
+
+def _hashed(content: hashlib._Hash | hashlib.blake2b, files: Iterable[tuple[str, bytes]]) -> str:
     for name, held in files:
         content.update(f"{name}\0{len(held)}\0".encode(errors="surrogateescape"))
         content.update(held)

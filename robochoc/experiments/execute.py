@@ -15,7 +15,7 @@ from robochoc import __version__
 from robochoc.communication.search_result import RobotsLostError
 from robochoc.experiments.digests import digest_of_files, digest_of_team
 from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_bytes, journal_of
-from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
+from robochoc.experiments.task import ASSIGNMENT, ProblemSpec, Recording, Row, Status, Task, options_of
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 from robochoc.formats.problems import read_problem
 from robochoc.generators.scenario import random_scenario
@@ -91,6 +91,7 @@ class TaskRunner(AbstractContextManager["TaskRunner"]):
         _fill(row, outcome, team)
         row.cost_over_time = curve.points() if curve else []
         row.loads = loads.loads() if loads else []
+        row.assignment = dict(outcome.assignment) if ASSIGNMENT in task.record else {}
         row.journal = journal_bytes(journal, outcome) if journal else b""
 
     def _team(self, problem: ProblemSpec) -> tuple[Team, str]:

@@ -4,33 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import html
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 
 from robochoc.experiments import summary
 from robochoc.experiments.export import latex_table
 from robochoc.experiments.figures import Drawing, figures_of, file_name, unique_names
+from robochoc.experiments.html_page import page, table
 from robochoc.experiments.report_content import PAIRS_EXPLANATION, ReportContent, headed
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS
 from robochoc.formats.diagnostics import invalid_input
 from robochoc.system.files import write_atomically
-
-_STYLE = """
-:root { color-scheme: light dark; }
-body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-figure { margin: 0; } figcaption { font-size: .85rem; opacity: .8; }
-.figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(26rem, 100%), 1fr)); gap: 1.5rem; }
-figure svg { width: 100%; height: auto; background: #fff; border-radius: 4px; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
-th, td { padding: .2rem .8rem .2rem 0; text-align: right; white-space: nowrap; }
-th:first-child, td:first-child { text-align: left; }
-thead th { border-bottom: 1px solid; }
-pre { overflow-x: auto; padding: .8rem; border: 1px solid #8884; border-radius: 4px; font-size: .85rem; }
-"""
-_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
 def write_page(results: Results, page: Path, over: str | None = None) -> None:
@@ -87,21 +72,14 @@ class _Report(ReportContent):
 
     def page(self) -> str:
         """Return the HTML page."""
-        title = html.escape(self.title)
-        head = (
-            f'<meta charset="utf-8"><title>{title}</title>'
-            f'<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}"><style>{_STYLE}</style>'
-        )
-        body = "\n".join(self._body())
-        return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body><h1>{title}</h1>\n{body}\n</body></html>\n'
+        return page(self.title, "\n".join(self._body()))
 
     def _body(self) -> Iterator[str]:
         yield from (f"<p>{html.escape(part)}</p>" for part in self.paragraphs)
         yield "".join(f"<p>{html.escape(line)}</p>" for line in self.measured())
         items = "".join(f"<li>{html.escape(line)}</li>" for line in self.answers())
         yield f"<ul>{items}</ul>" if items else ""
-        yield "<h2>How runs ended</h2>" + _table(*summary.endings(self.rows))
+        yield "<h2>How runs ended</h2>" + table(*summary.endings(self.rows))
         yield "<h2>Figures</h2>"
         yield "".join(f"<p>{html.escape(line)}</p>" for line in self.remarks)
         yield '<div class="figures">'
@@ -112,15 +90,15 @@ class _Report(ReportContent):
         for part, rows in self.parts:
             for metric in self.metrics:
                 head = html.escape(headed(METRICS[metric], part))
-                yield f"<h3>{head}</h3>" + _table(*summary.medians(rows, metric, self.over))
+                yield f"<h3>{head}</h3>" + table(*summary.medians(rows, metric, self.over))
         yield from self._tests()
         yield "<h2>How to repeat it</h2>" + self._how_to_repeat()
 
     def _tests(self) -> Iterator[str]:
-        for name, table in self.pairs():
+        for name, pairs in self.pairs():
             yield f"<h2>Pairs: {html.escape(name)}</h2>"
             yield f"<p>{PAIRS_EXPLANATION}</p>"
-            yield _table(*table)
+            yield table(*pairs)
 
     def _how_to_repeat(self) -> str:
         name = html.escape(f"{self.name}.toml")
@@ -135,12 +113,6 @@ def _of_part(drawing: Drawing, part: str) -> Drawing:
     if not part:
         return drawing
     return dataclasses.replace(drawing, name=file_name(drawing.name, part), title=headed(drawing.title, part))
-
-
-def _table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
-    head = "".join(f"<th>{html.escape(one)}</th>" for one in heads)
-    rows = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>" for line in lines)
-    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
 
 
 def _inline(drawing: Drawing) -> str:

@@ -186,7 +186,7 @@ def _comparison(
         sum(gain > 0 for gain in gains),
         median_ratio(pairs),
         statistics.median(differences) if differences else None,
-        _wilcoxon(differences),
+        paired_p_value(differences),
     )
 
 
@@ -201,11 +201,11 @@ def median_ratio(pairs: Sequence[tuple[float, float]]) -> float | None:
     return median if math.isfinite(median) else None
 
 
-def _wilcoxon(differences: Sequence[float]) -> float | None:
-    """Return the two-sided p-value, or None if there are too few differences. Zero differences are left out.
+def paired_p_value(differences: Sequence[float]) -> float | None:
+    """Return the two-sided p-value of Wilcoxon's signed-rank test, or None if there are too few differences.
 
-    With ties, the p-value is exact for up to `MOST_EXACT` differences and approximate for more, where scipy takes
-    seconds.
+    Zero differences are left out. With ties, the p-value is exact for up to `MOST_EXACT` differences, and approximate
+    for more, where scipy takes seconds.
     """
     some = [one for one in differences if one]
     if len(some) < FEWEST_PAIRS:
@@ -218,14 +218,20 @@ def _wilcoxon(differences: Sequence[float]) -> float | None:
 
 
 def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
-    """Return `found` with p-values corrected for the number of tests (Holm's method, which scipy lacks)."""
-    tested = sorted((one.p, place) for place, one in enumerate(found) if one.p is not None)
+    """Return `found` with p-values corrected for the number of tests."""
+    corrected = holm_corrected([one.p for one in found])
+    return [replace(one, p=p) for one, p in zip(found, corrected, strict=True)]
+
+
+def holm_corrected(values: Sequence[float | None]) -> list[float | None]:
+    """Return p-values corrected for their number by Holm's method, which scipy lacks. None, no test, remains None."""
+    tested = sorted((p, place) for place, p in enumerate(values) if p is not None)
     corrected: dict[int, float] = {}
     highest = 0.0
     for rank, (p, place) in enumerate(tested):
         highest = max(highest, min(1.0, p * (len(tested) - rank)))
         corrected[place] = highest
-    return [replace(one, p=corrected.get(place)) for place, one in enumerate(found)]
+    return [corrected.get(place) for place in range(len(values))]
 
 
 def cactus(rows: Rows, metric: str) -> dict[str, list[float]]:

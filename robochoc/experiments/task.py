@@ -182,6 +182,10 @@ class Status(StrEnum):
     ERROR = "error"
 
 
+ASSIGNMENT = "assignment"
+"""A word in `Task.record`: the row contains the assignment. The tables of studies have no column for it."""
+
+
 class CostPoint(msgspec.Struct, frozen=True, array_like=True):
     """A point at which the team's assignment became cheaper than ever before.
 
@@ -230,6 +234,7 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
         cpu_s: The seconds of processor time, in the simulator.
         cost_over_time: The improvements of the cost, if `COST_OVER_TIME` is recorded.
         loads: The load of each robot, if `ROBOTS` is recorded.
+        assignment: The values of all variables in the answer, if `ASSIGNMENT` is recorded.
         journal: The content of the run's journal, if `JOURNAL` is recorded.
         removed: With `preprocess`: the number of values removed before the protocol started.
         removing_messages: With `preprocess`: the messages for removing values, which `messages` does not include.
@@ -267,6 +272,7 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
     memory: int | None = None
     cost_over_time: list[CostPoint] = []
     loads: list[RobotLoad] = []
+    assignment: dict[str, int] = {}
     journal: Content = b""
     machine: str = ""
     version: str = ""

@@ -12,7 +12,10 @@ from tests.support.program import ROOT
 
 PICTURE = ROOT / "docs" / "images" / "architecture.svg"
 _SUBJECTS = {
-    "people": ("#dbe9fb", ("cli", "app", "experiments", "api", "testing", "environments", "seats", "modelling")),
+    "people": (
+        "#dbe9fb",
+        ("cli", "app", "leaderboard", "experiments", "api", "testing", "environments", "seats", "modelling"),
+    ),
     "around a run": (
         "#e3f3e1",
         ("privacy", "sniffer", "exploration", "view", "replay", "ros", "vehicles", "robots", "rounds", "generators"),

@@ -1,0 +1,298 @@
+"""`robochoc leaderboard`: the benchmark set, and protocols compared on it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.options.paths import InputPath, OutputFile
+from robochoc.cli.options.value_types import Seed, WholeNumber
+from robochoc.cli.reports.failures import LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
+
+    from robochoc.leaderboard.instances import Instance
+    from robochoc.leaderboard.results import Budget
+
+SIZES = ("small",)
+BUDGET = {"messages": "messages", "ncccs": "ncccs", "cycles": "cycles", "time": "time_s"}
+MOST_FAULTS = 20
+FORMATS = ("robochoc", "xcsp3", "frodo", "pydcop")
+
+family_option = click.option(
+    "--family", "families", multiple=True, metavar="NAME", help="Family. Repeatable.  [default: all]"
+)
+jobs_option = click.option(
+    "--jobs", type=WholeNumber(1, 1024), metavar="N", help="Number of workers.  [default: one per processor]"
+)
+size_option = click.option(
+    "--size", "sizes", multiple=True, type=click.Choice(SIZES), help="Size. Repeatable.  [default: all]"
+)
+
+
+@click.group()
+def leaderboard() -> None:
+    """Compare protocols on the benchmark set (documentation, page Leaderboard).
+
+    \b
+    robochoc leaderboard list --size small
+    robochoc leaderboard export tracking-small-3 --format xcsp3 -o tracking.xml
+    robochoc leaderboard run mgm dsa my_package.protocol:MyProtocol --family tracking
+    robochoc leaderboard show results.json --html site/
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+
+
+@leaderboard.command("list", short_help="List the instances of the set, with their optima.")
+@family_option
+@size_option
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object per instance.")
+def list_(families: tuple[str, ...], sizes: tuple[str, ...], *, as_json: bool) -> None:
+    """List the instances of the benchmark set: their answers, and the two solvers that proved each answer.
+
+    \b
+    robochoc leaderboard list --family tracking
+    robochoc leaderboard list --size small --json
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.leaderboard.certificates import published
+    from robochoc.leaderboard.tables import answer_text
+
+    for one in (published()[found.name] for found in _instances(families, sizes)):
+        if as_json:
+            import msgspec
+
+            click.echo(msgspec.json.encode(one))
+            continue
+        click.echo(f"{one.name:26} {one.robots:3} robots  {answer_text(one):14} {one.proved_by}, {one.agreed_by}")
+
+
+@leaderboard.command(short_help="Write an instance as a team, or for another tool.")
+@click.argument("instance")
+@click.option(
+    "--format", "kind", type=click.Choice(FORMATS), default="robochoc", show_default=True, help="Format to write."
+)
+@click.option(
+    "-o", "--output", type=InputPath(), metavar="PATH",
+    help="Folder (robochoc) or file to write.  [default: the name of the instance]",
+)  # fmt: skip
+@click.option("--force", is_flag=True, help="Replace the folder or file if it exists.")
+@invalid_input_fails
+def export(instance: str, kind: str, output: Path | None, *, force: bool) -> None:
+    """Write the instance called INSTANCE, after a comparison with the digest in the published list.
+
+    A team that the format cannot express is an error.
+
+    \b
+    robochoc leaderboard export random-small-0
+    robochoc leaderboard export random-small-0 --format pydcop -o random.yaml
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    with errors_as_failures(instance):
+        from robochoc.leaderboard.export import export_instance
+        from robochoc.leaderboard.instances import UnknownInstanceError, instance_named
+
+        try:
+            found = instance_named(instance)
+        except UnknownInstanceError as unknown:
+            raise Failure(USAGE, str(unknown)) from None
+        for line in export_instance(found, kind, output, replace=force):
+            click.echo(line)
+
+
+@leaderboard.command(short_help="Run protocols on the set under a budget.")
+@click.argument("protocols", nargs=-1, required=True, metavar="PROTOCOL|MODULE:CLASS ...")
+@family_option
+@size_option
+@click.option(
+    "--seeds",
+    type=WholeNumber(1, 10),
+    default=10,
+    show_default=True,
+    metavar="N",
+    help="First N instances of each size.",
+)
+@click.option(
+    "--budget", "budget_words", default="messages=20000,time=60", show_default=True, metavar="NAME=VALUE,...",
+    help="Limits of each run: messages, ncccs, cycles, time (seconds).",
+)  # fmt: skip
+@click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Random seed of all runs.")
+@click.option("--times", is_flag=True, help="Record processor times; the results then differ from run to run.")
+@click.option(
+    "-o",
+    "--output",
+    type=OutputFile(),
+    default="results.json",
+    show_default=True,
+    metavar="FILE",
+    help="File to write.",
+)
+@jobs_option
+@invalid_input_fails
+def run(  # noqa: PLR0913 - options
+    protocols: tuple[str, ...],
+    families: tuple[str, ...],
+    sizes: tuple[str, ...],
+    seeds: int,
+    budget_words: str,
+    seed: int,
+    output: Path,
+    jobs: int | None,
+    *,
+    times: bool,
+) -> None:
+    """Run protocols on instances of the set, and write the results as JSON.
+
+    A protocol of an outside package is named as it is installed, or as MODULE:CLASS, also in the current folder. The
+    same command writes the same bytes, unless --times is given or a run meets its time limit.
+
+    \b
+    robochoc leaderboard run dpop mgm dsa maxsum --size small
+    robochoc leaderboard run my_package.protocol:MyProtocol --budget messages=5000,cycles=200
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.cli.reports.progress import progress_line
+    from robochoc.communication.search_result import Progress
+    from robochoc.leaderboard.outside import named_protocols
+    from robochoc.leaderboard.results import write_results
+    from robochoc.leaderboard.running import entrants, run_leaderboard
+    from robochoc.system.posix import usable_processors
+
+    chosen, budget = list(_instances(families, sizes, range(seeds))), _budget(budget_words)
+    with errors_as_failures("leaderboard"), named_protocols(protocols) as names, progress_line("leaderboard") as show:
+        results = run_leaderboard(
+            entrants(names),
+            chosen,
+            budget,
+            seed=seed,
+            jobs=jobs or usable_processors(),
+            times=times,
+            progress=show and (lambda done, planned: show(Progress(0, 0, f"{done:,} of {planned:,} runs"))),
+        )
+        write_results(results, output)
+    click.echo(f"{output}: {len(results.runs):,} runs; next: robochoc leaderboard show {output}")
+
+
+@leaderboard.command(short_help="Check results: compute costs anew, repeat runs.")
+@click.argument("results", type=InputPath(), metavar="RESULTS.json")
+@click.option(
+    "--rerun", type=WholeNumber(0), default=10, show_default=True, metavar="N", help="Number of runs to repeat."
+)
+@click.option("--all", "everything", is_flag=True, help="Repeat all runs.")
+@click.option(
+    "--protocol", "protocols", multiple=True, metavar="MODULE:CLASS", help="Protocol that is not installed. Repeatable."
+)
+@jobs_option
+@invalid_input_fails
+def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | None, *, everything: bool) -> None:
+    """Check the results in a file: each answer against every constraint and the published optimum; repeat some runs.
+
+    Faults are printed, with exit status 4. To repeat runs of a protocol that is not installed, name it with --protocol.
+
+    \b
+    robochoc leaderboard verify results.json
+    robochoc leaderboard verify results.json --all
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.leaderboard.results import read_results
+
+    found = read_results(results)
+    from robochoc.leaderboard.outside import named_protocols
+
+    with errors_as_failures(results), named_protocols(protocols):
+        from robochoc.leaderboard.verification import changed_runs, selected, wrong_answers
+        from robochoc.system.posix import usable_processors
+
+        runs = selected(found.runs, None if everything else rerun)
+        faults = [*wrong_answers(found), *changed_runs(found, runs, jobs or usable_processors())]
+    _fail(results, faults)
+    click.echo(f"{results}: {len(found.runs):,} answers are right; {len(runs):,} repeated runs gave the same results")
+
+
+@leaderboard.command(short_help="Add results to a board.")
+@click.argument("results", type=InputPath(), metavar="RESULTS.json")
+@click.option("--board", type=InputPath(), required=True, metavar="FOLDER", help="Folder with the files of results.")
+@invalid_input_fails
+def submit(results: Path, board: Path) -> None:
+    """Check the answers in a file of results, and add the file to a board, which is a folder.
+
+    All results of a board have the same budget, seed and version. A file of the same name is replaced.
+
+    \b
+    robochoc leaderboard submit results.json --board board/
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.leaderboard.board import submit as submit_results
+    from robochoc.leaderboard.results import read_results
+
+    found = read_results(results)
+    with errors_as_failures(results):
+        from robochoc.leaderboard.verification import wrong_answers
+
+        faults = list(wrong_answers(found))
+        _fail(results, faults)
+        path = submit_results(found, results.name, board)
+    click.echo(f"{path}: {len(found.runs):,} runs; next: robochoc leaderboard show {board}")
+
+
+@leaderboard.command(short_help="Show tables, or write a static site.")
+@click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="RESULTS.json|BOARD ...")
+@click.option("--html", "site", type=InputPath(), metavar="FOLDER", help="Write a static site into this folder.")
+@click.option("--markdown", type=OutputFile(), metavar="FILE", help="Write the tables in Markdown.")
+@invalid_input_fails
+def show(paths: tuple[Path, ...], site: Path | None, markdown: Path | None) -> None:
+    """Show the scores of protocols in files of results, or on a board: ranks, gaps, costs of communication.
+
+    \b
+    robochoc leaderboard show results.json
+    robochoc leaderboard show board/ --html site/
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.cli.commands.experiment import require_modules
+
+    require_modules("ranks", "scipy")
+    from robochoc.cli.reports.leaderboard import print_board, write_markdown
+    from robochoc.leaderboard.board import read_board
+
+    results = read_board(paths)
+    with errors_as_failures(site or markdown or paths[0]):
+        if site is not None:
+            from robochoc.leaderboard.site import write_site
+
+            click.echo(f"{site}: {write_site(results, site):,} pages", err=True)
+        if markdown is not None:
+            write_markdown(results, markdown)
+            click.echo(f"{markdown}: written", err=True)
+    if site is None and markdown is None:
+        print_board(results)
+
+
+def _fail(path: Path, faults: Sequence[str]) -> None:
+    """Raise `Failure` with the first faults, if there are any."""
+    if faults:
+        more = [f"and {len(faults) - MOST_FAULTS:,} more"] if len(faults) > MOST_FAULTS else []
+        raise Failure(LOST, "\n".join(f"{path}: {line}" for line in [*faults[:MOST_FAULTS], *more]))
+
+
+def _instances(families: tuple[str, ...], sizes: tuple[str, ...], seeds: Sequence[int] = ()) -> Iterator[Instance]:
+    """Yield the chosen instances."""
+    from robochoc.leaderboard.instances import UnknownInstanceError, instances
+
+    try:
+        yield from instances(families, sizes, seeds)
+    except UnknownInstanceError as unknown:
+        raise Failure(USAGE, str(unknown)) from None
+
+
+def _budget(words: str) -> Budget:
+    """Parse NAME=VALUE,..."""
+    import msgspec
+
+    from robochoc.leaderboard.results import Budget
+
+    given = {}
+    for word in filter(None, words.split(",")):
+        name, equals, value = word.partition("=")
+        if not equals or name not in BUDGET or name in given:
+            raise click.UsageError(f"--budget: {word!r} is not one of {', '.join(BUDGET)} with a value, each once.")
+        given[name] = value
+    try:
+        return msgspec.convert({BUDGET[name]: value for name, value in given.items()}, Budget, strict=False)
+    except msgspec.ValidationError as wrong:
+        raise click.UsageError(f"--budget: {wrong}.") from None

@@ -1,0 +1,272 @@
+"""The benchmark set: families of problems, ten seeds each.
+
+An instance is a generator with its parameters and a seed, so no files are shipped. The name of an instance consists of
+its family, its size and its seed: `scale-free-small-7`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from functools import cache
+from types import MappingProxyType
+
+from robochoc.experiments.execute import team_of
+from robochoc.experiments.task import Parameter, ProblemSpec
+from robochoc.model.problem import Team
+from robochoc.system.errors import RobochocError
+from robochoc.system.lazy_dataclass import dataclass
+from robochoc.system.suggestions import did_you_mean
+
+SET_VERSION = 1
+"""The version of the set. It changes whenever an instance changes."""
+SIZES = ("small",)
+SEEDS = 10
+"""The number of instances of each family and size."""
+CP_SAT, TOULBAR2, COSOCO, DPOP = "ortools", "toulbar2", "cosoco", "dpop"
+
+
+class UnknownInstanceError(RobochocError, LookupError):
+    """The set has no instance, family or size with that name."""
+
+
+@dataclass(frozen=True)
+class BenchmarkFamily:
+    """A family of the set.
+
+    Attributes:
+        title: The title.
+        source: The paper that introduced the problems.
+        generator: The family in `robochoc.generators.families`.
+        common: The parameters shared by all sizes.
+        sizes: The parameters of each size.
+        solvers: The two solvers that certify the optima: of the merged problem, or the distributed protocol `dpop`.
+        events: The number of changes over time. 0: the problem does not change.
+        measures_privacy: True if the privacy loss is measured.
+        has_seeds: False if there is one instance of each size.
+    """
+
+    title: str
+    source: str
+    generator: str
+    common: Mapping[str, Parameter]
+    sizes: Mapping[str, Mapping[str, Parameter]]
+    solvers: tuple[str, str] = (TOULBAR2, CP_SAT)
+    events: int = 0
+    measures_privacy: bool = False
+    has_seeds: bool = True
+
+
+def _sizes(name: str, *values: Parameter, **others: tuple[Parameter, ...]) -> Mapping[str, Mapping[str, Parameter]]:
+    """Return the parameters of each size: those called `name` and the others each have a value for each size."""
+    columns = {name: values, **others}
+    return {size: {key: column[place] for key, column in columns.items()} for place, size in enumerate(SIZES)}
+
+
+FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
+    {
+        "random": BenchmarkFamily(
+            "Random binary problems",
+            "Model B: Prosser, AIJ 81, 1996; Gent et al., Constraints 6, 2001",
+            "random",
+            {"domain": 5, "max_cost": 100},
+            _sizes("agents", 10, 20, 30, density=(0.4, 0.25, 0.15)),
+            (TOULBAR2, DPOP),
+        ),
+        "nary": BenchmarkFamily(
+            "Random ternary problems",
+            "Model RB: Xu and Li, JAIR 12, 2000",
+            "nary",
+            {"domain": 3, "arity": 3, "max_cost": 100},
+            _sizes("agents", 10, 20, 30, constraints=(10, 20, 28)),
+            (TOULBAR2, DPOP),
+        ),
+        "scale-free": BenchmarkFamily(
+            "Scale-free graphs",
+            "Barabási and Albert, Science 286, 1999",
+            "random",
+            {"graph": "scale-free", "domain": 4, "max_cost": 100},
+            _sizes("agents", 12, 20, 40),
+            (TOULBAR2, DPOP),
+        ),
+        "small-world": BenchmarkFamily(
+            "Small worlds",
+            "Watts and Strogatz, Nature 393, 1998",
+            "random",
+            {"graph": "small-world", "domain": 4, "max_cost": 100},
+            _sizes("agents", 12, 24, 40),
+            (TOULBAR2, DPOP),
+        ),
+        "coloring-weighted": BenchmarkFamily(
+            "Weighted graph colouring",
+            "Koljonen et al., SASO 2010",
+            "coloring",
+            {"colors": 3, "conflicts": "weighted", "max_cost": 100},
+            _sizes("agents", 12, 24, 36, degree=(5.0, 5.0, 5.0)),
+            (TOULBAR2, DPOP),
+        ),
+        "coloring-hard": BenchmarkFamily(
+            "Hard graph colouring",
+            "Yokoo et al., TKDE 10, 1998",
+            "coloring",
+            {"colors": 3, "conflicts": "hard", "degree": 4.2},
+            _sizes("agents", 20, 40, 60),
+        ),
+        "meetings": BenchmarkFamily(
+            "Meeting scheduling",
+            "Maheswaran et al., AAMAS 2004",
+            "meetings",
+            {"model": "peav"},
+            _sizes("agents", 5, 10, 15, meetings=(5, 10, 18), slots=(4, 6, 8)),
+        ),
+        "sensors": BenchmarkFamily(
+            "Sensor networks",
+            "Béjar et al., AIJ 161, 2005",
+            "grid-sensors",
+            {"model": "sensors"},
+            _sizes("rows", 4, 6, 8, columns=(4, 6, 8), targets=(3, 7, 10)),
+        ),
+        "tracking": BenchmarkFamily(
+            "Target tracking",
+            "Zivan et al., JAAMAS 29, 2015",
+            "tracking",
+            {},
+            _sizes("agents", 6, 12, 20, targets=(5, 10, 16), side=(8, 12, 16)),
+        ),
+        "smart-homes": BenchmarkFamily(
+            "Smart lighting",
+            "Rust et al., IJCAI 2016",
+            "smart-homes",
+            {"levels": 4},
+            _sizes("agents", 9, 16, 24, rules=(6, 11, 16)),
+        ),
+        "frequencies": BenchmarkFamily(
+            "Frequency assignment",
+            "Cabon et al., Constraints 4, 1999",
+            "frequencies",
+            {},
+            _sizes("agents", 10, 20, 30, frequencies=(4, 5, 5), distance=(40, 35, 30)),
+        ),
+        "tasks": BenchmarkFamily(
+            "Task allocation",
+            "Gerkey and Matarić, IJRR 23, 2004",
+            "tasks",
+            {"skills": 2},
+            _sizes("agents", 6, 12, 16, tasks=(6, 12, 16)),
+        ),
+        "queens3d": BenchmarkFamily(
+            "Queens in three dimensions",
+            "the paper of the platform, Section 5.1",
+            "queens3d",
+            {},
+            _sizes("n", 3, 4, 5),
+            has_seeds=False,
+        ),
+        "dynamic": BenchmarkFamily(
+            "Random problems that change",
+            "Yeoh et al., AAMAS 2011",
+            "random",
+            {"domain": 4, "max_cost": 100},
+            _sizes("agents", 8, 14, 20, density=(0.4, 0.3, 0.2)),
+            (TOULBAR2, DPOP),
+            events=4,
+        ),
+        "asymmetric": BenchmarkFamily(
+            "Asymmetric random problems",
+            "Grinshpoun et al., JAIR 47, 2013",
+            "random",
+            {"domain": 4, "max_cost": 100, "asymmetric": True},
+            _sizes("agents", 8, 12, 16, density=(0.4, 0.3, 0.25)),
+            (TOULBAR2, COSOCO),
+        ),
+        "privacy": BenchmarkFamily(
+            "Meetings whose preferences are private",
+            "Greenstadt, Pearce and Tambe, AAAI 2006",
+            "meetings",
+            {"model": "eav"},
+            _sizes("agents", 5, 8, 12, meetings=(5, 8, 12), slots=(4, 5, 6)),
+            measures_privacy=True,
+        ),
+    }
+)
+"""The families by name. The kinds of colouring and of random problems have separate names: 14 kinds, 16 families."""
+_CHANGES = "add-constraint remove-constraint add-value remove-value"
+_RATE = 0.1
+
+
+@dataclass(frozen=True)
+class Instance:
+    """An instance of the set.
+
+    Attributes:
+        family: The name of its family.
+        size: Its size.
+        seed: Its seed, from 0.
+    """
+
+    family: str
+    size: str
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """The name."""
+        return f"{self.family}-{self.size}-{self.seed}"
+
+    @property
+    def group(self) -> BenchmarkFamily:
+        """The family."""
+        return FAMILIES[self.family]
+
+    @property
+    def problem(self) -> ProblemSpec:
+        """The problem, as in a study."""
+        group = self.group
+        seed = {"seed": self.seed} if group.has_seeds else {}
+        scenario = {"events": group.events, "rate": _RATE, "seed": self.seed, "kinds": _CHANGES} if group.events else {}
+        parameters = {**group.common, **group.sizes[self.size], **seed}
+        return ProblemSpec(group=self.family, family=group.generator, parameters=parameters, scenario=scenario)
+
+    def team(self) -> Team:
+        """Return the generated team."""
+        return team_of(self.problem)
+
+
+def instances(
+    families: Collection[str] = (), sizes: Collection[str] = (), seeds: Collection[int] = ()
+) -> Iterator[Instance]:
+    """Yield the instances of some families, sizes and seeds; an empty collection stands for all.
+
+    Raises:
+        UnknownInstanceError: if there is no such family or size.
+    """
+    _check(families, FAMILIES, "family")
+    _check(sizes, SIZES, "size")
+    for name, family in FAMILIES.items():
+        for size in SIZES:
+            for seed in range(SEEDS if family.has_seeds else 1):
+                if (name in (families or (name,))) and size in (sizes or (size,)) and seed in (seeds or (seed,)):
+                    yield Instance(name, size, seed)
+
+
+def _check(names: Collection[str], known: Collection[str], what: str) -> None:
+    for name in names:
+        if name not in known:
+            hint = did_you_mean(name, known, f"there are {', '.join(known)}")
+            raise UnknownInstanceError(f"the benchmark set has no {what} {name!r}; {hint}")
+
+
+@cache
+def _by_name() -> Mapping[str, Instance]:
+    return {one.name: one for one in instances()}
+
+
+def instance_named(name: str) -> Instance:
+    """Return the instance called `name`.
+
+    Raises:
+        UnknownInstanceError: if there is none; the error suggests another name.
+    """
+    if name not in _by_name():
+        hint = did_you_mean(name, _by_name(), "'robochoc leaderboard list' shows all")
+        raise UnknownInstanceError(f"the benchmark set has no instance {name!r}; {hint}")
+    return _by_name()[name]

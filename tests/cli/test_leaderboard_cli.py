@@ -1,0 +1,101 @@
+"""`robochoc leaderboard`, as people use it."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from robochoc.experiments.digests import digest_of_team
+from robochoc.formats import read_team
+from robochoc.leaderboard.instances import instance_named
+from robochoc.leaderboard.outside import named_protocols
+from robochoc.run.registry import UnknownProtocolError, protocol_named
+from tests.support.cases import cases
+from tests.support.program import ROOT, robochoc_within
+
+EXAMPLE = ROOT / "docs" / "examples" / "breakout"
+TWO = ("--family", "random", "--family", "coloring-hard", "--size", "small", "--seeds", "1", "--jobs", "1")
+
+
+def test_list_and_export(tmp_path: Path) -> None:
+    listed = robochoc_within("leaderboard", "list", "--family", "random", "--size", "small")
+    assert listed.stdout.startswith("random-small-0              10 robots  optimal 399    toulbar2, dpop\n")
+    as_json = robochoc_within("leaderboard", "list", "--family", "random", "--json").stdout.splitlines()
+    assert json.loads(as_json[0])["cost"] == 399
+    team = instance_named("random-small-0").team()
+    done = robochoc_within("leaderboard", "export", "random-small-0", "-o", tmp_path / "team")
+    assert done.returncode == 0
+    assert digest_of_team(read_team(tmp_path / "team")) == digest_of_team(team)
+    with cases() as each:
+        for form in ("xcsp3", "frodo", "pydcop"):
+            with each(form):
+                path = tmp_path / f"file.{form}"
+                done = robochoc_within("leaderboard", "export", "random-small-0", "--format", form, "-o", path)
+                assert done.returncode == 0
+                assert path.stat().st_size > 1000
+                again = robochoc_within("leaderboard", "export", "random-small-0", "--format", form, "-o", path)
+                assert (again.returncode, "use --force" in again.stderr) == (1, True)
+
+
+def test_run_verify_submit_and_show(tmp_path: Path) -> None:
+    path, board, site = tmp_path / "results.json", tmp_path / "board", tmp_path / "site"
+    done = robochoc_within("leaderboard", "run", "dpop", "MGM", "dba", *TWO, "-o", path, "--budget", "messages=300")
+    assert (done.returncode, done.stderr) == (0, "")
+    checked = robochoc_within("leaderboard", "verify", path, "--rerun", "2", "--jobs", "1")
+    assert checked.stdout == f"{path}: 6 answers are right; 2 repeated runs gave the same results\n"
+    assert robochoc_within("leaderboard", "submit", path, "--board", board).returncode == 0
+    shown = robochoc_within("leaderboard", "show", board).stdout
+    assert re.search(r"^random: Random binary problems$", shown, re.MULTILINE)
+    assert "Not for this family: dba." in shown
+    robochoc_within("leaderboard", "show", board, "--html", site, "--markdown", tmp_path / "page.md")
+    assert sorted(file.name for file in site.iterdir()) == [
+        "coloring-hard-small-0.html", "index.html", "random-small-0.html",
+    ]  # fmt: skip
+    page = (site / "random-small-0.html").read_text()
+    assert "toulbar2 proved it, and dpop proved the same" in page
+    assert "Best answer here: dpop." in page
+    assert "| dpop\\* |" in (tmp_path / "page.md").read_text()
+    altered = json.loads(path.read_text())
+    altered["runs"][1]["cost"] -= 1
+    path.write_text(json.dumps(altered))
+    wrong = robochoc_within("leaderboard", "submit", path, "--board", board)
+    assert (wrong.returncode, "mgm on random-small-0: the answer" in wrong.stderr) == (4, True)
+
+
+def test_a_protocol_of_a_module_enters(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(EXAMPLE)
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    path, word = tmp_path / "results.json", "robochoc_breakout:Breakout"
+    done = robochoc_within("leaderboard", "run", word, *TWO, "-o", path, "--budget", "messages=200")
+    assert (done.returncode, done.stderr) == (0, "")
+    (entrant,) = json.loads(path.read_text())["entrants"]
+    assert (entrant["name"], entrant["package"]) == ("breakout", "robochoc_breakout 0")
+    with pytest.raises(UnknownProtocolError):
+        protocol_named("breakout")
+    unknown = robochoc_within("leaderboard", "verify", path, "--jobs", "1")
+    assert (unknown.returncode, "no protocol 'breakout' is installed" in unknown.stderr) == (2, True)
+    known = robochoc_within("leaderboard", "verify", path, "--jobs", "1", "--protocol", word)
+    assert (known.returncode, known.stderr) == (0, "")
+
+
+def test_names_without_modules_need_no_package() -> None:
+    with named_protocols(["dpop"]) as names:
+        assert names == ["dpop"]
+
+
+def test_wrong_usage() -> None:
+    with cases() as each:
+        for words, message in [
+            (["run", "dqop"], "did you mean 'dpop'"),
+            (["run", "nope:Nope"], "No module named 'nope'"),
+            (["run", "dpop", "--budget", "hours=3"], "'hours=3' is not one of messages, ncccs, cycles, time"),
+            (["run", "dpop", "--budget", "messages=0"], "--budget: Expected `int` >= 1"),
+            (["run", "dpop", "--family", "rndom"], "did you mean 'random'"),
+            (["export", "random-small-99"], "did you mean 'random-small-9'"),
+        ]:
+            with each(message):
+                done = robochoc_within("leaderboard", *words)
+                assert (done.returncode, message in done.stderr) == (2, True)
