@@ -1,6 +1,6 @@
 """The published list of the benchmark set: the digest of each instance, and its answer with the solvers that proved it.
 
-`python -m robochoc.leaderboard.certificates FILE` computes the list anew (`make benchmark-set`). The two solvers of an
+`python -m robochoc.leaderboard.certificates FILE` computes the list again (`make benchmark-set`). The two solvers of an
 instance share no code: one finds the answer, and the other one proves the same verdict and cost.
 """
 

@@ -85,7 +85,7 @@ def _instance(one: Certificate, runs: Sequence[RunResult], best: Sequence[RunRes
         *(_proof(folder, name) for name in (one.proved_by, one.agreed_by)),
     ]
     yield f"<pre>{html.escape(chr(10).join(commands))}</pre>"
-    yield _paragraph(f"Best answer here: {_names(best)}. 'robochoc leaderboard verify' computes its cost anew.")
+    yield _paragraph(f"Best answer here: {_names(best)}. 'robochoc leaderboard verify' computes its cost again.")
     heads = ["protocol", "status", "verdict", "cost", "gap", "messages", "bytes", "NCCCs"]
     yield table(heads, [_run_line(run, one) for run in runs])
     for run in best[:1]:

@@ -1,4 +1,4 @@
-"""Verifies results: computes each cost anew, compares each answer with the published one, and repeats runs."""
+"""Verifies results: computes each cost again, compares each answer with the published one, and repeats runs."""
 
 from __future__ import annotations
 

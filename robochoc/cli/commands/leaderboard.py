@@ -172,7 +172,7 @@ def run(  # noqa: PLR0913 - options
     click.echo(f"{output}: {len(results.runs):,} runs; next: robochoc leaderboard show {output}")
 
 
-@leaderboard.command(short_help="Check results: compute costs anew, repeat runs.")
+@leaderboard.command(short_help="Check results: compute costs again, repeat runs.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.json")
 @click.option(
     "--rerun", type=WholeNumber(0), default=10, show_default=True, metavar="N", help="Number of runs to repeat."
