@@ -50,6 +50,10 @@ class InMemoryAuthority:
         """Return a new identity for the master at `hosts`."""
         return self._identity(MASTER, hosts)
 
+    def standby_identity(self, name: str, hosts: tuple[str, ...]) -> Identity:
+        """Return a new identity for the standby master `name` at `hosts`."""
+        return self._identity(name, hosts)
+
     def names(
         self,
         role: Role | None = None,

@@ -18,3 +18,12 @@ ROUNDS = "rounds"
 """The messages of games in rounds (`robochoc play`), in journals. Users cannot choose it by name."""
 MOST_LOSS = 0.9
 """The largest allowed probability of message loss. Above it, hardly any message arrives."""
+MASTER = "MASTER"
+"""The name of the first master of a run on a network."""
+MOST_STANDBYS = 9
+"""The maximum number of standby masters on this machine."""
+
+
+def standby_names(number: int) -> tuple[str, ...]:
+    """Return the names of `number` standby masters on this machine."""
+    return tuple(f"STANDBY{place}" for place in range(1, number + 1))

@@ -160,7 +160,8 @@ class Options:
         channel: A channel model, with which the simulator measures time as the seconds spent on computation and radio.
         message_loss: The probability that a message is permanently lost (0: the probability in `channel`). See `loss`.
         settings: The protocol's settings, as text.
-        kill: The robots whose processes are killed, with the times.
+        kill: The robots (with `standby` also masters) whose processes are killed, with the times.
+        standby: The number of standby masters on this machine, for `Runtime.NETWORK`.
         filters: The names of the channel filters for messages on a network, in order of application.
         chosen: The reasons for a `protocol` or an `order` that was chosen for the user.
         preprocess: The preprocessing before the protocol (None: no preprocessing).
@@ -203,6 +204,7 @@ class Options:
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
     kill: tuple[Kill, ...] = ()
+    standby: int = 0
     chosen: Mapping[str, str] = field(default_factory=dict)
     bounds: bool = False
     preprocess: Preprocess | None = None
@@ -283,6 +285,7 @@ _CONVERTERS = MappingProxyType(
         "settings": texts_by_name,
         "filters": items_of(text, "the names of filters"),
         "kill": items_of(kill, "objects of the class Kill"),
+        "standby": count,
         "chosen": texts_by_name,
         "bounds": flag,
         "preprocess": optional(one_of(Preprocess)),

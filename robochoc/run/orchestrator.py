@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 from robochoc.communication.search_result import Progress
@@ -181,8 +182,12 @@ def _solve_distributed(
         from robochoc.run.compatibility.channel_rules import refuse_channel  # noqa: PLC0415 - start-up: rarely needed
 
         refuse_channel(team, options)
-    deployment = ThisMachine(team, context, environment, audience)
     header = _header(team, options)
+    if options.standby:
+        with_standbys: Callable[[Team, RunContext, Outcome], Outcome]
+        with_standbys = resolve_name("robochoc.run.networked.local_standbys:solve_with_standbys")
+        return with_standbys(team, context, header)
+    deployment = ThisMachine(team, context, environment, audience)
     try:
         outcome = solve_distributed(deployment, protocol, header)
     except TooLargeError as refused:

@@ -341,7 +341,7 @@ def test_a_parent_that_is_struck_at_any_time_leaves_no_process(
 def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> None:
     """Before it is opened, and after it is closed, the fork server is all there is."""
     program = (
-        "import os; from robochoc.communication.network.local import _fork_server as begun;"
+        "import os; from robochoc.communication.network.local import start_fork_server as begun;"
         "from robochoc.protocols.satisfaction.abt import ABT; begun(ABT); os.kill(os.getpid(), 9)"
     )
     with running([sys.executable, "-c", program], short_path / "run") as run:
@@ -364,7 +364,7 @@ def test_a_request_to_the_fork_server_that_ends_too_early(request_: str, short_p
     """As of a parent that is killed after it has connected: the server ends, and says nothing."""
     program = (
         "import os, pickle, socket; from multiprocessing.forkserver import _forkserver as server;"
-        "from robochoc.communication.network.local import _fork_server as begun;"
+        "from robochoc.communication.network.local import start_fork_server as begun;"
         f"from robochoc.protocols.satisfaction.abt import ABT; begun(ABT); {request_}; os.kill(os.getpid(), 9)"
     )
     with running([sys.executable, "-c", program], short_path / "run") as run:

@@ -43,6 +43,7 @@ from robochoc.cli.options.solve import (
     protocol_option,
     repair_option,
     settings_option,
+    standby_option,
     start_option,
     withdraw_option,
 )
@@ -60,7 +61,7 @@ _SECTIONS: Sections = {
         "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--no-repair", "--messages", "--ncccs",
         "--cycles", "--count", "--with", "--cluster",
     ),
-    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
+    "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill", "--standby"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Input (documentation, page Files of other tools)": ("--format", "--infinity", "--owner"),
@@ -162,7 +163,7 @@ _SECTIONS: Sections = {
     "--on-loss",
     type=click.Choice(["fail", "withdraw"]),
     metavar="fail|withdraw",
-    help="If a robot's process dies, end the run (status 4), or continue without the robot.  [default: fail]",
+    help="If a robot dies: end (default) or continue the run.",
 )
 @click.option(
     "--spare",
@@ -174,6 +175,7 @@ _SECTIONS: Sections = {
 )
 @cluster_option
 @kill_option
+@standby_option
 @filter_option
 @click.option("--explain", is_flag=True, help="Print the reasons for the chosen protocol, and the pseudo-tree.")
 @click.option("--count", is_flag=True, help="With --protocol central, count-dpop: count solutions.")

@@ -135,6 +135,13 @@ kill_option = click.option(
     metavar="ROBOT@SECONDS",
     help="Kill a robot's process at this time. Repeatable.",
 )
+standby_option = click.option(
+    "--standby",
+    type=WholeNumber(0),
+    default=0,
+    metavar="N",
+    help="Network: start N standby masters, too.",
+)
 filter_option = click.option(
     "--filter",
     "filters",
@@ -146,8 +153,8 @@ filter_option = click.option(
 
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
-    "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
-    "central_with", "cluster", "answer", "cold", "repair",
+    "kill", "standby", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss",
+    "preprocess", "central_with", "cluster", "answer", "cold", "repair",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

@@ -81,7 +81,7 @@ class LocalNetwork(Session):
         require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
         self._protocol = protocol
         self._parameters = parameters
-        self._context = _fork_server(protocol)
+        self._context = start_fork_server(protocol)
         settings = replace(settings, scratch=get_temp_dir())
         self._settings = settings
         self._processes: dict[str, BaseProcess] = {}
@@ -221,7 +221,7 @@ class LocalNetwork(Session):
         self._processes = {}
 
 
-def _fork_server(protocol: type[Protocol]) -> ForkServerContext:
+def start_fork_server(protocol: type[Protocol]) -> ForkServerContext:
     """Start the fork server unless it is already running. It imports modules while the router is being opened.
 
     Signals are blocked during the start, so that no folder is left behind. The fork server inherits the blocked

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from robochoc.run.defaults import CENTRAL, MOST_LOSS
+from robochoc.run.defaults import CENTRAL, MOST_LOSS, MOST_STANDBYS
 from robochoc.run.options import AnswerRule, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 
@@ -103,6 +103,7 @@ OPTION_RULES = (
     _for_robots("--on-loss", lambda o: o.on_loss),
     _for_robots("--spare", lambda o: o.spares),
     _for_robots("--kill", lambda o: o.kill),
+    _for_robots("--standby", lambda o: o.standby),
     _for_robots("--channel", lambda o: o.channel),
     _for_robots("--deadline", lambda o: o.deadline),
     _for_robots("--message-loss", lambda o: o.message_loss),
@@ -160,6 +161,19 @@ OPTION_RULES = (
         lambda o: o.spares and o.runtime == Runtime.NETWORK,
         "--spare restarts only processes on this machine",
         "remove --runtime network",
+    ),
+    OptionRule(
+        lambda o: o.standby and o.runtime != Runtime.NETWORK,
+        "--standby starts masters on a network",
+        "add --runtime network",
+    ),
+    OptionRule(
+        lambda o: o.standby > MOST_STANDBYS, f"--standby starts at most {MOST_STANDBYS} masters besides the first one"
+    ),
+    OptionRule(
+        lambda o: o.standby and (o.improve is not None or o.start),
+        "--standby cannot be used with --improve, which publishes answers before robots have voted, or with --start",
+        "remove one of them",
     ),
     OptionRule(
         lambda o: (o.on_loss or o.spares) and o.runtime in _WITHOUT_PROCESSES,

@@ -12,7 +12,7 @@ from robochoc.protocols.requirements import BREAKABLE, unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import CENTRAL
+from robochoc.run.defaults import CENTRAL, MASTER, standby_names
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.solver.errors import UnsupportedError
 from robochoc.solver.exclusions import allocation_fault
@@ -68,8 +68,10 @@ class RunCase:
 
     @property
     def unknown_kills(self) -> str:
-        """The robots to be killed that are not in the team at any time."""
-        return ", ".join(sorted({kill.robot for kill in self.options.kill}.difference(*(e.order for e in self.epochs))))
+        """The robots to be killed that are not in the team at any time, and are not masters."""
+        standby = self.options.standby
+        known = [*(e.order for e in self.epochs), (MASTER, *standby_names(standby)) if standby else ()]
+        return ", ".join(sorted({kill.robot for kill in self.options.kill}.difference(*known)))
 
     @property
     def max_total(self) -> float:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 
 from robochoc.authority.enrolment import EnrolmentError, NotReachableError, enrol, renew
 from robochoc.authority.identity import Identity, IdentityError, default_identity_folder
 from robochoc.authority.names import check_member_name
+from robochoc.communication.network.following import follow
 from robochoc.communication.network.masters import Masters
-from robochoc.communication.network.robot import Ending, NetworkRobot
+from robochoc.communication.network.robot import Ending
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.robot_votes import RobotVotes
-from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.formats import check_robot
 from robochoc.model.costs import UnboundedCostError, normalized_robot
 from robochoc.model.problem import Robot
@@ -116,23 +115,4 @@ def join(
     own = CompiledRobot(robot, settings.compiled)
     masters = Masters(list(map(str, places)), settings.patience_s)
     votes = RobotVotes(identity.folder / VOTES if masters.several else None, several=masters.several)
-    while True:
-        place = masters.current
-        settings.stage(f"searching for the master at {place}")
-        try:
-            transport = Transport(place, identity, watch=(), patience_s=masters.attempt_s)
-        except CannotConnectError:
-            if not masters.several:
-                raise
-        else:
-            with ExitStack() as closing:
-                closing.callback(transport.close)
-                ending = NetworkRobot(own, identity, transport, protocol_or_stage, settings, votes, masters).run()
-                if not ending.elsewhere:
-                    return ending
-                closing.pop_all()
-            transport.abandon()
-            settings.lost_master(place, ending.why)
-        masters.leave()
-        if masters.is_over:
-            raise CannotConnectError(masters.failure)
+    return follow(own, identity, masters, votes, settings, protocol_or_stage)

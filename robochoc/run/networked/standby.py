@@ -42,12 +42,14 @@ class StandbyPlan(NamedTuple):
     """The part of a master's plan that makes it a standby master.
 
     Attributes:
-        leaders: The masters with a higher priority, in their order.
+        leaders: The masters with a higher priority, in their order. Without any, this master leads at once.
         identity: The identity of the standby master.
+        known: The Authority's rules, if they are known; they are not stored then.
     """
 
     leaders: tuple[Address, ...]
     identity: Identity
+    known: StandbyAnswer | None = None
 
 
 class RunOverElsewhereError(RobochocError):
@@ -141,7 +143,7 @@ class LeaderWatch:
         self._plan = plan
         self._followers: list[_Follower] = []
         self._file = plan.identity.folder / ADMISSION
-        self._answer = _stored(self._file)
+        self._answer = plan.known or _stored(self._file)
         self._resigned_at: float | None = None
         self._over: RunOverElsewhereError | None = None
 
@@ -160,7 +162,7 @@ class LeaderWatch:
     @property
     def is_led(self) -> bool:
         """True if a master with a higher priority has answered a short time ago."""
-        return self._silent_s() < SILENCE_S
+        return bool(self._plan.leaders) and self._silent_s() < SILENCE_S
 
     @property
     def has_closed(self) -> bool:
@@ -198,7 +200,8 @@ class LeaderWatch:
     @property
     def wait_s(self) -> float:
         """The time without an answer after which this master leads, in seconds."""
-        return SILENCE_S + _AFTER_S * (len(self._plan.leaders) - 1)
+        leaders = len(self._plan.leaders)
+        return SILENCE_S + _AFTER_S * (leaders - 1) if leaders else 0.0
 
     def _silent_s(self) -> float:
         """Return the time without an answer. A master that has resigned counts as silent for as long as necessary."""
@@ -211,7 +214,9 @@ class LeaderWatch:
         self.place = place
         self._resigned_at = time.monotonic() if answer.resigned else None
         self._over = RunOverElsewhereError(place, answer) if answer.over else None
-        if self._answer is None or (answer.names, answer.sniffers) != (self._answer.names, self._answer.sniffers):
+        before = self._answer
+        is_new = before is None or (answer.names, answer.sniffers) != (before.names, before.sniffers)
+        if is_new and self._plan.known is None:
             with suppress(OSError):  # it is still in memory
                 write_atomically(self._file, msgspec.msgpack.encode(answer), PRIVATE)
         self._answer = answer

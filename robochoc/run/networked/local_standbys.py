@@ -1,0 +1,268 @@
+"""A team on this machine with standby masters: `--runtime network --standby N`.
+
+Each robot and each master has its own process, connected by zenoh and mutual TLS. If the leading master is killed
+(`--kill MASTER@SECONDS`), the next one takes over, as across machines (docs/guides/several-machines.md). This process
+only starts the others, and receives the outcome. Certificates are created for this run, and exist only in memory.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+import socket
+import time
+from contextlib import suppress
+from dataclasses import replace
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+from robochoc.authority.admission import InMemoryAuthority
+from robochoc.authority.identity import Identity, IdentityTexts
+from robochoc.authority.registry import Role
+from robochoc.communication.main_guard import require_main_guard
+from robochoc.communication.network.control_messages import StandbyAnswer
+from robochoc.communication.network.local import LOOPBACK, start_fork_server
+from robochoc.communication.network.robot_process import (
+    START_S,
+    NetworkRobotStart,
+    end_with_the_parent,
+    network_robot_process,
+)
+from robochoc.communication.network.settings import LEASE_MS, PATIENCE_S, NetworkSettings
+from robochoc.communication.search_result import RobotsLostError
+from robochoc.journal.events import AnyEvent, Leads
+from robochoc.model.orders import with_order
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import Team
+from robochoc.run.context import RunContext
+from robochoc.run.defaults import MASTER, standby_names
+from robochoc.run.networked.address import Address
+from robochoc.run.networked.join import PATIENCE_S as LOOKING_S
+from robochoc.run.networked.master_run import MasterPlan, run_master
+from robochoc.run.networked.standby import RunOverElsewhereError, StandbyPlan
+from robochoc.run.options import Options
+from robochoc.run.registry import protocol_named
+from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
+from robochoc.solver.compiled_domain import TooManySolutionsError
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.errors import UnsupportedError
+from robochoc.system.errors import RobochocError
+from robochoc.system.plain_text import on_one_line
+from robochoc.system.signals import signals_delayed
+from robochoc.verification.checker import RefutedError, violations
+
+_PORTS = range(20_000, 32_000)
+"""The ports of masters. Systems use larger ones for outgoing connections, so these are still free at a takeover."""
+_ATTEMPTS = 100
+_TICK_S = 0.2
+_GRACE_S = 5.0
+"""The time for processes to end by themselves after the run, in seconds."""
+
+
+class NoDecisionError(RobotsLostError):
+    """Raised if no master has published a decision. `why`: the reason of each master."""
+
+    def __init__(self, why: str) -> None:
+        super().__init__({MASTER: why})
+        self.args = (why,)
+
+
+class _MasterStart(NamedTuple):
+    """The arguments with which a master's process starts: see `MasterPlan` for `fields`."""
+
+    place: Address
+    leaders: tuple[Address, ...]
+    identity: IdentityTexts
+    known: StandbyAnswer
+    fields: dict[str, Any]
+
+
+class _Failed(NamedTuple):
+    """The reason why a master has not published a decision."""
+
+    why: str
+    unsupported: bool
+
+
+_Report = Leads | Outcome | _Failed | None
+"""What a master's process reports; None: another master has ended the run."""
+
+
+def solve_with_standbys(team: Team, context: RunContext, header: Outcome) -> Outcome:
+    """Return the outcome of `header`'s run, found by the robots of `team` and the masters on this machine.
+
+    Raises:
+        NoDecisionError: if no master has published a decision.
+        RefutedError: if the decision violates a constraint.
+        UnsupportedError: if the options cannot be combined with the team, or a master cannot listen.
+    """
+    options = context.options
+    if context.observer is not None:
+        raise UnsupportedError("--standby cannot be used with --journal or --sniff: remove one of them")
+    names = standby_names(options.standby)
+    if taken := sorted({MASTER, *names} & set(team.order)):
+        raise UnsupportedError(f"{team.name} has a robot called {taken[0]}, as a master of --standby: rename the robot")
+    require_main_guard()
+    try:
+        compiled = context.team_compiler().compile(with_order(team, options.order, options.seed), every=True)
+    except (TooManySolutionsError, CompileTimeoutError, TeamCompileTimeoutError) as limit:
+        return replace(header, reason=str(limit))
+    site = _Site(compiled, names, options)
+    try:
+        outcome = site.run(context)
+    finally:
+        site.close()
+    context.kills.warn_of_pending()
+    known = ("order", "chosen", "symbols", "symbolic")
+    outcome = replace(outcome, **{name: getattr(header, name) for name in known})
+    if outcome.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}:
+        wrong = next(violations(compiled.team, outcome.assignment, {*outcome.withdrawn, *outcome.lost}), None)
+        if wrong:
+            raise RefutedError(f"the answer for {team.name} is wrong: {wrong}")
+    return outcome
+
+
+class _Site:
+    """The processes of the masters and robots."""
+
+    def __init__(self, compiled: CompiledTeam, names: tuple[str, ...], options: Options) -> None:
+        self._compiled = compiled
+        self._options = options
+        self._authority = InMemoryAuthority(compiled.team.order)
+        self._names = (MASTER, *names)
+        self._places = _free_places(len(self._names))
+        self._protocol = protocol_named(options.protocol)
+        self._context = start_fork_server(self._protocol)
+        self._processes: dict[str, BaseProcess] = {}
+        self._reports: dict[str, Connection] = {}
+
+    def run(self, context: RunContext) -> Outcome:
+        """Start all processes, and return the decision of a master. Raises `NoDecisionError`, `UnsupportedError`."""
+        for rank, name in enumerate(self._names):
+            self._start_master(rank, name)
+        for own in self._compiled.robots.values():
+            name = own.robot.name
+            endpoints = tuple(map(str, self._places))
+            texts = self._authority.identity(name).texts
+            start = NetworkRobotStart(own, texts, endpoints[0], self._protocol, LOOKING_S, LEASE_MS, endpoints[1:])
+            self._start(name, network_robot_process, start)
+        failed: dict[str, _Failed] = {}
+        while self._reports:
+            for name, report in self._next_reports():
+                if isinstance(report, Leads):
+                    context.kills.start(time.monotonic())
+                    _log(f"{report.master} leads in term {report.term}: {report.why}")
+                elif isinstance(report, Outcome):
+                    context.kills.end(time.monotonic())
+                    return report
+                elif report is not None:
+                    failed[name] = report
+            for name in context.kills.due(time.monotonic()):
+                _log(f"{name} is killed")
+                self._processes[name].kill()
+        why = "; ".join(f"{name}: {one.why}" for name, one in failed.items()) or "all masters have ended"
+        raise (UnsupportedError if any(one.unsupported for one in failed.values()) else NoDecisionError)(why)
+
+    def _start_master(self, rank: int, name: str) -> None:
+        authority, hosts = self._authority, (LOOPBACK,)
+        identity = authority.standby_identity(name, hosts) if rank else authority.master_identity(hosts)
+        roles = {str(Role.ROBOT): self._compiled.team.order, str(Role.MASTER): self._names, str(Role.OBSERVER): ()}
+        receiver, sender = self._context.Pipe(duplex=False)
+        start = _MasterStart(
+            self._places[rank],
+            self._places[:rank],
+            identity.texts,
+            StandbyAnswer(roles, ()),
+            _plan_fields(self._compiled.team, self._options),
+        )
+        self._start(name, _master_process, start, sender)
+        sender.close()
+        self._reports[name] = receiver
+
+    def _start(self, name: str, target: object, *given: object) -> None:
+        process = self._context.Process(target=target, name=name, args=given, daemon=True)  # type: ignore[arg-type]
+        with signals_delayed():  # see `LocalNetwork`
+            process.start()
+            self._processes[name] = process
+
+    def _next_reports(self) -> list[tuple[str, _Report]]:
+        """Wait a short time, and return the reports of masters. Masters that have ended are removed."""
+        found: list[tuple[str, _Report]] = []
+        ready = wait(list(self._reports.values()), _TICK_S)
+        for name, connection in list(self._reports.items()):
+            if connection in ready:
+                try:
+                    found.append((name, cast("_Report", connection.recv())))
+                except (EOFError, OSError):
+                    del self._reports[name]
+                    connection.close()
+        return found
+
+    def close(self) -> None:
+        """Wait a short time until all processes have ended, and kill the others."""
+        with signals_delayed():
+            until = time.monotonic() + (_GRACE_S if self._reports else 0)
+            for process in self._processes.values():
+                process.join(max(0.0, until - time.monotonic()))
+            for process in self._processes.values():
+                process.kill()
+                process.join()
+                process.close()
+            for connection in self._reports.values():
+                connection.close()
+
+
+def _plan_fields(team: Team, options: Options) -> dict[str, Any]:
+    """Return the fields of `MasterPlan` that all masters have in common."""
+    conditions = NetworkSettings(
+        filters=options.filters,
+        patience_s=options.patience or PATIENCE_S,
+        survive=options.survives_losses,
+    )
+    same = ("protocol", "seed", "withdraw", "timeout", "deadline", "messages", "message_loss")
+    return {
+        **{name: getattr(options, name) for name in same},
+        "settings": dict(options.settings),
+        "conditions": conditions,
+        "name": team.name,
+        "names": team.order,
+        "gather_s": START_S,
+    }
+
+
+def _master_process(start: _MasterStart, reports: Connection) -> None:
+    """Run one master in this process, and report its elections and its result."""
+    end_with_the_parent()
+
+    def observe(event: AnyEvent) -> None:
+        if isinstance(event, Leads):
+            reports.send(event)
+
+    standby = StandbyPlan(start.leaders, Identity.from_texts(start.identity), start.known)
+    plan = MasterPlan(Path(), start.place, standby=standby, **start.fields)
+    with suppress(BrokenPipeError):  # the run is over
+        try:
+            reports.send(run_master(plan, observer=observe).outcome)
+        except RunOverElsewhereError:
+            reports.send(None)
+        except RobochocError as error:
+            reports.send(_Failed(str(error), isinstance(error, UnsupportedError)))
+
+
+def _free_places(number: int) -> tuple[Address, ...]:
+    """Return free addresses of this machine. Raises `UnsupportedError` if there are none."""
+    found: list[Address] = []
+    chance = random.SystemRandom()
+    for _ in range(_ATTEMPTS):
+        place = Address(LOOPBACK, chance.choice(_PORTS))
+        with suppress(OSError), socket.create_server(place):
+            found += [] if place in found else [place]
+        if len(found) == number:
+            return tuple(found)
+    raise UnsupportedError(f"no free ports from {_PORTS.start} to {_PORTS.stop}: end other programs that listen there")
+
+
+def _log(text: str) -> None:
+    logging.getLogger("robochoc").warning("%s", on_one_line(text))
