@@ -87,7 +87,7 @@ class _Failed(NamedTuple):
 
 
 _Report = Leads | Outcome | _Failed | None
-"""What a master's process reports; None: another master has ended the run."""
+"""A report of a master's process; None: another master has ended the run."""
 
 
 def solve_with_standbys(team: Team, context: RunContext, header: Outcome) -> Outcome:
