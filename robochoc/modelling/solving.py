@@ -87,6 +87,7 @@ class Solvable(ABC):
         spares: int = 0,
         patience: float | None = None,
         kill: Sequence[Kill] = (),
+        standby: int = 0,
         filters: Sequence[str] = (),
         bounds: bool = False,
         preprocess: str | None = None,
@@ -143,7 +144,8 @@ class Solvable(ABC):
                 `spares`.
             spares: The number of lost robots that are replaced.
             patience: A robot whose process is suspended for this many seconds counts as lost. None: never.
-            kill: The robots whose processes are killed, with the times.
+            kill: The robots whose processes are killed, with the times; with `standby`, also `MASTER`.
+            standby: With `runtime="network"`: the number of standby masters, which take over if the first master dies.
             filters: The names of the channel filters for messages on a network, in the order of application.
             bounds: True if events report the proven lower bound of the cost (with processes and in the simulator).
             preprocess: The preprocessing before the protocol: `ac` makes domains arc consistent. None: no
