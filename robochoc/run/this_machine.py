@@ -186,8 +186,8 @@ class ThisMachine(Deployment):
         return phase.beginning_with(start_in(team, values, phase.parameters.withdrawal_cost)) if values else phase
 
     def remove(self, lost: Mapping[str, str]) -> None:
-        """See `Deployment.remove`."""
-        self._stage_team, self._continues = None, False
+        """See `Deployment.remove`. Answers published before are not valid for the remaining robots."""
+        self._stage_team, self._continues, self._improvements = None, False, None
         self._scenario.remove(lost.keys())
 
     def solve(self, phase: RunPhase) -> PhaseAnswer:

@@ -83,6 +83,17 @@ def test_answers_of_processes_at_a_deadline_replay_if_robots_have_no_values_yet(
     assert verdicts["solution"] > 20
 
 
+def test_answers_that_were_published_before_a_loss_do_not_count() -> None:
+    """Found by `make simulate`: an answer of all robots was followed by a worse one of the remaining robots."""
+    options = Options(protocol="adopt", runtime=Runtime.PROCESSES, cache=False, withdraw=Withdrawal.MINIMUM)
+    options = replace(options, deadline=10, improve=300, patience=1, spares=1)
+    for seed in range(8):
+        team = random_csp(4, 3, 0.9, 0.2, seed=seed, max_cost=9)
+        stop = Fault(FaultKind.STOP, team.order[2], 12 + seed, 50)
+        report = examine(Plan(seed * 3 + 1, team, options, (stop,), tick_s=1e-6, delay_s=2.0))
+        assert not report.findings, seed
+
+
 @pytest.fixture
 def deaf(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Let the robots of ABT ignore the third message that each of them receives."""
