@@ -252,6 +252,12 @@ def test_a_decision_that_brings_drones_too_close_is_not_flown(swarm: Swarm) -> N
     assert swarm.finish() == []
 
 
+def test_a_decision_with_a_place_on_the_ground_is_not_flown(swarm: Swarm) -> None:
+    with pytest.raises(SinkError, match=r"the waypoint of Fin has the height 0 m, less than 0\.1 m"):
+        swarm.fly(Nose=(2.0, 1.0, 1.0), Fin=(0.0, 1.0, 0.0))
+    assert swarm.finish() == []
+
+
 def test_the_end_lands_all_drones(swarm: Swarm, monkeypatch: pytest.MonkeyPatch) -> None:
     swarm.fly(Nose=(2.0, 1.0, 1.0))
     swarm.finish()

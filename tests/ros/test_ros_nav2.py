@@ -136,6 +136,7 @@ def test_a_robot_without_a_server(tmp_path: Path) -> None:
         ("rosbridge://127.0.0.1:1", "no rosbridge listens at"),
         ("rmw_zenoh://127.0.0.1:1", "no zenoh router listens at"),
         ("missing.yaml@dds:5", "missing.yaml: No such file or directory; name a file, as in nav2:robots.yaml@dds:5"),
+        ("robots.yaml?speed=1&speed=2@dds:5", "the options 'speed=1&speed=2' have a duplicate"),
         ("robots.yaml?speed=1@dds:5", "nav2 has no options: write them into its file"),
     ],
 )

@@ -17,7 +17,7 @@ from tornado.web import Application
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from tests.support.leftovers import shared_by_tests
-from tests.support.limits import HANG_S
+from tests.support.limits import HANG_S, wait_until
 
 Message = dict[str, Any]
 
@@ -90,6 +90,7 @@ class Server:
 
     def die(self) -> None:
         """Break every connection, without a word."""
+        wait_until(lambda: bool(self.handlers), "nobody is connected")
         for handler in [*self.handlers]:
             self._loop.call_soon_threadsafe(handler.break_off)
 

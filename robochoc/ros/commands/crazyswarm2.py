@@ -38,6 +38,8 @@ SERVICES: Mapping[str, str] = MappingProxyType(
 POSE = "geometry_msgs/PoseStamped"
 LANDED_M = 0.04
 """The height at which the motors stop, as in the examples of Crazyswarm2."""
+LOW_M = 0.1
+"""The least height of a waypoint."""
 LEAST_S = 2.0
 """The shortest duration of a take-off, a flight or a landing, in seconds."""
 END_S = 60.0
@@ -104,6 +106,7 @@ class Crazyswarm2Commander(Commander):
         landing = [name for name, one in known.items() if one.lands and name in self._places]
         self._plan_landing(landing)
         flown = {name: one.at for name, one in known.items() if not one.lands}
+        self._check_heights(flown)
         places = {name: at for name, at in self._places.items() if name not in landing}
         rising = {name: self._above(name) for name in flown if name not in places}
         try:
@@ -119,6 +122,13 @@ class Crazyswarm2Commander(Commander):
         for name, one in known.items():
             self.robots[name].target, self.robots[name].phase = one, RobotPhase.MOVING
             self.robots[name].sent_s = time.monotonic()
+
+    def _check_heights(self, places: Mapping[str, Point]) -> None:
+        """Raise `SinkError` for a place on the ground, such as those of lists with two coordinates."""
+        for name, (_, _, z) in places.items():
+            if z < LOW_M:
+                problem = f"{self.where}: the waypoint of {name} has the height {z:g} m, less than {LOW_M:g} m"
+                raise SinkError(on_one_line(f"{problem}; use places with a height; the decision is not flown"))
 
     def end(self) -> None:
         """Land all drones in the air, after the current step."""
@@ -139,7 +149,8 @@ class Crazyswarm2Commander(Commander):
         }
         missing = [name for name, space in found.items() if not space]
         if missing:
-            problem = f"{self._file}: no enabled robot is called {namespaces[missing[0]][1:]} or {missing[0]}"
+            names = " or ".join(dict.fromkeys((namespaces[missing[0]][1:], missing[0])))
+            problem = f"{self._file}: no enabled robot is called {names}"
             raise SinkError(on_one_line(f"{problem}; each drone of the team needs one"))
         return found
 

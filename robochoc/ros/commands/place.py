@@ -49,6 +49,10 @@ class CommandPlace(NamedTuple):
         except ValueError:
             problem = f"the options {shortened(options or '')!r} cannot be read"
             raise SinkError(on_one_line(f"{problem}; expected OPTION=VALUE&OPTION=VALUE")) from None
+        if len(dict(pairs)) < len(pairs):
+            raise SinkError(
+                on_one_line(f"the options {shortened(options or '')!r} have a duplicate; delete one of them")
+            )
         return cls(Path(file) if file else None, dict(pairs), middleware or _DDS)
 
     def number(self, name: str, usual: float, least: float, most: float) -> float:
