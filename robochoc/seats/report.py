@@ -21,7 +21,7 @@ from robochoc.system.lazy_dataclass import dataclass
 from robochoc.verification.checker import constraint_cost
 
 MOST_LISTED = 100
-"""The maximum number of breaches, lies and false claims that are listed for a robot."""
+"""The maximum number of breaches and of false claims that are listed for a robot."""
 
 
 @dataclass(frozen=True)
@@ -35,13 +35,21 @@ class FalseClaim:
 
 
 class SeatRecord:
-    """What the player of one robot did in a game."""
+    """The actions of the player of one robot in a game. Only the first breaches and false claims are kept."""
 
     def __init__(self) -> None:
         self.messages = self.bytes = self.texts = self.characters = self.claims = self.tokens = 0
         self.breaches: list[Breach] = []
+        self.broken_rules: Counter[str] = Counter()
         self.lies: list[int] = []
         self.false_claims: list[FalseClaim] = []
+        self.false_claims_total = 0
+
+    def breach(self, one: Breach) -> None:
+        """Count a breach. The first breach of each rule is always kept."""
+        if len(self.breaches) < MOST_LISTED or str(one.rule) not in self.broken_rules:
+            self.breaches.append(one)
+        self.broken_rules[str(one.rule)] += 1
 
     def sent(self, size: int) -> None:
         """Count a message of `size` bytes."""
@@ -64,16 +72,20 @@ class Ledger:
     def record(self, name: str, number: int, move: Move, *, lies: bool) -> None:
         """Record a move in round `number`. `lies`: the robot announced another value than it plays."""
         seat = self._seats[name]
-        seat.breaches += move.breaches
+        for one in move.breaches:
+            seat.breach(one)
         seat.tokens += move.tokens
         if lies:
             seat.lies.append(number)
 
     def record_claim(self, name: str, receiver: str, number: int, value: Value, cost: int, *, holds: bool) -> None:
         """Record a claim, which `holds` or not."""
-        self._seats[name].claims += 1
+        seat = self._seats[name]
+        seat.claims += 1
         if not holds:
-            self._seats[name].false_claims.append(FalseClaim(number, receiver, value, cost))
+            seat.false_claims_total += 1
+            if len(seat.false_claims) < MOST_LISTED:
+                seat.false_claims.append(FalseClaim(number, receiver, value, cost))
 
     def disclose(self, sender: str, receiver: str, message: Message) -> None:
         """Record a message for the measure of privacy. Repeated messages disclose nothing new."""
@@ -98,8 +110,10 @@ class SeatReport:
         claims: The claims among its messages.
         tokens: The tokens that its player reports to have used.
         lies: The rounds in which it announced another value than it played.
-        false_claims: Its claims that are not true.
-        breaches: The rules that it broke.
+        false_claims: Its first claims that are not true, at most `MOST_LISTED`.
+        false_claims_total: The number of its claims that are not true.
+        breaches: Its first breaches, at most `MOST_LISTED`, and the first breach of each rule.
+        broken_rules: How often it broke each rule.
         disclosed: The mean share of the bits of its private costs that its neighbours know after the game (EntropyTS),
             by kind of secret; None: not known, or no secret.
     """
@@ -117,13 +131,10 @@ class SeatReport:
     tokens: int
     lies: tuple[int, ...]
     false_claims: tuple[FalseClaim, ...]
+    false_claims_total: int
     breaches: tuple[Breach, ...]
+    broken_rules: Mapping[str, int]
     disclosed: Mapping[str, float | None]
-
-    @property
-    def broken_rules(self) -> Mapping[str, int]:
-        """How often the robot broke each rule."""
-        return Counter(str(one.rule) for one in self.breaches)
 
 
 @dataclass(frozen=True)
@@ -225,8 +236,10 @@ def report_of(
             claims=one.claims,
             tokens=one.tokens,
             lies=tuple(one.lies),
-            false_claims=tuple(one.false_claims[:MOST_LISTED]),
+            false_claims=tuple(one.false_claims),
+            false_claims_total=one.false_claims_total,
             breaches=tuple(one.breaches),
+            broken_rules=dict(one.broken_rules),
             disclosed=disclosed[name],
         )
 

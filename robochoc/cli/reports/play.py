@@ -12,9 +12,6 @@ from robochoc.model.cost_units import cost_shown
 from robochoc.seats.report import CoalitionReport, GameReport, SeatReport
 from robochoc.system.plain_text import counted, listed, on_one_line
 
-_MOST_NAMED = 5
-"""The maximum number of broken rules that are described for a robot."""
-
 
 def print_game(report: GameReport) -> None:
     """Print the result of the game, a table of the robots, and who lied or broke which rule."""
@@ -63,8 +60,8 @@ def _remarks(report: GameReport) -> Iterator[str]:
         if one.lies:
             rounds = listed(map(str, one.lies))
             yield f"{one.robot} lied: it announced another value than it played in {_rounds(len(one.lies))} {rounds}"
-        if one.false_claims:
-            yield f"{one.robot} made {counted(len(one.false_claims), 'false claim')} about its private costs"
+        if one.false_claims_total:
+            yield f"{one.robot} made {counted(one.false_claims_total, 'false claim')} about its private costs"
         for rule, times in one.broken_rules.items():
             details = next(breach.details for breach in one.breaches if breach.rule == rule)
             first = next(breach.round for breach in one.breaches if breach.rule == rule)
@@ -86,8 +83,6 @@ def _coalition(one: CoalitionReport) -> str:
 def game_json(report: GameReport) -> str:
     """Return the report as one JSON object (docs/reference/seats.md)."""
     fields = msgspec.to_builtins(report, str_keys=True, builtin_types=())
-    for one, seat in zip(fields["seats"], report.seats, strict=True):
-        one["broken_rules"] = dict(seat.broken_rules)
     for group, coalition in zip(fields["coalitions"], report.coalitions, strict=True):
         group["gains_at_others_expense"] = coalition.gains_at_others_expense
     return msgspec.json.Encoder(decimal_format="number").encode(fields).decode()

@@ -11,6 +11,7 @@ import pytest
 
 from robochoc.seats import GameOptions, GameReport, Limits, play
 from robochoc.seats.line_process import LINE_BYTES, ROUND_BYTES
+from robochoc.seats.report import MOST_LISTED
 from robochoc.solver.errors import UnsupportedError
 from tests.support.limits import HANG_S, wait_until
 from tests.support.seats import lamps, program
@@ -67,6 +68,20 @@ def test_the_budget_of_characters() -> None:
     report = game(program("move['say'] = [{'to': neighbours[0], 'text': 'x' * 100}]"), rounds=3)
     assert rules(report) == {"too-many": 2}
     assert (report["r1"].texts, report["r1"].characters) == (1, 100)
+
+
+def test_the_report_of_a_long_game_is_short_and_counts_everything() -> None:
+    body = """
+move['say'] = [{'to': neighbours[0], 'claim': {'value': values[0], 'cost': 1000 + number}}] * 2
+if number > 55: move['value'] = {}
+"""
+    seat = game(program(body), Limits(timeout_s=HANG_S, messages=1), rounds=120)["r1"]
+    assert dict(seat.broken_rules) == {"too-many": 120, "invalid-value": 65}
+    assert len(seat.breaches) == MOST_LISTED
+    assert (len(seat.false_claims), seat.false_claims_total) == (MOST_LISTED, 120)
+    last = game(program("if number < 150: move['round'] = 0.5\nelse: move['value'] = {}"), rounds=150)["r1"]
+    assert (last.breaches[-1].round, str(last.breaches[-1].rule)) == (150, "invalid-value")
+    assert len(last.breaches) == MOST_LISTED + 1
 
 
 @pytest.mark.parametrize("rounds", [1, 3])
