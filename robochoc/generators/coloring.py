@@ -68,10 +68,20 @@ def coloring(
         ValueError: There is no such graph. The message names the number to change.
     """
     check_bounds({"agents": (agents, 1, MAX_NODES), "colors": (colors, 1, MAX_VALUES)})
+    graph = random_graph_of(agents, degree, connected=connected)
+    return coloring_of(graph, colors, seed, conflicts=conflicts, max_cost=max_cost, places=places)
+
+
+def random_graph_of(agents: int, degree: float, *, connected: bool = False) -> Graph:
+    """Return a uniformly random graph with `degree` neighbours on average.
+
+    Raises:
+        ValueError: There is no such graph.
+    """
+    check_bounds({"agents": (agents, 1, MAX_NODES)})
     if not 0 <= degree <= agents - 1:
         raise ValueError(f"degree is {degree}; among {agents} robots it must be from 0 to {agents - 1}")
-    graph = uniform(agents, round(agents * degree / 2), str(float(degree)), connected=connected)
-    return coloring_of(graph, colors, seed, conflicts=conflicts, max_cost=max_cost, places=places)
+    return uniform(agents, round(agents * degree / 2), str(float(degree)), connected=connected)
 
 
 def coloring_of(

@@ -11,6 +11,7 @@ from functools import cache
 from types import MappingProxyType, UnionType
 from typing import Any, get_args, get_type_hints
 
+from robochoc.generators import agentsnet as agent_tasks
 from robochoc.generators import coloring as colorings
 from robochoc.generators import frequencies as frequency_assignments
 from robochoc.generators import ising as isings
@@ -19,6 +20,7 @@ from robochoc.generators import nary as nary_problems
 from robochoc.generators import queens3d as queens
 from robochoc.generators import random_csp as random_problems
 from robochoc.generators import sensors as sensor_networks
+from robochoc.generators import smart_grid as grids
 from robochoc.generators import smart_homes as lightings
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
@@ -98,6 +100,23 @@ def coloring(
         max_cost=max_cost,
         places=places,
     )
+
+
+def agentsnet(
+    *,
+    task: str,
+    agents: int | None = None,
+    graph: str = "random",
+    degree: float | None = None,
+    seed: int = 0,
+    **of_graph: Any,  # noqa: ANN401 - `GraphChoice`'s own
+) -> Team:
+    """Return a task of AgentsNet: see `generators/agentsnet.py`."""
+    drawn = GraphChoice(kind=graph, agents=agents, **of_graph)
+    on = drawn.graph("degree", degree)
+    if on is None:
+        on = colorings.random_graph_of(agents or 0, degree or 0, connected=drawn.connected)
+    return agent_tasks.agentsnet_on(on, task, seed)
 
 
 def meetings(  # noqa: PLR0913 - parameters of a family, by their names
@@ -206,6 +225,7 @@ def patrol(
 
 FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
     {
+        "agentsnet": agentsnet,
         "coloring": coloring,
         "coverage": coverage,
         "formation": formation,
@@ -218,6 +238,7 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "queens3d": queens.queens3d,
         "random": random,
         "sensors": sensor_networks.sensors,
+        "smart-grid": grids.smart_grid,
         "smart-homes": lightings.smart_homes,
         "tasks": tasks,
         "tracking": trackings.tracking,

@@ -14,7 +14,7 @@ import weakref
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from operator import itemgetter
 
 from robochoc.model.expression import UndefinedValueError
@@ -231,7 +231,8 @@ def _body(definition: Predicate | Function) -> Closure:
     key = id(definition)
     if key not in _bodies:
         body = compile_expression(definition.body, definition.parameters)
-        _bodies[key] = weakref.ref(definition, lambda _: _bodies.pop(key, None)), body
+        forget = partial(_bodies.pop, key)  # not a closure over the module, which is gone when the program ends
+        _bodies[key] = weakref.ref(definition, forget), body
     return _bodies[key][1]
 
 

@@ -12,6 +12,7 @@ from tests.support.program import ROOT
 OF_THE_COMMAND = {"output", "force", "help"}
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
 EXAMPLES: dict[str, dict[str, int | float | str]] = {
+    "agentsnet": {"task": "matching", "agents": 4, "degree": 2.0},
     "coloring": {"agents": 5, "degree": 2.0},
     "coverage": {"map": BUILDING, "agents": 2, "cells": 20},
     "formation": {"map": BUILDING, "agents": 2},
@@ -24,6 +25,7 @@ EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "queens3d": {"n": 2},
     "random": {"agents": 4, "domain": 2, "density": 0.5, "tightness": 0.5},
     "sensors": {"sensors": 4, "targets": 1},
+    "smart-grid": {"agents": 2},
     "smart-homes": {"agents": 3, "rules": 2},
     "tasks": {"agents": 2, "tasks": 2},
     "tracking": {"agents": 2, "targets": 1, "side": 3},

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import click
 
-from robochoc.cli.commands.generate.binary import coloring, ising, random_problem
+from robochoc.cli.commands.generate.binary import agentsnet, coloring, ising, random_problem
 from robochoc.cli.commands.generate.maps import coverage, formation, patrol
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
-from robochoc.cli.commands.generate.networks import frequencies, nary, smart_homes
+from robochoc.cli.commands.generate.networks import frequencies, nary, smart_grid, smart_homes
 from robochoc.cli.commands.generate.queens import queens3d
 from robochoc.cli.commands.generate.scenario import scenario
 
@@ -24,6 +24,7 @@ def generate() -> None:
 
 
 for family in (
+    agentsnet,
     coloring,
     coverage,
     formation,
@@ -37,6 +38,7 @@ for family in (
     random_problem,
     scenario,
     sensors,
+    smart_grid,
     smart_homes,
     tasks,
     tracking,

@@ -1,4 +1,4 @@
-"""`robochoc generate random`, `coloring` and `ising`: problems on graphs, with one robot per node."""
+"""`robochoc generate random`, `coloring`, `agentsnet` and `ising`: problems on graphs, with one robot per node."""
 
 from __future__ import annotations
 
@@ -125,6 +125,36 @@ def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
 
     graph = pop_graph(problem, "degree")
     return graph_to_color(**problem) if graph is None else coloring_of(graph, **problem)
+
+
+@click.command(
+    cls=SectionedCommand,
+    sections={COMMON: ("--task", "--agents", "--graph", "--degree"), "Graph": GRAPH, "Output": OUTPUT},
+    short_help="AgentsNet: tasks for teams of language-model agents.",
+)
+@click.option(
+    "--task",
+    type=click.Choice(["coloring", "vertex-cover", "matching", "leader-election", "consensus"]),
+    required=True,
+    help="The problem that the robots solve.",
+)
+@graph_options
+@click.option("--degree", type=Finite(), metavar="D", help="random: average number of neighbours.")
+@seed_option
+@writes_team("agentsnet-TASK-AGENTS-GRAPH-SEED[-connected]")
+def agentsnet(**problem: Any) -> Team:  # noqa: ANN401 - `agentsnet`'s own
+    """The tasks of AgentsNet (Groetschla et al. 2025) on a graph: robots talk to their neighbours only.
+
+    A vertex cover is a DCOP, in which each coordinator costs 1; the other tasks are DisCSPs. Robot3 has the variable
+    V3.
+
+    \b
+    robochoc generate agentsnet --task matching --agents 16 --graph small-world
+    robochoc generate agentsnet --task consensus --agents 100 --graph scale-free
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.families import agentsnet as task_on_graph
+
+    return task_on_graph(**problem)
 
 
 @click.command(short_help="Ising models: spins on a torus, real couplings.")

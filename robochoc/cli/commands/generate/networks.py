@@ -1,4 +1,4 @@
-"""`robochoc generate nary`, `frequencies` and `smart-homes`: constraints of several robots, radio links and lamps."""
+"""`robochoc generate nary`, `frequencies`, `smart-homes` and `smart-grid`: links, lamps and devices of homes."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.generate import number_option, seed_option, share_option, writes_team
+from robochoc.cli.options.generate import OUTPUT, number_option, seed_option, share_option, writes_team
+from robochoc.cli.options.sections import COMMON, SectionedCommand
 from robochoc.cli.options.value_types import WholeNumber
 
 if TYPE_CHECKING:
@@ -87,3 +88,35 @@ def smart_homes(**problem: Any) -> Team:  # noqa: ANN401 - `smart_homes`'s own
     from robochoc.generators.smart_homes import smart_homes as lighting
 
     return lighting(**problem)
+
+
+@click.command(
+    "smart-grid",
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--devices", "--slots"),
+        "Devices": ("--window", "--duration", "--consumption", "--supply"),
+        "Output": OUTPUT,
+    },
+    short_help="Smart grid: homes share sustainable energy.",
+)
+@number_option("--agents", "Number of homes.")
+@number_option("--devices", "Number of devices of a home.", most=10, default=2)
+@number_option("--slots", "Number of time slots.", least=2, default=24)
+@number_option("--window", "Number of slots in which a device can start.", default=3)
+@number_option("--duration", "Maximum number of slots for which a device runs.", default=3)
+@number_option("--consumption", "Maximum consumption of a device in a slot.", most=MAX_COST, default=30)
+@number_option("--supply", "Largest sustainable energy in a slot.", least=0, most=MAX_COST, default=40)
+@seed_option
+@writes_team("smart-grid-AGENTS-DEVICES-SLOTS-WINDOW-DURATION-CONSUMPTION-SUPPLY-SEED")
+def smart_grid(**problem: Any) -> Team:  # noqa: ANN401 - `smart_grid`'s own
+    """Smart grid (CoLLAB; Mahmud et al. 2025): homes start devices so that little energy exceeds the sustainable one.
+
+    A value is the slot in which a device starts. The cost of a slot is the consumption above its supply.
+
+    \b
+    robochoc generate smart-grid --agents 5
+    """  # noqa: D301 - \\b keeps click from wrapping the lines
+    from robochoc.generators.smart_grid import smart_grid as grid
+
+    return grid(**problem)
