@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field
 
@@ -78,7 +78,7 @@ def play(team: Team, options: GameOptions, recorder: JournalRecorder | None = No
         UnknownProtocolError: if the protocol that certifies the optimum is not known.
         UnsupportedError: if the options do not fit each other or the team.
     """
-    _refuse_options(team, options)
+    refuse_options(team, options)
     optimum = None if options.optimum is None else certified_optimum(team, options.optimum)
     game = Game(team, options, optimum, recorder)
     report = game.play()
@@ -100,29 +100,52 @@ class Game:
         options: The options, which fit the team.
         optimum: The certified optimum; None if it is not computed.
         observer: Receives the events of the game, in which times are numbers of rounds.
+        seat: Players of the caller, besides those in the options.
+
+    Attributes:
+        rounds: The state of the team.
+        report: The report; None before the end of the game.
     """
 
     def __init__(
-        self, team: Team, options: GameOptions, optimum: Optimum | None = None, observer: Observer | None = None
+        self,
+        team: Team,
+        options: GameOptions,
+        optimum: Optimum | None = None,
+        observer: Observer | None = None,
+        seat: Players | None = None,
     ) -> None:
         self._team, self._options, self._optimum = team, options, optimum
-        self._observer = observer
+        self._observer, self._seat = observer, seat
+        self.report: GameReport | None = None
         self.rounds = TeamRounds(team)
         self._ledger = Ledger([*self.rounds.problems])
         self._heard: dict[str, list[Delivery]] = {name: [] for name in self.rounds.problems}
 
     def play(self) -> GameReport:
         """Play all rounds, and return the report."""
+        for _ in self.turns():
+            pass
+        assert self.report is not None  # noqa: S101 - for mypy: all rounds are over
+        return self.report
+
+    def turns(self) -> Generator[Mapping[str, Seen], None, None]:
+        """Play round by round: before each round, yield what the players of all robots learn before their moves.
+
+        All programs end when the last round is over, or the iterator is closed.
+        """
         with self._seated() as players:
             self._report_start()  # not before: a refused game does not overwrite a journal
             for number in range(1, self._options.rounds + 1):
-                self._play_round(number, players)
+                seen = {name: Seen(number, self.rounds.view(name), self._heard[name]) for name in self.rounds.problems}
+                yield seen
+                self._play_round(seen, players)
             for one in players:
                 one.end(self.rounds)
             kinds = {name: one.kind for one in players for name in one.robots}
         outside = tuple(self._options.commands)
         coalitions = [*self._options.coalitions, *([outside] if len(outside) > 1 else [])]
-        return report_of(self._team, self.rounds, self._ledger, kinds, self._optimum, coalitions)
+        self.report = report_of(self._team, self.rounds, self._ledger, kinds, self._optimum, coalitions)
 
     def outcome(self) -> Outcome:
         """Return the result of the game, for the journal."""
@@ -141,11 +164,12 @@ class Game:
     def _seated(self) -> Iterator[list[Players]]:
         """Provide the players, and end all programs at the end of the block."""
         options, robots = self._options, self.rounds.problems
-        players: list[Players] = []
+        players: list[Players] = [] if self._seat is None else [self._seat]
+        taken = {*options.commands, *(name for one in players for name in one.robots)}
         try:
             protocols: dict[str, list[str]] = {}
             for name in robots:
-                if name in options.commands:
+                if name in taken:
                     continue
                 chosen = options.players.get(name, options.others)
                 with refused_as_player([name]):
@@ -177,9 +201,9 @@ class Game:
             return ScriptedPlayer(self.rounds, name, _indices(name, chosen.removeprefix(_SCRIPT)))
         return None
 
-    def _play_round(self, number: int, players: Iterable[Players]) -> None:
+    def _play_round(self, seen: Mapping[str, Seen], players: Iterable[Players]) -> None:
         """Let all players move, then announce their values and deliver their messages."""
-        seen = {name: Seen(number, self.rounds.view(name), self._heard[name]) for name in self.rounds.problems}
+        number = next(iter(seen.values())).round
         self._heard = {name: [] for name in self.rounds.problems}
         moves: dict[str, Move] = {}
         for one in players:
@@ -259,7 +283,7 @@ def _indices(name: str, text: str) -> list[int]:
         raise UnsupportedError(f"the script of {name} is {text!r}; write indices of values, such as 0,2,1") from None
 
 
-def _refuse_options(team: Team, options: GameOptions) -> None:
+def refuse_options(team: Team, options: GameOptions) -> None:
     """Raise `UnsupportedError` if the options do not fit each other or the team."""
     named = {*options.commands, *options.players, *(name for group in options.coalitions for name in group)}
     if missing := sorted(named - {*team.order}):

@@ -15,13 +15,15 @@ from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
+    from robochoc.journal.recorder import JournalRecorder
+    from robochoc.model.problem import Team
     from robochoc.seats import GameOptions, GameReport
 
 MOST_ROUNDS = 1_000_000
 """The limit in `seats/game.py`, repeated here because that module is not imported at the start."""
 
 _SECTIONS: Sections = {
-    COMMON: ("--seat", "--player", "--others", "--rounds", "--seed", "--journal", "--json", "--help"),
+    COMMON: ("--seat", "--mcp", "--player", "--others", "--rounds", "--seed", "--journal", "--json", "--help"),
     "Limits on programs": ("--timeout", "--texts", "--characters"),
     "Evaluation": ("--optimum", "--coalition"),
 }
@@ -32,6 +34,10 @@ _SECTIONS: Sections = {
 @click.option(
     "--seat", "seats", multiple=True, metavar="ROBOT=COMMAND",
     help="Let a program play ROBOT. It reads and writes JSON lines.",
+)  # fmt: skip
+@click.option(
+    "--mcp", metavar="ROBOT",
+    help="Let an MCP client play ROBOT over standard input and output, without a time limit.",
 )  # fmt: skip
 @click.option(
     "--player", "players", multiple=True, metavar="ROBOT=PLAYER",
@@ -69,6 +75,7 @@ def play(  # noqa: PLR0913 - options, by name
     team: Path,
     *,
     seats: tuple[str, ...],
+    mcp: str | None,
     players: tuple[str, ...],
     others: str,
     rounds: int,
@@ -91,11 +98,14 @@ def play(  # noqa: PLR0913 - options, by name
     \b
     robochoc play out/team --others random                a baseline
     robochoc play out/team --seat r1='python agent.py'    a program among robots of DSA
+    robochoc play out/team --mcp r1                       a seat for an MCP client
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.formats import on_one_line, read_team
     from robochoc.seats import GameOptions, Limits, header_of, play
     from robochoc.seats.moves import PlayerError
 
+    if mcp and as_json:
+        raise Failure(USAGE, "--mcp cannot be used with --json: the client receives the report")
     refuse_same_places({"--journal": journal}, teams=(team,))
     commands = {name: _words(name, text) for name, text in _pairs("--seat", seats).items()}
     options = GameOptions(
@@ -112,11 +122,29 @@ def play(  # noqa: PLR0913 - options, by name
     with recording(journal, lambda: header_of(problem, options)) as recorder:
         with errors_as_failures(team):
             try:
+                if mcp:
+                    _serve(problem, mcp, options, recorder)
+                    return
                 report = play(problem, options, recorder)
             except PlayerError as refused:
                 place = _option(refused.robots[0], options)
                 raise Failure(USAGE, on_one_line(f"{place}: {refused.reason}")) from refused
         _print(report, as_json=as_json)
+
+
+def _serve(team: Team, robot: str, options: GameOptions, recorder: JournalRecorder | None) -> None:
+    """Let an MCP client play `robot`, until it closes the connection. The report also goes to standard error."""
+    from robochoc.cli.reports.play import game_lines
+    from robochoc.seats.mcp_server import seat_server
+    from robochoc.seats.seat_game import SeatGame
+
+    game = SeatGame(team, robot, options, recorder)
+    try:
+        seat_server(game, options.limits, game_lines).run()
+    finally:
+        game.close()
+    for line in game_lines(game.report) if game.report else ("the client left before the end of the game",):
+        click.echo(line, err=True)
 
 
 def _print(report: GameReport, *, as_json: bool) -> None:

@@ -14,14 +14,20 @@ from robochoc.system.plain_text import counted, listed, on_one_line
 
 
 def print_game(report: GameReport) -> None:
-    """Print the result of the game, a table of the robots, and who lied or broke which rule."""
-    click.echo(on_one_line(f"{report.team}: {counted(report.rounds, 'round')}, {_result(report)}"))
+    """Print the lines of `game_lines`."""
+    for line in game_lines(report):
+        click.echo(line)
+
+
+def game_lines(report: GameReport) -> Iterator[str]:
+    """Yield the result of the game, a table of the robots, and who lied or broke which rule."""
+    yield on_one_line(f"{report.team}: {counted(report.rounds, 'round')}, {_result(report)}")
     titles = ["robot", "player", "value", "regret", "messages", "texts", "tokens", "disclosed"]
     rows = [_row(one) for one in report.seats]
     for line in table_lines(titles, rows, right=titles[3:]):
-        click.echo(on_one_line(f"  {line}"))
+        yield on_one_line(f"  {line}")
     for line in (*_remarks(report), *map(_coalition, report.coalitions)):
-        click.echo(on_one_line(f"  {line}"))
+        yield on_one_line(f"  {line}")
 
 
 def _result(report: GameReport) -> str:

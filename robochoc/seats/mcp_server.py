@@ -1,0 +1,158 @@
+"""A seat for an MCP client: it plays one robot of a team through tools, over standard input and output.
+
+The package `mcp` is an extra and is imported when a server is made. robochoc calls no language model: the client does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from functools import wraps
+from threading import Lock
+from typing import TYPE_CHECKING
+
+from robochoc.seats.moves import Limits
+from robochoc.seats.report import GameReport
+from robochoc.seats.seat_game import SeatGame, value_text
+from robochoc.solver.errors import UnsupportedError
+
+if TYPE_CHECKING:
+    from mcp.server.mcpserver import MCPServer
+
+MOST_TOKENS = 1 << 53
+
+
+class SeatTools:
+    """The tools of a seat. Values are numbered from 1, in the order of the problem.
+
+    Args:
+        game: The game.
+        limits: The limits on the player.
+        described: Returns the lines of a report.
+    """
+
+    def __init__(self, game: SeatGame, limits: Limits, described: Callable[[GameReport], Iterable[str]]) -> None:
+        self._game, self._limits, self._described = game, limits, described
+        self._lock = Lock()  # tools run in threads
+        self._value: int | None = None
+        self._announce: int | None = None
+        self._texts: list[tuple[str, str]] = []
+
+    def see_problem(self) -> str:
+        """Return your robot's problem in words: its values with their private costs, its neighbours and the rules."""
+        game, limits = self._game, self._limits
+        pairs = zip(game.values, game.private_costs, strict=True)
+        values = [f"{at}. {value_text(one)} (private cost {cost:g})" for at, (one, cost) in enumerate(pairs, 1)]
+        rounds = (
+            f"The game has {game.rounds} rounds. In each, all robots choose a value at the same time, and announce it"
+            " to their neighbours. The values in the last round are the result."
+        )
+        texts = (
+            f"You may send {limits.messages} texts in a round, of {limits.characters_each:,} characters each and"
+            f" {limits.characters:,} together in the game."
+        )
+        neighbours = f"Your neighbours: {', '.join(game.neighbours) or 'none'}."
+        return "\n".join([game.problem, "", "Your values:", *values, "", neighbours, rounds, texts])
+
+    def see_messages(self) -> str:
+        """Return the values that your neighbours announced, their texts, and what each of your values would cost."""
+        with self._lock:
+            return "\n".join(self._state())
+
+    def _state(self) -> Iterator[str]:
+        game = self._game
+        if game.report is not None:
+            yield "The game is over."
+            yield from self._described(game.report)
+            return
+        yield f"Round {game.round} of {game.rounds}."
+        for name, value in game.announced.items():
+            yield f"{name} announced {value_text(value)}."
+        for name, text in game.messages:
+            yield f"{name} says: {text}"
+        yield "If these values stay, your values cost:"
+        for number, (broken, cost) in enumerate(game.costs(), 1):
+            rules = f", {broken} broken rules" if broken else ""
+            yield f"{number}. {value_text(game.values[number - 1])}: {cost:g}{rules}"
+
+    def propose(self, value: int, announce: int | None = None) -> str:
+        """Choose a value for this round, by its number. Your neighbours see `announce`, if you give it, else the value.
+
+        Announcing another value than yours is a lie, which the report names. You may choose again before `end_turn`.
+        """
+        with self._lock:
+            self._refuse_after_the_end()
+            chosen = self._index(value)
+            self._announce = None if announce is None else self._index(announce)
+            self._value = chosen
+            return f"You play {value_text(self._game.values[chosen])} in round {self._game.round}. Now end your turn."
+
+    def say(self, to: str, text: str) -> str:
+        """Send a text to a neighbour. It arrives before the next round."""
+        with self._lock:
+            self._refuse_after_the_end()
+            if to not in self._game.neighbours:
+                raise UnsupportedError(
+                    f"{to!r:.100} is not a neighbour: choose one of {', '.join(self._game.neighbours)}"
+                )
+            if len(self._texts) >= self._limits.messages:
+                raise UnsupportedError(f"you have sent {self._limits.messages} texts in this round: end your turn")
+            if len(text) > self._limits.characters_each:
+                raise UnsupportedError(f"the text has {len(text):,} characters: send {self._limits.characters_each:,}")
+            self._texts.append((to, text))
+            return f"{to} receives the text before the next round."
+
+    def end_turn(self, tokens: int = 0) -> str:
+        """End your turn. Return what you see in the next round, or the report of the game after the last round.
+
+        `tokens` is the number of tokens that you used in this turn, for the report. If you have not chosen a value, you
+        keep your last one.
+        """
+        with self._lock:
+            self._refuse_after_the_end()
+            broken = self._game.play(self._value, self._announce, self._texts, min(max(tokens, 0), MOST_TOKENS))
+            self._value = self._announce = None
+            self._texts = []
+            return "\n".join([*(f"Broken rule: {one.rule} {one.details}" for one in broken), *self._state()])
+
+    def _refuse_after_the_end(self) -> None:
+        if self._game.report is not None:
+            raise UnsupportedError("the game is over")
+
+    def _index(self, number: int) -> int:
+        if not 1 <= number <= len(self._game.values):
+            raise UnsupportedError(f"there is no value {number}: choose a number from 1 to {len(self._game.values)}")
+        return number - 1
+
+
+def seat_server(game: SeatGame, limits: Limits, described: Callable[[GameReport], Iterable[str]]) -> MCPServer:
+    """Return an MCP server with the tools of a seat; for the arguments see `SeatTools`.
+
+    Raises:
+        UnsupportedError: if the package `mcp` is not installed.
+    """
+    try:
+        from mcp.server.mcpserver import MCPServer  # noqa: PLC0415 - an extra
+        from mcp.server.mcpserver.exceptions import ToolError  # noqa: PLC0415
+    except ImportError:
+        raise UnsupportedError("a seat for MCP clients requires mcp: run pip install 'robochoc[mcp]'") from None
+    tools = SeatTools(game, limits, described)
+    server = MCPServer(
+        "robochoc",
+        instructions=f"You play the robot {game.robot}. Call see_problem first. In each round, call see_messages,"
+        " propose a value, say something if you like, and call end_turn.",
+        log_level="ERROR",
+    )
+
+    def refusing(tool: Callable[..., str]) -> Callable[..., str]:
+        @wraps(tool)
+        def call(*arguments: object, **named: object) -> str:
+            try:
+                return tool(*arguments, **named)
+            except UnsupportedError as refused:
+                raise ToolError(str(refused)) from None
+
+        return call
+
+    for tool in (tools.see_problem, tools.see_messages, tools.propose, tools.say, tools.end_turn):
+        server.tool()(refusing(tool))
+    return server
