@@ -102,7 +102,7 @@ class SeatTools:
             return f"{to} receives the text before the next round."
 
     def end_turn(self, tokens: int = 0) -> str:
-        """End your turn. Return what you see in the next round, or the report of the game after the last round.
+        """End your turn. Return the state of the next round or, after the last round, the report of the game.
 
         `tokens` is the number of tokens that you used in this turn, for the report. If you have not chosen a value, you
         keep your last one.
