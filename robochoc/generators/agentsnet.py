@@ -70,7 +70,7 @@ def agentsnet_on(graph: Graph, task: Task | str, seed: int = 0) -> Team:
     task = member(Task, "task", task)
     edges = graph.draw(seeded(seed))
     if task in _GLOBAL and not links_all(edges, graph.agents):
-        raise ValueError(f"the graph is not connected, but {task} requires it: use another seed, or --connected")
+        raise ValueError(f"the graph is not connected, but {task} requires it: use another seed or graph")
     values, constraints = _PARTS[task](graph.agents, edges)
     return assemble(
         f"agentsnet-{task}-{graph.agents}-{graph.label}-{seed}{graph.suffix}",
