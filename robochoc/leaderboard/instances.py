@@ -20,6 +20,7 @@ from robochoc.system.suggestions import did_you_mean
 SET_VERSION = 1
 """The version of the set. It changes whenever an instance changes."""
 SIZES = ("small",)
+"""The published sizes. A further size needs its parameters in each family, and certificates (`make benchmark-set`)."""
 SEEDS = 10
 """The number of instances of each family and size."""
 CP_SAT, TOULBAR2, COSOCO, DPOP = "ortools", "toulbar2", "cosoco", "dpop"
@@ -56,12 +57,6 @@ class BenchmarkFamily:
     has_seeds: bool = True
 
 
-def _sizes(name: str, *values: Parameter, **others: tuple[Parameter, ...]) -> Mapping[str, Mapping[str, Parameter]]:
-    """Return the parameters of each size: those called `name` and the others each have a value for each size."""
-    columns = {name: values, **others}
-    return {size: {key: column[place] for key, column in columns.items()} for place, size in enumerate(SIZES)}
-
-
 FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
     {
         "random": BenchmarkFamily(
@@ -69,7 +64,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Model B: Prosser, AIJ 81, 1996; Gent et al., Constraints 6, 2001",
             "random",
             {"domain": 5, "max_cost": 100},
-            _sizes("agents", 10, 20, 30, density=(0.4, 0.25, 0.15)),
+            {"small": {"agents": 10, "density": 0.4}},
             (TOULBAR2, DPOP),
         ),
         "nary": BenchmarkFamily(
@@ -77,7 +72,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Model RB: Xu and Li, JAIR 12, 2000",
             "nary",
             {"domain": 3, "arity": 3, "max_cost": 100},
-            _sizes("agents", 10, 20, 30, constraints=(10, 20, 28)),
+            {"small": {"agents": 10, "constraints": 10}},
             (TOULBAR2, DPOP),
         ),
         "scale-free": BenchmarkFamily(
@@ -85,7 +80,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Barabási and Albert, Science 286, 1999",
             "random",
             {"graph": "scale-free", "domain": 4, "max_cost": 100},
-            _sizes("agents", 12, 20, 40),
+            {"small": {"agents": 12}},
             (TOULBAR2, DPOP),
         ),
         "small-world": BenchmarkFamily(
@@ -93,7 +88,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Watts and Strogatz, Nature 393, 1998",
             "random",
             {"graph": "small-world", "domain": 4, "max_cost": 100},
-            _sizes("agents", 12, 24, 40),
+            {"small": {"agents": 12}},
             (TOULBAR2, DPOP),
         ),
         "coloring-weighted": BenchmarkFamily(
@@ -101,7 +96,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Koljonen et al., SASO 2010",
             "coloring",
             {"colors": 3, "conflicts": "weighted", "max_cost": 100},
-            _sizes("agents", 12, 24, 36, degree=(5.0, 5.0, 5.0)),
+            {"small": {"agents": 12, "degree": 5.0}},
             (TOULBAR2, DPOP),
         ),
         "coloring-hard": BenchmarkFamily(
@@ -109,56 +104,56 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Yokoo et al., TKDE 10, 1998",
             "coloring",
             {"colors": 3, "conflicts": "hard", "degree": 4.2},
-            _sizes("agents", 20, 40, 60),
+            {"small": {"agents": 20}},
         ),
         "meetings": BenchmarkFamily(
             "Meeting scheduling",
             "Maheswaran et al., AAMAS 2004",
             "meetings",
             {"model": "peav"},
-            _sizes("agents", 5, 10, 15, meetings=(5, 10, 18), slots=(4, 6, 8)),
+            {"small": {"agents": 5, "meetings": 5, "slots": 4}},
         ),
         "sensors": BenchmarkFamily(
             "Sensor networks",
             "Béjar et al., AIJ 161, 2005",
             "grid-sensors",
             {"model": "sensors"},
-            _sizes("rows", 4, 6, 8, columns=(4, 6, 8), targets=(3, 7, 10)),
+            {"small": {"rows": 4, "columns": 4, "targets": 3}},
         ),
         "tracking": BenchmarkFamily(
             "Target tracking",
             "Zivan et al., JAAMAS 29, 2015",
             "tracking",
             {},
-            _sizes("agents", 6, 12, 20, targets=(5, 10, 16), side=(8, 12, 16)),
+            {"small": {"agents": 6, "targets": 5, "side": 8}},
         ),
         "smart-homes": BenchmarkFamily(
             "Smart lighting",
             "Rust et al., IJCAI 2016",
             "smart-homes",
             {"levels": 4},
-            _sizes("agents", 9, 16, 24, rules=(6, 11, 16)),
+            {"small": {"agents": 9, "rules": 6}},
         ),
         "frequencies": BenchmarkFamily(
             "Frequency assignment",
             "Cabon et al., Constraints 4, 1999",
             "frequencies",
             {},
-            _sizes("agents", 10, 20, 30, frequencies=(4, 5, 5), distance=(40, 35, 30)),
+            {"small": {"agents": 10, "frequencies": 4, "distance": 40}},
         ),
         "tasks": BenchmarkFamily(
             "Task allocation",
             "Gerkey and Matarić, IJRR 23, 2004",
             "tasks",
             {"skills": 2},
-            _sizes("agents", 6, 12, 16, tasks=(6, 12, 16)),
+            {"small": {"agents": 6, "tasks": 6}},
         ),
         "queens3d": BenchmarkFamily(
             "Queens in three dimensions",
             "the paper of the platform, Section 5.1",
             "queens3d",
             {},
-            _sizes("n", 3, 4, 5),
+            {"small": {"n": 3}},
             has_seeds=False,
         ),
         "dynamic": BenchmarkFamily(
@@ -166,7 +161,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Yeoh et al., AAMAS 2011",
             "random",
             {"domain": 4, "max_cost": 100},
-            _sizes("agents", 8, 14, 20, density=(0.4, 0.3, 0.2)),
+            {"small": {"agents": 8, "density": 0.4}},
             (TOULBAR2, DPOP),
             events=4,
         ),
@@ -175,7 +170,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Grinshpoun et al., JAIR 47, 2013",
             "random",
             {"domain": 4, "max_cost": 100, "asymmetric": True},
-            _sizes("agents", 8, 12, 16, density=(0.4, 0.3, 0.25)),
+            {"small": {"agents": 8, "density": 0.4}},
             (TOULBAR2, COSOCO),
         ),
         "privacy": BenchmarkFamily(
@@ -183,7 +178,7 @@ FAMILIES: Mapping[str, BenchmarkFamily] = MappingProxyType(
             "Greenstadt, Pearce and Tambe, AAAI 2006",
             "meetings",
             {"model": "eav"},
-            _sizes("agents", 5, 8, 12, meetings=(5, 8, 12), slots=(4, 5, 6)),
+            {"small": {"agents": 5, "meetings": 5, "slots": 4}},
             measures_privacy=True,
         ),
     }

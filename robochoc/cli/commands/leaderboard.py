@@ -204,7 +204,8 @@ def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | No
         runs = selected(found.runs, None if everything else rerun)
         faults = [*wrong_answers(found), *changed_runs(found, runs, jobs or usable_processors())]
     _fail(results, faults)
-    click.echo(f"{results}: {len(found.runs):,} answers are right; {len(runs):,} repeated runs gave the same results")
+    repeated = f"; {len(runs):,} repeated runs gave the same results" if runs else ""
+    click.echo(f"{results}: {len(found.runs):,} answers are right{repeated}")
 
 
 @leaderboard.command(short_help="Add results to a board.")
