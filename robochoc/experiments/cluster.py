@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -53,7 +54,9 @@ class ClusterWorkers:
 
     def _submit(self, task: Task) -> Future:
         content = msgspec.json.encode(task)
-        return self._tasks.client.submit(run_one, content, files_of(task), key=f"robochoc-{task.key}", pure=False)
+        path = task.problem.path
+        files = files_of(Path(path)) if path else {}
+        return self._tasks.client.submit(run_one, content, files, key=f"robochoc-{task.key}", pure=False)
 
 
 def _row(future: Future) -> Row:

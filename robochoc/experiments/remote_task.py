@@ -15,14 +15,21 @@ from robochoc.system.temporary_files import PrivateFolder
 _KEPT = threading.local()
 
 
-def files_of(task: Task) -> dict[str, bytes]:
-    """Return the contents of the files of a task's problem, by name; empty if the problem is generated."""
-    path = Path(task.problem.path)
-    if not task.problem.path:
-        return {}
+def files_of(path: Path) -> dict[str, bytes]:
+    """Return the contents of the file or folder of a problem, by name."""
     if path.is_file():
         return {path.name: path.read_bytes()}
     return {str(one.relative_to(path)): one.read_bytes() for one in sorted(path.rglob("*")) if one.is_file()}
+
+
+def write_files(files: Mapping[str, bytes], folder: Path, name: str) -> Path:
+    """Write the files of a problem with this name into a folder on a worker, and return its path."""
+    path = folder / name
+    for file, content in files.items():
+        target = path if [*files] == [name] else path / file
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(content)
+    return path
 
 
 def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
@@ -36,14 +43,8 @@ def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
     if not files:
         return msgspec.json.encode(_bench().run(task))
     with PrivateFolder() as folder:
-        name = Path(task.problem.path).name
-        single = len(files) == 1 and name in files
-        place = Path(folder) if single else Path(folder) / name
-        for file, held in files.items():
-            target = place / file
-            target.parent.mkdir(parents=True, exist_ok=True)
-            target.write_bytes(held)
-        here = msgspec.structs.replace(task.problem, path=str(place / name if single else place))
+        path = write_files(files, Path(folder), Path(task.problem.path).name)
+        here = msgspec.structs.replace(task.problem, path=str(path))
         return msgspec.json.encode(_bench().run(msgspec.structs.replace(task, problem=here)))
 
 

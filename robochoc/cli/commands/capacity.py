@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from robochoc.cli.options.cluster import cluster_option, on_cluster
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.value_types import Number, ProtocolName, Seed
-from robochoc.cli.reports.failures import LIMIT, Failure, errors_as_failures, invalid_input_fails
+from robochoc.cli.reports.failures import LIMIT, LOST, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
+    from robochoc.experiments.capacity.machines import Machine
     from robochoc.experiments.capacity.measurement import Step
     from robochoc.experiments.capacity.search import Capacity
 
@@ -46,6 +48,7 @@ _HEADINGS = ("robots", "variables", "decisions/s", "messages/s", "messages", "Mi
     metavar="SECONDS",
     help="The longest time for all measurements.",
 )
+@cluster_option
 @click.option("--seed", type=Seed(), default=0, show_default=True, metavar="N", help="Random seed.")
 @click.option("--json", "as_json", is_flag=True, help="Print the measurements as JSON.")
 @invalid_input_fails
@@ -55,6 +58,7 @@ def capacity(
     runtime: str,
     deadline: float,
     timeout: float,
+    cluster: str | None,
     seed: int,
     *,
     as_json: bool,
@@ -67,6 +71,7 @@ def capacity(
 
     \b
     robochoc capacity tasks.yaml
+    robochoc capacity tasks.yaml --cluster cluster.json  # each of its machines
     robochoc capacity instances/queens3d-4 --runtime simulator --deadline 1
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.progress import progress_line
@@ -75,8 +80,13 @@ def capacity(
     from robochoc.experiments.capacity.search import find_capacity
     from robochoc.run.options import Options
 
-    name = paths[0].name or str(paths[0])
-    with errors_as_failures(paths[0]), progress_line(name) as progress:
+    names = ", ".join(map(str, paths))
+    if cluster is not None:
+        words = ["--protocol", protocol, "--runtime", runtime, "--deadline", str(deadline), "--seed", str(seed)]
+        with errors_as_failures(names), on_cluster(cluster):
+            _measure_machines(cluster, paths, words, timeout, as_json=as_json)
+        return
+    with errors_as_failures(names), progress_line(paths[0].name or str(paths[0])) as progress:
         found = find_capacity(
             growth_of(paths),
             Options(protocol, runtime, seed),  # type: ignore[arg-type]  # converted and checked
@@ -94,8 +104,46 @@ def capacity(
     if not found.robots:
         if found.limit == Limit.TIME:
             why = f"could not be measured within --timeout {timeout:g} s; use a longer --timeout"
-            raise Failure(LIMIT, f"{paths[0]}: {why}")
-        raise Failure(LIMIT, f"{paths[0]}: the given problem is too large: {found.limit}: {found.why}")
+            raise Failure(LIMIT, f"{names}: {why}")
+        problem = "the given problem" if len(paths) == 1 else "the smallest of the given problems"
+        raise Failure(LIMIT, f"{names}: {problem} is too large: {found.limit}: {found.why}")
+
+
+def _measure_machines(
+    cluster: str, paths: tuple[Path, ...], words: list[str], timeout: float, *, as_json: bool
+) -> None:
+    """Print the capacity of each machine of a cluster. Raises `Failure` if a machine has no result."""
+    from robochoc.experiments.capacity.growth import check_is_complete, growth_of
+
+    growth = growth_of(paths)
+    check_is_complete(paths)
+    from robochoc.experiments.capacity.machines import measure_machines
+
+    machines = measure_machines(cluster, paths, words, timeout)
+    if as_json:
+        import msgspec
+
+        click.echo(msgspec.json.format(msgspec.json.encode({"machines": machines}), indent=2).decode())
+    else:
+        from robochoc.cli.reports.table import print_table
+
+        click.echo(f"grown: {growth.text}")
+        print_table(("machine", *_HEADINGS, "limit"), [_machine_row(one) for one in machines], right=_HEADINGS)
+    for one in machines:
+        if one.capacity is None:
+            raise Failure(LOST, f"{one.host}: {one.error}")
+        if not one.capacity.robots:
+            raise Failure(LIMIT, f"{one.host}: the given problem is too large: {one.capacity.why}")
+
+
+def _machine_row(one: Machine) -> tuple[str, ...]:
+    """Return the row of the largest size that a machine holds."""
+    if one.capacity is None:
+        return (one.host, *("-" for _ in _HEADINGS), one.error)
+    found = one.capacity
+    solved = [step for step in found.steps if step.limit is None]
+    row = _row(max(solved, key=lambda step: step.robots)) if solved else ("0", *("-" for _ in _HEADINGS[1:]))
+    return (one.host, *row, f"{found.limit} ({found.why})" if found.limit else "none was met")
 
 
 def _report(step: Step) -> None:

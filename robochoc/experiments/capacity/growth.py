@@ -67,9 +67,19 @@ def _constant_team(path: Path) -> Team:
 
 
 def _is_task_list(path: Path) -> bool:
+    return {"robots", "tasks"} <= _sections_of(path)
+
+
+def _sections_of(path: Path) -> set[str]:
     with as_input_errors(path):
-        found = sections(read_content(path, LIST_BYTES_MAX).decode("utf-8", "replace").lstrip("\ufeff"))
-    return {"robots", "tasks"} <= found
+        return sections(read_content(path, LIST_BYTES_MAX).decode("utf-8", "replace").lstrip("\ufeff"))
+
+
+def check_is_complete(paths: Sequence[Path]) -> None:
+    """Raise `UnsupportedError` if a problem needs a file that is not at its path: the map of a list."""
+    for path in paths:
+        if path.is_file() and _is_task_list(path) and "map" in _sections_of(path):
+            raise UnsupportedError(f"{path.name} has a map, which is not sent to other machines: measure it on each")
 
 
 def _grown_list(path: Path) -> Growth:
