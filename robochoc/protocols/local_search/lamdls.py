@@ -44,7 +44,8 @@ it has sent its value. So each move saves the team as much as it saves the robot
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import itertools
+from collections.abc import Container, Mapping, Sequence
 from typing import Annotated
 
 import msgspec
@@ -79,8 +80,7 @@ class LAMDLS(CycleProtocol):
     """One agent of LAMDLS.
 
     State: this robot's `colour`, the neighbours with smaller colours (`earlier`) and with larger ones (`later`), and
-        the
-    `view`: the neighbours' present values.
+    the `view`: the neighbours' present values.
     """
 
     messages = Colour | Value | AnytimeMessage
@@ -105,7 +105,7 @@ class LAMDLS(CycleProtocol):
         """At first these are the neighbours with higher and lower priority: the order of colouring."""
         self.later = tuple(name for name in problem.neighbours if order.rank[name] > own)
         self.view: dict[str, wire.Value] = {}
-        self._colours: dict[str, int] = {}
+        self.colours: dict[str, int] = {}
 
     def start_cycles(self) -> None:
         """Choose a random value, and wait for the colours of all neighbours with higher priority."""
@@ -115,8 +115,8 @@ class LAMDLS(CycleProtocol):
     def _choose_colour(self, messages: Mapping[str, wire.Message]) -> None:
         """Choose the smallest free colour, and send it."""
         self._store_colours(messages)
-        taken = {*self._colours.values()}
-        self.colour = next(colour for colour in range(len(taken) + 1) if colour not in taken)
+        taken = {*self.colours.values()}
+        self.colour = least_free(taken)
         self.multicast(self.problem.neighbours, Colour(self.problem.values[self.present], self.colour))
         self.listen(self.later, self._start_first_step)
 
@@ -132,7 +132,7 @@ class LAMDLS(CycleProtocol):
 
     def _is_before(self, name: str, *, higher: bool) -> bool:
         """Return whether a neighbour moves first: by its colour, or, if that is lost or the same, by its priority."""
-        colour, own = self._colours.get(name), self.colour
+        colour, own = self.colours.get(name), self.colour
         return higher if colour is None or own is None or colour == own else colour < own
 
     def receive_late(self, sender: str, message: wire.Message) -> None:
@@ -150,7 +150,7 @@ class LAMDLS(CycleProtocol):
                 raise ValueError(f"{name} sent no colour, which must come first")  # noqa: TRY004 - as any bad message
             self.check_value(name, message.value)
             self.view[name] = message.value
-            self._colours[name] = message.colour
+            self.colours[name] = message.colour
 
     def _wait_for_earlier(self) -> None:
         self.listen(self.earlier, self._move)
@@ -158,17 +158,25 @@ class LAMDLS(CycleProtocol):
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """Choose the best value given the neighbours' values, and send it."""
         self.view |= self.checked_values(messages)
-        costs = self.problem.lexicographic_costs(self.view)
-        least = min(costs)
-        index = self.present
-        if costs[index] > least:
-            index = self.any_of([place for place, cost in enumerate(costs) if cost == least])
-        self.choose(index)
+        self.choose(index := self.best_response())
         self.multicast(self.problem.neighbours, Value(self.problem.values[index]))
         if not self.finished:
             self.listen(self.later, self._wait_for_later)
+
+    def best_response(self) -> int:
+        """Return the best value given the neighbours' values: the present one, if no value is better."""
+        costs = self.problem.lexicographic_costs(self.view)
+        least = min(costs)
+        if costs[self.present] == least:
+            return self.present
+        return self.any_of([place for place, cost in enumerate(costs) if cost == least])
 
     def _wait_for_later(self, messages: Mapping[str, wire.Message]) -> None:
         """Start the next step, once all neighbours with larger colours have made the last one."""
         self.view |= self.checked_values(messages)
         self._wait_for_earlier()
+
+
+def least_free(taken: Container[int]) -> int:
+    """Return the smallest colour that is not `taken`."""
+    return next(colour for colour in itertools.count() if colour not in taken)

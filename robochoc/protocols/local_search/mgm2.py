@@ -193,6 +193,30 @@ class JointMove(NamedTuple):
     place: int
 
 
+def offered_gains(
+    problem: LocalProblem, present: int, view: Mapping[str, wire.Value], partner: str, domain: Sequence[wire.Value]
+) -> Gains:
+    """Return the gain for each of the partner's values and each of this robot's values."""
+    rows = [problem.lexicographic_costs({**view, partner: value}) for value in domain]
+    now = rows[domain.index(view[partner])][present]
+    return [[gain(now, cost) for cost in row] for row in rows]
+
+
+def joint_moves(
+    problem: LocalProblem, present: int, view: Mapping[str, wire.Value], offerer: str, gains: Gains
+) -> Iterator[JointMove]:
+    """Yield all offered moves with the total gain of both robots.
+
+    The total gain is the offerer's gain plus this robot's gain on constraints that do not include the offerer.
+    """
+    costs = problem.lexicographic_costs({name: value for name, value in view.items() if name != offerer})
+    now = costs[present]
+    for own, (own_cost, row) in enumerate(zip(costs, gains, strict=True)):
+        broken, cost = gain(now, own_cost)
+        for place, offered in enumerate(row):
+            yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
+
+
 @mypyc_attr(allow_interpreted_subclasses=True)
 class MGM2(Gainers):
     """One agent of MGM-2. State: neighbours' `domains`, the `view`, and the `partner` that it is committed to."""
@@ -251,9 +275,7 @@ class MGM2(Gainers):
 
     def _gains(self, partner: str) -> Gains:
         """Return the gain for each of the partner's values and each of this robot's values."""
-        rows = [self.problem.lexicographic_costs({**self.view, partner: value}) for value in self.domains[partner]]
-        now = rows[self.domains[partner].index(self.view[partner])][self.present]
-        return [[gain(now, cost) for cost in row] for row in rows]
+        return offered_gains(self.problem, self.present, self.view, partner, self.domains[partner])
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
         """Answer all offers: an offerer rejects them; other robots accept the best offer if its gain is positive."""
@@ -268,7 +290,8 @@ class MGM2(Gainers):
 
     def _commit(self, offers: Mapping[str, Gains]) -> str | None:
         """Accept the best offer if its total gain is positive; return its sender."""
-        moves = [move for name, gains in offers.items() for move in self._joint(name, gains)]
+        problem, present, view = self.problem, self.present, self.view
+        moves = [move for name, gains in offers.items() for move in joint_moves(problem, present, view, name, gains)]
         self.gain = max((move.gain for move in moves), default=NO_GAIN)
         if self.gain <= NO_GAIN:
             return None
@@ -276,18 +299,6 @@ class MGM2(Gainers):
         self.target = move.own
         self.send(move.partner, Accept(move.place, *move.gain))
         return move.partner
-
-    def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
-        """Yield all offered moves with the total gain of both robots.
-
-        The total gain is the offerer's gain plus this robot's gain on constraints that do not include the offerer.
-        """
-        costs = self.problem.lexicographic_costs({name: value for name, value in self.view.items() if name != offerer})
-        now = costs[self.present]
-        for own, (own_cost, row) in enumerate(zip(costs, gains, strict=True)):
-            broken, cost = gain(now, own_cost)
-            for place, offered in enumerate(row):
-                yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
 
     def _receive_answer(self, messages: Mapping[str, wire.Message]) -> None:
         """Commit to the partner if it accepted the offer; otherwise use this robot's best move alone."""
