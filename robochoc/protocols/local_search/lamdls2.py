@@ -64,7 +64,7 @@ from robochoc.solver.local_problem import LocalProblem
 class NumberedColour(Colour, frozen=True):
     """The sender's value and colour, and its `number` in the order of the next colouring."""
 
-    number: Annotated[float, msgspec.Meta(ge=0, lt=1)]
+    number: Annotated[float, msgspec.Meta(ge=0, le=1)]
 
     def in_words(self, words: Wording) -> str:
         return f"{words.own_value(self.value)}, and my colour is number {self.colour + 1} this time"
