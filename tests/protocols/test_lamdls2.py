@@ -9,7 +9,7 @@ import pytest
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.lamdls2 import LAMDLS2, NumberedColour
-from robochoc.protocols.local_search.mgm2 import Accept, Offer
+from robochoc.protocols.local_search.mgm2 import Accept, Gains, Offer
 from robochoc.protocols.shared.cycles import Domain, Value
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
@@ -112,7 +112,7 @@ def test_a_pair_that_cannot_gain_keeps_its_values() -> None:
 def test_of_several_offers_the_one_of_the_smallest_number_is_accepted() -> None:
     """D, refused, receives B's value instead of an answer."""
     robot = middle()
-    gains = [[(0, 0), (0, -2)], [(0, -2), (0, 3)]]
+    gains: Gains = [[(0, 0), (0, -2)], [(0, -2), (0, 3)]]
     told = replies(robot, ("RD", Offer(gains)), ("RA", Offer(gains)))
     assert [(name, type(message)) for name, message in told] == [
         ("RA", Accept), ("RA", Value), ("RC", Value), ("RD", Value),
