@@ -112,7 +112,7 @@ class MasterLoop(ABC):
             kill_s = self._kills.wait_s(now) if is_searching else None  # only then robots are killed
             wave_s = max(0.0, self._waved + self.wave_s - now) if self.state.wave_due else None
             self._serve_once(now, deadline, kill_s, wave_s, None if watch is None else watch.wait_s(now))
-            self._detect_end(now)
+            self._detect_end(now, is_limited=deadline is not None)
             if is_searching:
                 self._kill_due()
             if watch is not None:
@@ -158,10 +158,10 @@ class MasterLoop(ABC):
             for name in self._kills.due(time.monotonic()):
                 self._kill(name)
 
-    def _detect_end(self, now: float) -> None:
+    def _detect_end(self, now: float, *, is_limited: bool = False) -> None:
         """Start a wave if it could prove quiescence, or if a progress report or a limit needs the message count.
 
-        A search that can never continue ends.
+        A search that can never continue ends. `is_limited`: the search has a deadline.
         """
         state = self.state
         if state.is_stalled(self._waited_s, self._transit_s):
@@ -171,7 +171,7 @@ class MasterLoop(ABC):
         if wanted:
             self._shown = now
         if self._progress and wanted:
-            stage = f"waiting for {names}" if (names := state.awaited(self._waited_s)) else ""
+            stage = self._overdue_in_words(is_limited=is_limited)
             self._progress(Progress(state.counters.sent, time.monotonic() - self._began, stage))
         if state.start_continuation():
             self._send_all(GoOn())
@@ -181,3 +181,10 @@ class MasterLoop(ABC):
         if wave is not None:
             self._waved = now
             self._send_all(CounterWave(wave))
+
+    def _overdue_in_words(self, *, is_limited: bool) -> str:
+        """Return which robots have not answered for long; empty if there are none."""
+        names, silent_s = self.state.overdue(self._waited_s)
+        if not names:
+            return ""
+        return f"no answer from {names} for {silent_s:.0f} s{'' if is_limited else ' (--timeout limits the search)'}"

@@ -76,6 +76,11 @@ class FourCounters:
         return tuple(sorted(unreported or self._unanswered))
 
     @property
+    def wave(self) -> int:
+        """The number of the latest wave; 0 before the first one."""
+        return self._wave
+
+    @property
     def due(self) -> bool:
         """True if a wave is due: all counters are known, the sums are equal, and no wave is open."""
         return not self._unanswered and not self._unreported and self._total.sent == self._total.received

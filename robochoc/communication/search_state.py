@@ -20,8 +20,8 @@ from robochoc.system.plain_text import listed
 
 NO_TRAITS = Traits()
 _ASKED_ENOUGH = 2
-_AWAITED_S = 10.0
-"""The time without changes after which the progress report names the robots that have not answered, in seconds."""
+_OVERDUE_S = 10.0
+"""The time after which the progress report names robots that have not answered, in seconds."""
 
 
 class SearchState:
@@ -63,6 +63,7 @@ class SearchState:
         self._still: tuple[MessageCounts, int] | None = None
         self._still_since = 0.0
         self._asked = 0
+        self._silent_since: dict[tuple[str, int], float] = {}
 
     def handle(self, name: str, message: EpochMessage) -> str:
         """Handle a control message from the robot `name`. Return why the message is invalid, or an empty text.
@@ -215,9 +216,15 @@ class SearchState:
             return f"{listed(self.unready)} cannot start: data from other robots were lost for good"
         return f"{self.counters.missing:,} messages between robots were lost for good"
 
-    def awaited(self, now: float) -> str:
-        """Return the names of the robots that have not answered, if nothing has changed for long; otherwise empty."""
-        return listed(self.silent) if now - self._still_since > _AWAITED_S else ""
+    def overdue(self, now: float) -> tuple[str, float]:
+        """Return the robots that have not answered for long, and for how many seconds; ("", 0.0) if there are none.
+
+        A computing robot answers no wave. Call this from time to time, with the same `now` as `is_stalled`.
+        """
+        wave, before = self.counters.wave, self._silent_since
+        self._silent_since = {(name, wave): before.get((name, wave), now) for name in self.silent}
+        late = {name: now - since for (name, _), since in self._silent_since.items() if now - since > _OVERDUE_S}
+        return listed(late), max(late.values(), default=0.0)
 
     def next_wave(self, *, wanted: bool = False) -> int | None:
         """Return the number of a wave to start now, or None.

@@ -8,7 +8,9 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robochoc.communication.control import Counters, Ready
 from robochoc.communication.quiescence import FourCounters, MessageCounts
+from robochoc.communication.search_state import SearchState
 from tests.support.examples import examples
 
 ROBOTS = ("A", "B", "C", "D")
@@ -138,3 +140,38 @@ def test_one_balanced_wave_is_not_enough() -> None:
     waved(counters, MessageCounts(1, 0), MessageCounts(1, 1))  # B has spoken since
     assert not counters.quiescent
     assert not counters.due
+
+
+def test_robots_that_have_not_answered_for_long_are_overdue() -> None:
+    state = SearchState(1, ROBOTS[:2])
+    for name in state.order:
+        state.handle(name, Ready(1))
+    state.start()
+    wave = state.counters.start_wave()
+    state.handle("A", Counters(1, wave, 0, 0))
+    assert state.overdue(5) == ("", 0)
+    for now in range(6, 71):
+        state.handle("A", Counters(1, 0, now, 0))
+        late = state.overdue(now)
+    assert late == ("B", 65), "also if other robots continue"
+    state.handle("B", Counters(1, wave, 0, 0))
+    assert state.overdue(71) == ("", 0)
+
+
+def test_a_robot_that_answers_each_wave_late_is_not_overdue() -> None:
+    state = SearchState(1, ROBOTS[:2])
+    for name in state.order:
+        state.handle(name, Ready(1))
+    state.start()
+    for now in range(0, 60, 6):
+        wave = state.counters.start_wave()
+        assert state.overdue(now) == ("", 0)
+        state.handle("A", Counters(1, wave, now, 0))
+        assert state.overdue(now + 5) == ("", 0)
+        state.handle("B", Counters(1, wave, now, 0))
+
+
+def test_a_robot_that_is_not_ready_is_overdue() -> None:
+    state = SearchState(1, ROBOTS[:2])
+    state.handle("A", Ready(1))
+    assert [state.overdue(now)[0] for now in (0, 10, 11)] == ["", "", "B"]
