@@ -18,6 +18,7 @@ from robochoc.app.pages.imported.model import build_imported_model
 from robochoc.app.pages.imported.whatif import build_imported_whatif
 from robochoc.app.pages.lessons.page import build_lesson, build_lessons
 from robochoc.app.pages.model.page import build_model
+from robochoc.app.pages.seat.page import build_seat
 from robochoc.app.pages.shell import AREAS, shell
 from robochoc.app.pages.whatif.page import build_whatif
 from robochoc.app.projects import Project, Projects
@@ -29,6 +30,7 @@ _BUILD: dict[str, Callable[[Project], None]] = {
     "whatif": build_whatif,
     "fly": build_fly,
     "compare": build_compare,
+    "play": build_seat,
 }
 _BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_imported_model, "whatif": build_imported_whatif}
 """The pages that are different for imported teams."""

@@ -16,7 +16,7 @@ from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError, renamed
 from robochoc.app.texts import say
 
-AREAS = ("model", "decide", "whatif", "fly", "compare")
+AREAS = ("model", "decide", "whatif", "fly", "compare", "play")
 """The pages of a team, in the usual order of use."""
 
 

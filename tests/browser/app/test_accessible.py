@@ -23,6 +23,7 @@ SHOWN = {
     "whatif": "svg .robot",
     "fly": ".tell .cards",
     "compare": "h1",
+    "play": "h1",
     "lessons": ".cards li",
 }
 """By its page, what is there once a page is."""

@@ -22,7 +22,7 @@ from tests.support.limits import HANG_S
 SEED = 22
 MOST_GROWN_KB = 400_000
 """Memory that the events may take, whatever they say. A hundredth of what they would with a text of 1 MB each."""
-AREAS = ("model", "decide", "whatif", "fly", "compare")
+AREAS = ("model", "decide", "whatif", "fly", "compare", "play")
 PAGES = ("", *(f"team/{{team}}/{area}" for area in AREAS), "lessons", "lessons/1")
 
 

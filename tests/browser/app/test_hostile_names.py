@@ -15,7 +15,7 @@ from tests.support.cases import cases
 from tests.support.hostile_client import NAMES
 from tests.support.limits import HANG_S
 
-AREAS = ("model", "decide", "whatif", "fly", "compare")
+AREAS = ("model", "decide", "whatif", "fly", "compare", "play")
 LONG = "n" * 10_000
 TEXTS = (*(name for name in NAMES if name.strip()), LONG)
 PAINTED = "document.title = 'painted'; globalThis.executed = true"

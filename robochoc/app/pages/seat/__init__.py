@@ -1,0 +1,1 @@
+"""The page "Play": a person plays one robot of the team."""
