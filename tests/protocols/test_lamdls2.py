@@ -166,7 +166,7 @@ def test_it_ends_in_a_2_optimum(teams: int) -> None:
     for seed in range(teams):
         team = random_cost_team(chance)
         if all(domains_of(team).values()):
-            end = assignments_by_cycle(team, played(team, LAMDLS2, Concurrent(0), seed, cycles=60))[-1]
+            end = assignments_by_cycle(team, played(team, LAMDLS2, Concurrent(0), seed, cycles=200))[-1]
             assert is_optimal(team, end, 1)
             assert is_optimal(team, end, 2)
 
