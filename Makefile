@@ -177,7 +177,7 @@ bench: $(READY)  ## figures into benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
 
 # The same list each time: the digests of all instances, and their optima, each proved by two solvers.
-benchmark-set: $(READY)  ## robochoc/leaderboard/instances.json: half an hour of CPU
+benchmark-set: $(READY)  ## robochoc/leaderboard/instances.json: some minutes of CPU
 	$(BIN)/python -m robochoc.leaderboard.certificates robochoc/leaderboard/instances.json
 
 # OF="--size small" takes a part of the set; BUDGET, ENTRANTS and JOBS change the rest.
