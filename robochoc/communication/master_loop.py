@@ -110,13 +110,19 @@ class MasterLoop(ABC):
             self._turned = now
             watch = self.watch if is_searching else None
             kill_s = self._kills.wait_s(now) if is_searching else None  # only then robots are killed
-            wave_s = max(0.0, self._waved + self.wave_s - now) if self.state.wave_due else None
-            self._serve_once(now, deadline, kill_s, wave_s, None if watch is None else watch.wait_s(now))
+            self._serve_once(
+                now, deadline, kill_s, self._wave_wait_s(now), None if watch is None else watch.wait_s(now)
+            )
             self._detect_end(now, is_limited=deadline is not None)
             if is_searching:
                 self._kill_due()
             if watch is not None:
                 self._take_snapshots(watch)
+
+    def _wave_wait_s(self, now: float) -> float | None:
+        """Return the seconds until a wave that is due may start, or None if no wave waits for its time."""
+        left_s = self._waved + self.wave_s - now
+        return left_s if left_s > 0 and self.state.wave_due else None
 
     def _serve_once(self, now: float, deadline: float | None, *waits_s: float | None) -> None:
         """Serve the robots once, after a wait of at most `TICK_S` and these seconds. Then check for lost robots."""

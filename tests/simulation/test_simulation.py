@@ -94,6 +94,14 @@ def test_answers_that_were_published_before_a_loss_do_not_count() -> None:
         assert not report.findings, seed
 
 
+def test_a_master_does_not_poll_while_robots_report_whether_they_continue() -> None:
+    """Found by `make simulate`: with lost messages, the master read its clock a million times in three seconds."""
+    options = Options(protocol="mcs-mgm", runtime=Runtime.PROCESSES, cache=False, messages=2000, message_loss=0.1)
+    for seed in range(3):
+        team = random_csp(4, 3, 0.7, 0.3, seed=seed, max_cost=9)
+        assert not examine(Plan(seed * 3 + 1, team, options, tick_s=1e-6, delay_s=0.01)).findings, seed
+
+
 @pytest.fixture
 def deaf(monkeypatch: pytest.MonkeyPatch) -> pytest.MonkeyPatch:
     """Let the robots of ABT ignore the third message that each of them receives."""
