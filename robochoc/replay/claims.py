@@ -72,8 +72,9 @@ class ReplayedRun:
 def with_answer(run: RecordedRun, robots: RebuiltRobots, journal: Journal) -> ReplayedRun:
     """Return a replayed run with its answer."""
     improved = journal.header.improve is not UNSET
-    in_order = journal.header.runtime == "simulator"
-    limited = journal.header.limit_s is not UNSET and not in_order
+    simulated = journal.header.runtime == "simulator"
+    in_order = simulated and not journal.header.channel  # with a channel, the steps of robots overlap
+    limited = journal.header.limit_s is not UNSET and not simulated
     replayed = ReplayedRun(run, robots.compiled.team, in_order=in_order, improved=improved, limited=limited)
     final = journal.header.answer == "final"
     return replayed if journal.outcome is None else _answered(replayed, robots, journal.outcome, final=final)
@@ -230,8 +231,9 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
 def _was_decided(recorded: Answer, replayed: ReplayedRun) -> bool:
     """Return whether the robots had the recorded assignment together at some time of the run.
 
-    Robots in processes report their decisions in bundles, and a journal does not contain the order of the bundles. So
-    any combination of their values may have been reported together (`DecidedValues`).
+    Robots in processes report their decisions in bundles, and simulated robots with a channel report them before their
+    time. A journal does not contain this order. So any combination of their values may have been reported together
+    (`DecidedValues`).
     """
     values = recorded.assignment
     own = {
