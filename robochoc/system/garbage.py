@@ -9,6 +9,10 @@ from threading import Lock
 
 RARE_THRESHOLD = 100_000
 """The number of new objects minus deleted ones that starts a collection of the youngest. Python's default is 700."""
+BLOCKS_BEFORE_COLLECTION = 64
+"""The number of `collection_paused` blocks after which a full collection may be due."""
+_GROWTH = 1.25
+"""A full collection is due when this many times as many objects exist as after the last one, as in Python itself."""
 _active_freezes: list[None] = []
 """One item for each active `garbage_frozen` block."""
 _active_pauses: list[None] = []
@@ -16,6 +20,35 @@ _active_pauses: list[None] = []
 _usual_thresholds: list[tuple[int, int, int]] = []
 """For each active `collection_seldom` block, the thresholds before the first one. Threads may end in any order."""
 _thresholds_lock = Lock()
+
+
+class _FullCollections:
+    """Decides when a full collection is due.
+
+    Counting objects as old resets Python's own counters, so a process with many searches would never have one.
+    """
+
+    def __init__(self) -> None:
+        self._blocks = 0
+        self._objects = 0
+
+    def is_due(self) -> bool:
+        """Return whether a full collection is due. All objects must be frozen."""
+        self._blocks += 1
+        if self._blocks < BLOCKS_BEFORE_COLLECTION:
+            return False
+        self._blocks = 0
+        return gc.get_freeze_count() > _GROWTH * self._objects
+
+    def collect(self) -> None:
+        """Free all cyclic garbage, and count the objects that stay."""
+        gc.collect()
+        gc.freeze()
+        self._objects = gc.get_freeze_count()
+        gc.unfreeze()
+
+
+_full_collections = _FullCollections()
 
 
 @contextmanager
@@ -81,9 +114,13 @@ def resume_in_child() -> None:
 def count_as_old() -> None:
     """Make the collector treat all present objects as old, without visiting them, because most of them stay.
 
-    If objects are frozen, this has no effect, because it would unfreeze them. `gc.get_freeze_count` visits each frozen
-    object, so it is not called inside `garbage_frozen`.
+    After many calls, cyclic garbage among them is freed. If objects are frozen, this has no effect, because it would
+    unfreeze them. `gc.get_freeze_count` visits each frozen object, so it is not called inside `garbage_frozen`.
     """
-    if not _active_freezes and not gc.get_freeze_count():
-        gc.freeze()
-        gc.unfreeze()
+    if _active_freezes or gc.get_freeze_count():
+        return
+    gc.freeze()
+    is_due = _full_collections.is_due()
+    gc.unfreeze()
+    if is_due:
+        _full_collections.collect()

@@ -1,11 +1,18 @@
 """The garbage collector is put off, and left as it was found."""
 
 import gc
+import weakref
 from collections.abc import Iterator
 
 import pytest
 
-from robochoc.system.garbage import RARE_THRESHOLD, collection_paused, collection_seldom, garbage_frozen
+from robochoc.system.garbage import (
+    BLOCKS_BEFORE_COLLECTION,
+    RARE_THRESHOLD,
+    collection_paused,
+    collection_seldom,
+    garbage_frozen,
+)
 
 
 class Looped:
@@ -33,6 +40,20 @@ def test_what_was_made_meanwhile_is_not_young_afterwards() -> None:
     young = {id(one) for one in gc.get_objects(generation=0)}
     assert not young & {id(one) for one in made}
     assert not gc.get_freeze_count()
+
+
+def test_cyclic_garbage_of_many_blocks_is_freed() -> None:
+    """A program that solves for days must not grow."""
+    gc.enable()
+    freed: list[int] = []
+    most = 0
+    for number in range(10 * BLOCKS_BEFORE_COLLECTION):
+        with collection_paused():
+            made = [Looped() for _ in range(1000)]
+            weakref.finalize(made[0], freed.append, number)
+            del made
+        most = max(most, number + 1 - len(freed))
+    assert most < 5 * BLOCKS_BEFORE_COLLECTION
 
 
 def test_frozen_objects_stay_frozen() -> None:
