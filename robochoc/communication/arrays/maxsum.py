@@ -202,8 +202,8 @@ class ArrayMaxSum(CycleRun):
     def __init__(
         self, layout: ArrayLayout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
-        chosen = cast("MaxSumSettings", settings)
-        for name, used in (("split", chosen.split > 0), ("reweight", chosen.reweight != 1)):
+        settings = cast("MaxSumSettings", settings)
+        for name, used in (("split", settings.split > 0), ("reweight", settings.reweight != 1)):
             if used:
                 raise UnsupportedError(f"maxsum with --set {name} has no array implementation: use --runtime simulator")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)

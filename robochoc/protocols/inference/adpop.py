@@ -187,7 +187,7 @@ class ADPOP(TreeProtocol):
         writes_to_non_neighbours=False,
         tables=True,
         privacy="constraints of others, but for sums",
-        use_when="costs, induced width too large for dpop: bounds on the error",
+        use_when="costs, width too large for dpop: bounds on the error",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -87,7 +87,7 @@ class LAMDLS2(LAMDLS):
         writes_to_non_neighbours=False,
         privacy="constraints among others",
         cost_never_rises=True,
-        use_when="as MGM-2, and delays differ: pairs move, the cost never rises",
+        use_when="as MGM-2, with unequal delays: pairs move, cost never rises",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -110,7 +110,7 @@ WRONG = {
     "no problems": ('[runs]\nprotocol = "abt"\n', 0, "problems: expected a table"),
     "no runs": (SMALL.partition("[runs]")[0], 0, "runs: expected a table"),
     "unknown table": (f"{SMALL}[limit]\n", 12, "limit: there is no such key (did you mean 'limits'?)"),
-    "neither": (SMALL.replace('family = "random"\n', ""), 2, "either family (one of coloring,"),
+    "neither": (SMALL.replace('family = "random"\n', ""), 2, "either family (one of agentsnet,"),
     "unknown family": (SMALL.replace('"random"', '"randon"'), 3, "there is no family randon"),
     "unknown parameter": (SMALL.replace("domain", "domian"), 5, "did you mean 'domain'?"),
     "missing parameter": (SMALL.replace("domain = 3\n", ""), 2, "the family random needs domain"),
