@@ -313,7 +313,7 @@ class ProcessesRun(Session, MasterLoop):
 
         The wait for a computing robot ends at the time limit (`_limit`); with a verdict, at the latest after
         `BUSY_REPORTS_S`. The wait for a stopped robot ends after the patience. Robots are checked twice, since a robot
-        that has just reported does not compute either.
+        that has just reported does not compute either. If the search was stopped (`late`), the wait is short.
         """
         began, limit = time.monotonic(), self._limit
         before, idle = len(self._silent()), False
@@ -324,11 +324,13 @@ class ProcessesRun(Session, MasterLoop):
                 until = min(until, max(limit, now + LATE_REPORTS_S))
             self._serve_until(lambda: not self._silent(), until)
             silent = [self._pool.robots[name] for name in self._silent()]
-            if late or is_past(limit):
+            if is_past(limit):
                 return
-            if len(silent) < before or any(robot.status is ProcessStatus.STOPPED for robot in silent):
+            if len(silent) < before or (not late and any(robot.status is ProcessStatus.STOPPED for robot in silent)):
                 before, idle = len(silent), False
                 continue
+            if late:
+                return
             enough = self.state.verdict is not None and time.monotonic() - began > BUSY_REPORTS_S
             was_idle, idle = idle, not any(robot.is_computing for robot in silent)
             if enough or (was_idle and idle):
