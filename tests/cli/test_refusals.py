@@ -52,6 +52,8 @@ REFUSED = {
         ("--local-timeout=0", "--local-timeout"),
         ("--local-timeout=nan", "--local-timeout"),
         ("--local-timeout=-1", "--local-timeout"),
+        ("--runtime network --standby 1 --sniff", "--standby cannot be used with --journal or --sniff"),
+        ("--runtime network --standby 1 --journal x", "--standby cannot be used with --journal or --sniff"),
         ("--sniff --serve", "--serve cannot be used with --sniff"),
         ("--open", "--open requires --sniff"),
         ("--sniff --protocol central --count", "--count reports only a number"),

@@ -320,10 +320,8 @@ def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, t
         raise click.UsageError(f"--start accepts one team; {teams} were found")
     if options.bounds and not outputs.journal:
         raise click.UsageError("--bounds writes to the journal: add --journal FILE")
-    if options.runtime == "arrays" and (outputs.journal or outputs.sniffer):
-        raise click.UsageError(
-            "--journal and --sniff show messages, but --runtime arrays sends no messages: use another runtime"
-        )
+    if outputs.journal or outputs.sniffer:
+        _refuse_to_show_messages(options)
     if outputs.serve and outputs.sniffer:
         raise click.UsageError(
             "--serve cannot be used with --sniff: remove --serve, since the page of --sniff also shows the scene"
@@ -332,3 +330,13 @@ def check_outputs(outputs: Outputs, request: TeamRequest, options: Options, *, t
         raise click.UsageError(f"--ros and --situation accept one team; {teams} were found")
     if outputs and teams > 1:
         raise click.UsageError(f"--html, --journal, --serve and --sniff accept one team; {teams} were found")
+
+
+def _refuse_to_show_messages(options: Options) -> None:
+    """Raise `click.UsageError` if a run with these options has no journal of messages."""
+    if options.runtime == "arrays":
+        raise click.UsageError(
+            "--journal and --sniff show messages, but --runtime arrays sends no messages: use another runtime"
+        )
+    if options.standby:
+        raise click.UsageError("--standby cannot be used with --journal or --sniff; remove one of them")

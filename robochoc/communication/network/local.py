@@ -27,7 +27,12 @@ from robochoc.communication.network import fork_server
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import NetworkMembers, reach
 from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.robot_process import START_S, NetworkRobotStart, network_robot_process
+from robochoc.communication.network.robot_process import (
+    START_S,
+    NetworkRobotStart,
+    network_robot_process,
+    only_protocol,
+)
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.process_status import describe_end
@@ -191,7 +196,8 @@ class LocalNetwork(Session):
             name = own.robot.name
             texts = self._authority.identity(name).texts
             limits = (self._settings.patience_s, self._settings.lease_ms)
-            given = NetworkRobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
+            protocols = partial(only_protocol, self._protocol)
+            given = NetworkRobotStart(own, texts, self._master.endpoint, protocols, *limits)
             process = self._context.Process(target=network_robot_process, name=name, args=(given,), daemon=True)
             with signals_delayed():  # a half-started process would wait forever, and block the end of the program
                 process.start()

@@ -38,11 +38,17 @@ class NetworkRobotStart(NamedTuple):
     own: CompiledRobot
     identity: IdentityTexts
     endpoint: str
-    protocol: type[Protocol]
+    protocols: Callable[[str], type[Protocol]]
+    """Returns the protocol of a phase, by its name."""
     patience_s: float
     lease_ms: int
     standbys: tuple[str, ...] = ()
     """The endpoints of standby masters, by priority."""
+
+
+def only_protocol(protocol: type[Protocol], _name: str) -> type[Protocol]:
+    """Return `protocol`, for robots whose search has one phase (with `partial`: processes receive no lambda)."""
+    return protocol
 
 
 def network_robot_process(given: NetworkRobotStart) -> None:
@@ -64,7 +70,7 @@ def network_robot_process(given: NetworkRobotStart) -> None:
             return
         with Transport(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as transport:
             settings = RobotSettings(given.patience_s, set_rank=set_niceness)
-            NetworkRobot(given.own, identity, transport, lambda _name: given.protocol, settings).run()
+            NetworkRobot(given.own, identity, transport, given.protocols, settings).run()
     except CannotConnectError as error:
         sys.exit(str(error))
 
@@ -78,7 +84,7 @@ def _follow(given: NetworkRobotStart, identity: Identity, set_niceness: Callable
         lost_master=lambda place, why: log.warning("%s: left the master at %s: %s", name, place, on_one_line(why)),
     )
     masters = Masters((given.endpoint, *given.standbys), given.patience_s)
-    follow(given.own, identity, masters, RobotVotes(several=True), settings, lambda _name: given.protocol)
+    follow(given.own, identity, masters, RobotVotes(several=True), settings, given.protocols)
 
 
 def end_with_the_parent() -> None:

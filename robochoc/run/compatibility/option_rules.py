@@ -171,8 +171,8 @@ OPTION_RULES = (
         lambda o: o.standby > MOST_STANDBYS, f"--standby starts at most {MOST_STANDBYS} masters besides the first one"
     ),
     OptionRule(
-        lambda o: o.standby and (o.improve is not None or o.start),
-        "--standby cannot be used with --improve, which publishes answers before robots have voted, or with --start",
+        lambda o: o.standby and (o.improve is not None or o.start or o.verify),
+        "--standby cannot be used with --improve, --start or --verify",
         "remove one of them",
     ),
     OptionRule(

@@ -8,6 +8,7 @@ only starts the others, and receives the outcome. Certificates are created for t
 from __future__ import annotations
 
 import logging
+import os
 import random
 import socket
 import time
@@ -40,10 +41,10 @@ from robochoc.run.context import RunContext
 from robochoc.run.defaults import MASTER, standby_names
 from robochoc.run.networked.address import Address
 from robochoc.run.networked.join import PATIENCE_S as LOOKING_S
-from robochoc.run.networked.master_run import MasterPlan, run_master
+from robochoc.run.networked.master_run import SHARED, MasterPlan, run_master
 from robochoc.run.networked.standby import RunOverElsewhereError, StandbyPlan
 from robochoc.run.options import Options
-from robochoc.run.registry import protocol_named
+from robochoc.run.registry import protocol_named, protocol_or_stage
 from robochoc.solver.compile import CompileTimeoutError, TeamCompileTimeoutError
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.solver.compiled_team import CompiledTeam
@@ -51,6 +52,7 @@ from robochoc.solver.errors import UnsupportedError
 from robochoc.system.errors import RobochocError
 from robochoc.system.plain_text import on_one_line
 from robochoc.system.signals import signals_delayed
+from robochoc.system.stopping import STOP, stop_handled, stop_requested
 from robochoc.verification.checker import RefutedError, violations
 
 _PORTS = range(20_000, 32_000)
@@ -100,7 +102,7 @@ def solve_with_standbys(team: Team, context: RunContext, header: Outcome) -> Out
     """
     options = context.options
     if context.observer is not None:
-        raise UnsupportedError("--standby cannot be used with a journal or an observer: remove one of them")
+        raise UnsupportedError("--standby cannot be used with --journal or --sniff; remove one of them")
     names = standby_names(options.standby)
     if taken := sorted({MASTER, *names} & set(team.order)):
         raise UnsupportedError(f"{team.name} has a robot called {taken[0]}, as a master of --standby: rename the robot")
@@ -112,6 +114,7 @@ def solve_with_standbys(team: Team, context: RunContext, header: Outcome) -> Out
     site = _Site(compiled, names, options)
     try:
         outcome = site.run(context)
+        site.wait()
     finally:
         site.close()
     context.kills.warn_of_pending()
@@ -133,8 +136,7 @@ class _Site:
         self._authority = InMemoryAuthority(compiled.team.order)
         self._names = (MASTER, *names)
         self._places = _free_places(len(self._names))
-        self._protocol = protocol_named(options.protocol)
-        self._context = start_fork_server(self._protocol)
+        self._context = start_fork_server(protocol_named(options.protocol))
         self._processes: dict[str, BaseProcess] = {}
         self._reports: dict[str, Connection] = {}
 
@@ -146,12 +148,14 @@ class _Site:
             name = own.robot.name
             endpoints = tuple(map(str, self._places))
             texts = self._authority.identity(name).texts
-            start = NetworkRobotStart(own, texts, endpoints[0], self._protocol, LOOKING_S, LEASE_MS, endpoints[1:])
+            start = NetworkRobotStart(own, texts, endpoints[0], protocol_or_stage, LOOKING_S, LEASE_MS, endpoints[1:])
             self._start(name, network_robot_process, start)
         failed: dict[str, _Failed] = {}
+        unstopped = ""
         while self._reports:
             for name, report in self._next_reports():
                 if isinstance(report, Leads):
+                    unstopped = name
                     context.kills.start(time.monotonic())
                     _log(f"{report.master} leads in term {report.term}: {report.why}")
                 elif isinstance(report, Outcome):
@@ -162,8 +166,30 @@ class _Site:
             for name in context.kills.due(time.monotonic()):
                 _log(f"{name} is killed")
                 self._processes[name].kill()
-        why = "; ".join(f"{name}: {one.why}" for name, one in failed.items()) or "all masters have ended"
-        raise (UnsupportedError if any(one.unsupported for one in failed.values()) else NoDecisionError)(why)
+            if unstopped and stop_requested():
+                self._stop_search(unstopped)
+                unstopped = ""
+        causes = {name: one.why for name, one in failed.items()} | self._killed()
+        why = "; ".join(f"{name}: {cause}" for name, cause in causes.items())
+        refusal = UnsupportedError if any(one.unsupported for one in failed.values()) else NoDecisionError
+        raise refusal(f"all masters have ended: {why}")
+
+    def _stop_search(self, leader: str) -> None:
+        """Let the leading master end the search with the best answer."""
+        pid = self._processes[leader].pid
+        if STOP and pid is not None:
+            with suppress(ProcessLookupError):
+                os.kill(pid, STOP)
+
+    def _killed(self) -> dict[str, str]:
+        """Return the reasons for the end of masters whose processes were killed. They have closed their pipes."""
+        causes = {}
+        for name in self._names:
+            process = self._processes[name]
+            process.join(_GRACE_S)
+            if process.exitcode:
+                causes[name] = f"its process was ended by signal {-process.exitcode}"
+        return causes
 
     def _start_master(self, rank: int, name: str) -> None:
         authority, hosts = self._authority, (LOOPBACK,)
@@ -175,7 +201,7 @@ class _Site:
             self._places[:rank],
             identity.texts,
             StandbyAnswer(roles, ()),
-            _plan_fields(self._compiled.team, self._options),
+            plan_fields(self._compiled.team, self._options),
         )
         self._start(name, _master_process, start, sender)
         sender.close()
@@ -200,12 +226,15 @@ class _Site:
                     connection.close()
         return found
 
+    def wait(self) -> None:
+        """Wait a short time until all processes have ended after a decision."""
+        until = time.monotonic() + _GRACE_S
+        for process in self._processes.values():
+            process.join(max(0.0, until - time.monotonic()))
+
     def close(self) -> None:
-        """Wait a short time until all processes have ended, and kill the others."""
+        """Kill all processes that have not ended."""
         with signals_delayed():
-            until = time.monotonic() + (_GRACE_S if self._reports else 0)
-            for process in self._processes.values():
-                process.join(max(0.0, until - time.monotonic()))
             for process in self._processes.values():
                 process.kill()
                 process.join()
@@ -214,16 +243,16 @@ class _Site:
                 connection.close()
 
 
-def _plan_fields(team: Team, options: Options) -> dict[str, Any]:
+def plan_fields(team: Team, options: Options) -> dict[str, Any]:
     """Return the fields of `MasterPlan` that all masters have in common."""
     conditions = NetworkSettings(
         filters=options.filters,
         patience_s=options.patience or PATIENCE_S,
         survive=options.survives_losses,
     )
-    same = ("protocol", "seed", "withdraw", "timeout", "deadline", "messages", "message_loss")
     return {
-        **{name: getattr(options, name) for name in same},
+        **{name: getattr(options, name) for name in SHARED},
+        "protocol": options.protocol,
         "settings": dict(options.settings),
         "conditions": conditions,
         "name": team.name,
@@ -244,7 +273,8 @@ def _master_process(start: _MasterStart, reports: Connection) -> None:
     plan = MasterPlan(Path(), start.place, standby=standby, **start.fields)
     with suppress(BrokenPipeError):  # the run is over
         try:
-            reports.send(run_master(plan, observer=observe).outcome)
+            with stop_handled():
+                reports.send(run_master(plan, observer=observe).outcome)
         except RunOverElsewhereError:
             reports.send(None)
         except RobochocError as error:

@@ -40,7 +40,7 @@ from robochoc.run.incumbent import merged_values
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.networked.standby import LeaderWatch, StandbyPlan
-from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
+from robochoc.run.options import AnswerRule, OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_or_stage
 from robochoc.run.starts import start_of_outcome
 from robochoc.solver.errors import UnsupportedError
@@ -50,6 +50,10 @@ from robochoc.verification.checker import RefutedError
 
 LOOPBACK_ADDRESS = Address(LOOPBACK)
 """The default address, reachable only from this machine. Other addresses must be chosen explicitly."""
+SHARED = (
+    "seed", "timeout", "deadline", "improve", "answer", "repair", "withdraw", "messages", "message_loss", "settings",
+)  # fmt: skip
+"""The fields of `MasterPlan` that are also in `Options`, with the same meaning."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,8 @@ class MasterPlan:
         deadline: A limit like `timeout`, but the best assignment known at the deadline is the answer (None: no
             deadline).
         improve: The seconds after the deadline in which the robots search for better answers (None: they stop).
+        answer: The answer of a search that proves nothing: see `Options`.
+        repair: True if a local search repairs the assignment of an incomplete protocol: see `Options`.
         messages: A limit on the number of messages (None: no limit).
         message_loss: The probability with which robots drop received messages.
         start: The outcome from whose assignment the robots begin (None: they begin without an assignment).
@@ -95,6 +101,8 @@ class MasterPlan:
     timeout: float | None = None
     deadline: float | None = None
     improve: float | None = None
+    answer: AnswerRule = AnswerRule.BEST
+    repair: bool = True
     messages: int | None = None
     message_loss: float = 0.0
     start: Outcome | None = None
@@ -107,17 +115,10 @@ class MasterPlan:
         return Options(
             protocol=protocol,
             runtime=Runtime.NETWORK,
-            seed=self.seed,
-            timeout=self.timeout,
-            deadline=self.deadline,
-            improve=self.improve,
-            withdraw=self.withdraw,
-            messages=self.messages,
-            message_loss=self.message_loss,
             on_loss=OnLoss.WITHDRAW if self.conditions.survive else OnLoss.FAIL,
             patience=self.conditions.patience_s,
-            settings=self.settings,
             filters=self.conditions.filters,
+            **{name: getattr(self, name) for name in SHARED},
         )
 
 
