@@ -169,5 +169,5 @@ def test_a_robot_with_the_name_of_a_master() -> None:
 
 def test_masters_have_no_journal() -> None:
     seen: list[AnyEvent] = []
-    with pytest.raises(UnsupportedError, match="--standby cannot be used with --journal or --sniff"):
+    with pytest.raises(UnsupportedError, match="--standby cannot be used with a journal or an observer"):
         solve(TRIANGLE, options(), observer=seen.append)

@@ -102,7 +102,7 @@ def solve_with_standbys(team: Team, context: RunContext, header: Outcome) -> Out
     """
     options = context.options
     if context.observer is not None:
-        raise UnsupportedError("--standby cannot be used with --journal or --sniff; remove one of them")
+        raise UnsupportedError("--standby cannot be used with a journal or an observer: remove one of them")
     names = standby_names(options.standby)
     if taken := sorted({MASTER, *names} & set(team.order)):
         raise UnsupportedError(f"{team.name} has a robot called {taken[0]}, as a master of --standby: rename the robot")
