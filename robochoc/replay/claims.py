@@ -7,7 +7,7 @@ the search (`--improve`) may be older: it is checked against the constraints, an
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import chain
@@ -28,9 +28,10 @@ from robochoc.replay.steps import RecordedRun
 from robochoc.run.defaults import CENTRAL
 from robochoc.run.evaluation import PhaseAnswer, Search, check_with_files, evaluate_search, is_proven
 from robochoc.run.improvement import Rank
+from robochoc.run.incumbent import merged_values
 from robochoc.run.phases import RunPhase
 from robochoc.run.registry import protocol_by_class
-from robochoc.run.starts import start_in
+from robochoc.run.starts import robots_values, start_in
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_domain import TooManySolutionsError
 from robochoc.system.lazy_dataclass import dataclass
@@ -57,7 +58,8 @@ class ReplayedRun:
 
     `any_time`: the answer may be any assignment that the robots had, because nothing is proven. `in_order`: decisions
     were reported one by one. `improved`: the answer may be any assignment that was found at a snapshot, even if it was
-    not published. `limited`: the reports that prove it may have been too late.
+    not published. `limited`: the reports that prove it may have been too late. `start`: the start assignment, which is
+    the answer of a search that was stopped before the robots had a better one.
     """
 
     run: RecordedRun
@@ -67,6 +69,7 @@ class ReplayedRun:
     in_order: bool = True
     improved: bool = False
     limited: bool = False
+    start: Mapping[str, int] | None = None
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, journal: Journal) -> ReplayedRun:
@@ -188,7 +191,8 @@ def _answer_contradictions(whose: str, recorded: Answer, last: ReplayedRun) -> I
     began = last.run.began
     earlier = bool(recorded.improvements) or (began is not None and began.continues is True)
     has_answer = bool(recorded.assignment or recorded.withdrawn)
-    decided = has_answer and (last.improved or (last.any_time and _was_decided(recorded, last)))
+    is_start = last.limited and recorded.assignment == last.start
+    decided = has_answer and (is_start or last.improved or (last.any_time and _was_decided(recorded, last)))
     if recorded.verdict != Verdict.NO_SOLUTION and (earlier or decided):
         yield from _published_contradictions(whose, recorded, replayed, last.team)
         return
@@ -281,7 +285,13 @@ def _answered(replayed: ReplayedRun, robots: RebuiltRobots, outcome: Outcome, *,
         answer = evaluate_search(phase, Search(result, check), team.kind, partial(user_cost, team), ANY_DEADLINE)
     except (RefutedError, TooManySolutionsError):
         answer = PhaseAnswer(Verdict.UNKNOWN)
-    return replace(replayed, answer=answer, any_time=not (final or is_proven(phase, result)))
+    start = robots_values(team, phase.parameters.start) if phase.start_cost is not None else None
+    return replace(
+        replayed,
+        answer=answer,
+        any_time=not (final or is_proven(phase, result)),
+        start=None if start is None else merged_values(start),
+    )
 
 
 def _places(run: RecordedRun, outcome: Outcome) -> bool:

@@ -24,6 +24,7 @@ from robochoc.replay import replay
 from robochoc.run.options import AnswerRule, Options, Runtime, Withdrawal
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.compiled import plain_python_only
+from tests.support.complex_problems import random_complex_team
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
 from tests.support.random_changes import random_changing_team
@@ -292,6 +293,31 @@ def test_a_search_without_time_ends_with_its_start() -> None:
     assert not found.contradictions
     other = {name: value % 3 + 1 for name, value in solved.assignment.items()}
     assert replay(replace(journal, events=nothing, outcome=replace(late, assignment=other))).contradictions
+
+
+def test_a_search_that_is_stopped_at_its_end_may_return_its_start() -> None:
+    """Found by `make simulate`: at a deadline, robots had another solution, which is not better than the start."""
+    chance, found = Random(1), 0
+    options = Options(protocol="afc-ng", runtime=Runtime.SIMULATOR, cache=False, deadline=1000)
+    for _ in range(10):
+        team = random_complex_team(chance)
+        every = itertools.product(*(tuple(one.domain) for one in team.variables.values()))
+        solutions = [dict(zip(team.variables, values, strict=True)) for values in itertools.islice(every, 5000)]
+        solutions = [solution for solution in solutions if not [*violations(team, solution)]][-3:]
+        for start in solutions:
+            journal = recorded(team, replace(options, start=start))
+            assert journal.outcome is not None
+            if journal.outcome.assignment == start:
+                continue
+            found += 1
+            early = replace(journal.outcome, assignment=start)
+            assert replay(replace(journal, outcome=early)).contradictions
+            header = msgspec.structs.replace(journal.header, runtime=Runtime.PROCESSES)
+            for claimed in (start, *solutions):
+                ours = replace(early, runtime=Runtime.PROCESSES, assignment=claimed)
+                is_right = claimed in (start, journal.outcome.assignment)
+                assert (not replay(replace(journal, header=header, outcome=ours)).contradictions) == is_right
+    assert found
 
 
 def cheaper_combinations(team: Team, journal: Journal) -> Iterator[dict[str, int]]:
