@@ -198,7 +198,8 @@ class Improvements(SearchWatch):
         if lost:
             return replace(final, improvements=tuple(self.improvements))
         self._refuse_false_claims(final)
-        self._note(final)
+        limited = self._published is not None and final.verdict == Verdict.UNKNOWN and bool(final.assignment)
+        self._note(replace(final, verdict=Verdict.SOLUTION) if limited else final)  # the last gain before a limit
         best, now = self._best, time.monotonic()
         if best is None or (now < self._deadline and not _is_found(final)):
             return replace(final, improvements=tuple(self.improvements))

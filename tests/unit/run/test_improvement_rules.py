@@ -94,6 +94,16 @@ def test_a_limit_leaves_the_best_of_those_that_were_published(bench: Bench) -> N
     assert final.reason is None
 
 
+def test_the_last_assignment_before_a_limit_may_be_the_best(bench: Bench) -> None:
+    """Found by `make simulate`: the answer cost more than the robots' last assignment."""
+    bench.tick(1.2, answer(5))
+    limited = answer(4, Verdict.UNKNOWN, reason="the limit of messages was reached")
+    final = bench.made.concluded(limited, lost=False)
+    assert (final.verdict, final.cost, final.assignment) == (Verdict.SOLUTION, 4, {"X": 4})
+    assert final.reason == limited.reason
+    assert bench.published == [(1.2, 5), (1.2, 4)]
+
+
 def test_the_end_may_be_better_than_all_before(bench: Bench) -> None:
     bench.tick(1.0, answer(5))
     bench.now = 2.0
