@@ -21,7 +21,8 @@ LARGEST_FILE = 256 * 2**20
 FORMAT = 1
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Cost = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
-Name = Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9 .,_+:-]*$")]
+Name = Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9 .,_+:-]*\Z")]
+Place = Annotated[str, msgspec.Meta(max_length=400, pattern=r"^([\w.]+:[\w.]+)?\Z")]
 Text = Annotated[str, msgspec.Meta(max_length=1000)]
 
 
@@ -47,11 +48,13 @@ class Entrant(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=T
     Attributes:
         name: The name of the protocol.
         package: The package that offers it, with its version.
+        place: The module and the class of another package's protocol (MODULE:CLASS); empty for one of robochoc.
         source: The digest of the files of another package's protocol; empty for a protocol of robochoc.
     """
 
     name: Name
     package: Text = ""
+    place: Place = ""
     source: Text = ""
 
 

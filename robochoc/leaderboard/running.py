@@ -31,11 +31,12 @@ def entrants(names: Sequence[str]) -> list[Entrant]:
     Raises:
         UnknownProtocolError: if a protocol is not installed, or cannot be used.
     """
-    spelled = list(dict.fromkeys(map(installed_spelling, names)))
-    return [
-        Entrant(name=name, package=installed_protocol(name).package, source=digest_of_protocol(protocol_named(name)))
-        for name in spelled
-    ]
+    return [_entrant(name) for name in dict.fromkeys(map(installed_spelling, names))]
+
+
+def _entrant(name: str) -> Entrant:
+    source, offer = digest_of_protocol(protocol_named(name)), installed_protocol(name)
+    return Entrant(name=name, package=offer.package, place=offer.place if source else "", source=source)
 
 
 def run_leaderboard(

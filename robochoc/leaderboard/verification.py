@@ -1,11 +1,13 @@
-"""Verifies results: computes each cost again, compares each answer with the published one, and repeats runs."""
+"""Verifies results: computes each cost again, compares answers and claims with published ones, and repeats runs."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import groupby
 
 from robochoc.leaderboard.certificates import Certificate, published
+from robochoc.leaderboard.claims import claims_proof, wrong_claims
 from robochoc.leaderboard.export import checked_team
 from robochoc.leaderboard.instances import instance_named
 from robochoc.leaderboard.results import Entrant, LeaderboardResults, RunResult
@@ -13,23 +15,37 @@ from robochoc.leaderboard.running import comparable, entrants, run_leaderboard
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.traits import Traits
+from robochoc.run.registry import UnknownProtocolError, protocol_named
+from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError, check_user_cost, violations
 
 _ANSWERS = {Verdict.SOLUTION, Verdict.OPTIMAL}
 
 
 def wrong_answers(results: LeaderboardResults) -> Iterator[str]:
-    """Yield a sentence for each run whose answer is wrong.
+    """Yield a sentence for each fault of a run that can be found without repeating the run.
 
     Raises:
         ChangedInstanceError: if a generated team differs from the published list.
     """
+    traits = _known_traits(results.entrants)
     for name, runs in groupby(sorted(results.runs, key=lambda run: run.instance), key=lambda run: run.instance):
         team = checked_team(instance_named(name))
         last = team_after_events(team, len(team.scenario))
         for run in runs:
-            for fault in _faults(run, last, published()[name]):
+            best = published()[name]
+            for fault in (*_faults(run, last, best), *wrong_claims(run, last, best, traits.get(run.protocol))):
                 yield f"{run.protocol} on {name}: {fault}"
+
+
+def _known_traits(given: Sequence[Entrant]) -> dict[str, Traits]:
+    """Return the traits of the protocols that can be found here, by name."""
+    found = {}
+    for one in given:
+        with suppress(UnknownProtocolError):
+            found[one.name] = protocol_named(one.name).traits
+    return found
 
 
 def _faults(run: RunResult, team: Team, best: Certificate) -> Iterator[str]:
@@ -54,39 +70,65 @@ def _faults(run: RunResult, team: Team, best: Certificate) -> Iterator[str]:
         yield f"claims the optimum {run.cost}, but {best.proved_by} and {best.agreed_by} proved {best.cost}"
 
 
+class Repetition:
+    """The runs of a file that are repeated, and the reasons why others are not.
+
+    Only protocols that can be found here are run. Results that name a module do not make robochoc import it.
+
+    Args:
+        results: The results.
+        number: The number of repeated runs, at equal distances. None: all. Proofs that an incomplete protocol claims
+            are also repeated, since its traits do not decide whether it can prove them.
+    """
+
+    def __init__(self, results: LeaderboardResults, number: int | None) -> None:
+        self._results = results
+        self.remarks: list[str] = []
+        self.faults: list[str] = []
+        names = {one.name for one in results.entrants if self._can_be_repeated(one)}
+        here = [run for run in results.runs if run.protocol in names]
+        incomplete = {name for name in names if not protocol_named(name).traits.complete}
+        proofs = [run for run in here if run.protocol in incomplete and claims_proof(run)]
+        chosen = {(run.instance, run.protocol) for run in (*selected(here, number), *proofs)}
+        self.runs = [run for run in here if (run.instance, run.protocol) in chosen]
+
+    def _can_be_repeated(self, before: Entrant) -> bool:
+        """Return whether the protocol is here, with the same source files. Otherwise note the reason."""
+        runs = counted(sum(run.protocol == before.name for run in self._results.runs), "run")
+        try:
+            (now,) = entrants([before.name])
+        except UnknownProtocolError as unknown:
+            hint = f"its module is not installed; if you trust it, add --protocol {before.place}"
+            self.remarks.append(f"{runs} of {before.name} not repeated: {hint if before.place else unknown}")
+            return False
+        if not now.source and before.source:
+            self.faults.append(f"{before.name}: is a protocol of robochoc, but the results have a digest of its files")
+        elif now.source != before.source:
+            self.remarks.append(f"{runs} of {before.name} not repeated: its files ({now.package}) have changed")
+            return False
+        return True
+
+    def changed_runs(self, jobs: int = 1) -> Iterator[str]:
+        """Repeat the runs, and yield a sentence for each one with another result."""
+        yield from self.faults
+        by_instance: dict[str, list[RunResult]] = {}
+        for run in self.runs:
+            by_instance.setdefault(run.instance, []).append(run)
+        for name, own in by_instance.items():
+            named = entrants([run.protocol for run in own])
+            budget, seed = self._results.budget, self._results.seed
+            repeated = run_leaderboard(named, [instance_named(name)], budget, seed=seed, jobs=jobs)
+            for before, now in zip(own, repeated.runs, strict=True):
+                if fields := _differences(comparable(before), comparable(now)):
+                    yield f"{before.protocol} on {name}: another {', '.join(fields)}"
+
+
+def _differences(before: RunResult, now: RunResult) -> list[str]:
+    return [one for one in before.__struct_fields__ if getattr(before, one) != getattr(now, one)]
+
+
 def selected(runs: Sequence[RunResult], number: int | None) -> list[RunResult]:
     """Return `number` runs at equal distances, or all (None)."""
     if number is None or number >= len(runs):
         return list(runs)
     return [runs[place * len(runs) // number] for place in range(number)]
-
-
-def changed_runs(results: LeaderboardResults, runs: Sequence[RunResult], jobs: int = 1) -> Iterator[str]:
-    """Repeat runs, and yield a sentence for each one with another result.
-
-    Raises:
-        UnknownProtocolError: if a protocol is not installed.
-    """
-    by_instance: dict[str, list[RunResult]] = {}
-    for run in runs:
-        by_instance.setdefault(run.instance, []).append(run)
-    yield from _other_sources(results, {run.protocol for run in runs})
-    for name, own in by_instance.items():
-        named = entrants([run.protocol for run in own])
-        repeated = run_leaderboard(named, [instance_named(name)], results.budget, seed=results.seed, jobs=jobs)
-        for before, now in zip(own, repeated.runs, strict=True):
-            if comparable(before) != comparable(now):
-                fields = [
-                    one
-                    for one in before.__struct_fields__
-                    if getattr(comparable(before), one) != getattr(comparable(now), one)
-                ]
-                yield f"{before.protocol} on {name}: another {', '.join(fields)}"
-
-
-def _other_sources(results: LeaderboardResults, names: set[str]) -> Iterator[str]:
-    """Yield a sentence for each protocol that is installed in another version than that of the results."""
-    given: list[Entrant] = [one for one in results.entrants if one.name in names]
-    for before, now in zip(given, entrants([one.name for one in given]), strict=True):
-        if before.source != now.source:
-            yield f"{before.name}: the installed protocol has other source files ({now.package})"

@@ -46,7 +46,8 @@ def test_run_verify_submit_and_show(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (0, "")
     checked = robochoc_within("leaderboard", "verify", path, "--rerun", "2", "--jobs", "1")
     assert checked.stdout == f"{path}: 6 answers are right; 2 repeated runs gave the same results\n"
-    assert robochoc_within("leaderboard", "submit", path, "--board", board).returncode == 0
+    added = robochoc_within("leaderboard", "submit", path, "--board", board, "--rerun", "2", "--jobs", "1")
+    assert (added.returncode, added.stderr) == (0, checked.stdout)
     shown = robochoc_within("leaderboard", "show", board).stdout
     assert re.search(r"^random: Random binary problems$", shown, re.MULTILINE)
     assert "Not for this family: dba." in shown
@@ -61,7 +62,7 @@ def test_run_verify_submit_and_show(tmp_path: Path) -> None:
     altered = json.loads(path.read_text())
     altered["runs"][1]["cost"] -= 1
     path.write_text(json.dumps(altered))
-    wrong = robochoc_within("leaderboard", "submit", path, "--board", board)
+    wrong = robochoc_within("leaderboard", "submit", path, "--board", board, "--rerun", "0")
     assert (wrong.returncode, "mgm on random-small-0: the answer" in wrong.stderr) == (4, True)
 
 
@@ -75,10 +76,22 @@ def test_a_protocol_of_a_module_enters(tmp_path: Path, monkeypatch: pytest.Monke
     assert (entrant["name"], entrant["package"]) == ("breakout", "robochoc_breakout 0")
     with pytest.raises(UnknownProtocolError):
         protocol_named("breakout")
+    assert entrant["place"] == word
     unknown = robochoc_within("leaderboard", "verify", path, "--jobs", "1")
-    assert (unknown.returncode, "no protocol 'breakout' is installed" in unknown.stderr) == (2, True)
-    known = robochoc_within("leaderboard", "verify", path, "--jobs", "1", "--protocol", word)
+    assert (unknown.returncode, unknown.stdout) == (0, f"{path}: 2 answers are right\n")
+    assert f"2 runs of breakout not repeated: its module is not installed; if you trust it, add --protocol {word}" in (
+        unknown.stderr
+    )
+    known = robochoc_within("leaderboard", "verify", path, "--jobs", "1", "--rerun", "1", "--protocol", word)
     assert (known.returncode, known.stderr) == (0, "")
+    assert known.stdout == f"{path}: 2 answers are right; 1 repeated run gave the same result\n"
+    absent = robochoc_within("leaderboard", "verify", path, "--protocol", "nope:Nope")
+    assert (absent.returncode, "No module named 'nope'" in absent.stderr) == (2, True)
+    altered = json.loads(path.read_text())
+    altered["entrants"][0]["source"] = "0"
+    path.write_text(json.dumps(altered))
+    other = robochoc_within("leaderboard", "verify", path, "--protocol", word)
+    assert (other.returncode, "its files (robochoc_breakout 0) have changed" in other.stderr) == (0, True)
 
 
 def test_names_without_modules_need_no_package() -> None:

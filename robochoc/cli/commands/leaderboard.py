@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,12 +11,13 @@ import click
 from robochoc.cli.options.paths import InputPath, OutputFile
 from robochoc.cli.options.value_types import Seed, WholeNumber
 from robochoc.cli.reports.failures import LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
+from robochoc.system.plain_text import counted, on_one_line
 
 if TYPE_CHECKING:
-    from collections.abc import Iterator, Sequence
+    from collections.abc import Callable, Iterator, Sequence
 
     from robochoc.leaderboard.instances import Instance
-    from robochoc.leaderboard.results import Budget
+    from robochoc.leaderboard.results import Budget, LeaderboardResults
 
 SIZES = ("small",)
 BUDGET = {"messages": "messages", "ncccs": "ncccs", "cycles": "cycles", "time": "time_s"}
@@ -31,6 +33,19 @@ jobs_option = click.option(
 size_option = click.option(
     "--size", "sizes", multiple=True, type=click.Choice(SIZES), help="Size. Repeatable.  [default: all]"
 )
+
+
+def _repetition_options(command: Callable[..., None]) -> Callable[..., None]:
+    """Add the options of `verify` and `submit`."""
+    rerun = click.option(
+        "--rerun", type=WholeNumber(0), default=10, show_default=True, metavar="N", help="Number of runs to repeat."
+    )
+    everything = click.option("--all", "everything", is_flag=True, help="Repeat all runs.")
+    protocol = click.option(
+        "--protocol", "protocols", multiple=True, metavar="MODULE:CLASS",
+        help="Protocol that is not installed, to be imported and run. Repeatable.",
+    )  # fmt: skip
+    return rerun(everything(protocol(jobs_option(command))))
 
 
 @click.group()
@@ -169,24 +184,18 @@ def run(  # noqa: PLR0913 - options
             progress=show and (lambda done, planned: show(Progress(0, 0, f"{done:,} of {planned:,} runs"))),
         )
         write_results(results, output)
-    click.echo(f"{output}: {len(results.runs):,} runs; next: robochoc leaderboard show {output}")
+    click.echo(f"{output}: {counted(len(results.runs), 'run')}; next: robochoc leaderboard show {output}")
 
 
 @leaderboard.command(short_help="Check results: compute costs again, repeat runs.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.json")
-@click.option(
-    "--rerun", type=WholeNumber(0), default=10, show_default=True, metavar="N", help="Number of runs to repeat."
-)
-@click.option("--all", "everything", is_flag=True, help="Repeat all runs.")
-@click.option(
-    "--protocol", "protocols", multiple=True, metavar="MODULE:CLASS", help="Protocol that is not installed. Repeatable."
-)
-@jobs_option
+@_repetition_options
 @invalid_input_fails
 def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | None, *, everything: bool) -> None:
-    """Check the results in a file: each answer against every constraint and the published optimum; repeat some runs.
+    """Check the results in a file: answers, claimed proofs, curves and counts of all runs; repeat some runs.
 
-    Faults are printed, with exit status 4. To repeat runs of a protocol that is not installed, name it with --protocol.
+    Faults are printed, with exit status 4. Modules that the file names are not imported: to repeat runs of a protocol
+    that is not installed, name it with --protocol. The guide (page Leaderboard) lists all that is checked.
 
     \b
     robochoc leaderboard verify results.json
@@ -195,42 +204,34 @@ def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | No
     from robochoc.leaderboard.results import read_results
 
     found = read_results(results)
-    from robochoc.leaderboard.outside import named_protocols
-
-    with errors_as_failures(results), named_protocols(protocols):
-        from robochoc.leaderboard.verification import changed_runs, selected, wrong_answers
-        from robochoc.system.posix import usable_processors
-
-        runs = selected(found.runs, None if everything else rerun)
-        faults = [*wrong_answers(found), *changed_runs(found, runs, jobs or usable_processors())]
-    _fail(results, faults)
-    repeated = f"; {len(runs):,} repeated runs gave the same results" if runs else ""
-    click.echo(f"{results}: {len(found.runs):,} answers are right{repeated}")
+    with _verified(found, results, None if everything else rerun, protocols, jobs) as checked:
+        click.echo(f"{results}: {checked}")
 
 
 @leaderboard.command(short_help="Add results to a board.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.json")
 @click.option("--board", type=InputPath(), required=True, metavar="FOLDER", help="Folder with the files of results.")
+@_repetition_options
 @invalid_input_fails
-def submit(results: Path, board: Path) -> None:
-    """Check the answers in a file of results, and add the file to a board, which is a folder.
+def submit(
+    results: Path, board: Path, rerun: int, protocols: tuple[str, ...], jobs: int | None, *, everything: bool
+) -> None:
+    """Verify the results in a file as `verify` does, and add the file to a board, which is a folder.
 
     All results of a board have the same budget, seed and version. A file of the same name is replaced.
 
     \b
     robochoc leaderboard submit results.json --board board/
     """  # noqa: D301 - \\b keeps click from wrapping the lines
-    from robochoc.leaderboard.board import submit as submit_results
     from robochoc.leaderboard.results import read_results
 
     found = read_results(results)
-    with errors_as_failures(results):
-        from robochoc.leaderboard.verification import wrong_answers
+    with _verified(found, results, None if everything else rerun, protocols, jobs) as checked:
+        from robochoc.leaderboard.board import submit as submit_results
 
-        faults = list(wrong_answers(found))
-        _fail(results, faults)
         path = submit_results(found, results.name, board)
-    click.echo(f"{path}: {len(found.runs):,} runs; next: robochoc leaderboard show {board}")
+        click.echo(f"{results}: {checked}", err=True)
+    click.echo(f"{path}: {counted(len(found.runs), 'run')}; next: robochoc leaderboard show {board}")
 
 
 @leaderboard.command(short_help="Show tables, or write a static site.")
@@ -264,11 +265,38 @@ def show(paths: tuple[Path, ...], site: Path | None, markdown: Path | None) -> N
         print_board(results)
 
 
+@contextmanager
+def _verified(
+    found: LeaderboardResults, path: Path, number: int | None, protocols: tuple[str, ...], jobs: int | None
+) -> Iterator[str]:
+    """Verify results, with the named protocols available, and provide a summary.
+
+    Raises:
+        Failure: if there are faults.
+    """
+    from robochoc.leaderboard.outside import named_protocols
+
+    with errors_as_failures(path), named_protocols(protocols) as names:
+        from robochoc.leaderboard.running import entrants
+        from robochoc.leaderboard.verification import Repetition, wrong_answers
+        from robochoc.system.posix import usable_processors
+
+        entrants(names)  # a protocol that cannot be used is an error
+        repetition = Repetition(found, number)
+        for remark in repetition.remarks:
+            click.echo(f"{path}: {on_one_line(remark)}", err=True)
+        _fail(path, [*wrong_answers(found), *repetition.changed_runs(jobs or usable_processors())])
+        answers, many = len(found.runs), len(repetition.runs)
+        summary = f"{counted(answers, 'answer')} {'is' if answers == 1 else 'are'} right"
+        repeated = f"; {counted(many, 'repeated run')} gave the same result{'' if many == 1 else 's'}"
+        yield summary + (repeated if many else "")
+
+
 def _fail(path: Path, faults: Sequence[str]) -> None:
     """Raise `Failure` with the first faults, if there are any."""
     if faults:
         more = [f"and {len(faults) - MOST_FAULTS:,} more"] if len(faults) > MOST_FAULTS else []
-        raise Failure(LOST, "\n".join(f"{path}: {line}" for line in [*faults[:MOST_FAULTS], *more]))
+        raise Failure(LOST, "\n".join(f"{path}: {on_one_line(line)}" for line in [*faults[:MOST_FAULTS], *more]))
 
 
 def _instances(families: tuple[str, ...], sizes: tuple[str, ...], seeds: Sequence[int] = ()) -> Iterator[Instance]:

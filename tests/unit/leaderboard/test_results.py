@@ -15,7 +15,7 @@ from robochoc.leaderboard.board import read_board, submit
 from robochoc.leaderboard.instances import instances
 from robochoc.leaderboard.results import Budget, LeaderboardResults, read_results, write_results
 from robochoc.leaderboard.running import entrants, run_leaderboard
-from robochoc.leaderboard.verification import changed_runs, selected, wrong_answers
+from robochoc.leaderboard.verification import Repetition, wrong_answers
 from robochoc.run.registry import UnknownProtocolError
 from tests.support.cases import cases
 from tests.support.studies import RunsHere
@@ -47,7 +47,7 @@ def test_the_same_runs_are_the_same_bytes(results: LeaderboardResults, tmp_path:
 
 def test_answers_are_right_and_runs_are_repeated(results: LeaderboardResults) -> None:
     assert list(wrong_answers(results)) == []
-    assert list(changed_runs(results, selected(results.runs, 4))) == []
+    assert list(Repetition(results, 4).changed_runs()) == []
     by_name = {(run.instance, run.protocol): run for run in results.runs}
     assert by_name["random-small-0", "dpop"].verdict == "optimal"
     assert by_name["random-small-0", "afc-ng"].status == Status.REFUSED
@@ -86,7 +86,72 @@ def test_wrong_answers_are_found(results: LeaderboardResults) -> None:
 
 def test_other_results_of_a_repeated_run_are_found(results: LeaderboardResults) -> None:
     altered = changed(results, "random-small-0", "mgm", messages=3)
-    assert list(changed_runs(altered, altered.runs[:3])) == ["mgm on random-small-0: another messages"]
+    assert list(Repetition(altered, None).changed_runs()) == ["mgm on random-small-0: another messages"]
+
+
+def curve_of(results: LeaderboardResults, protocol: str) -> list[tuple[int, int]]:
+    return next(run.curve for run in results.runs if (run.instance, run.protocol) == ("random-small-0", protocol))
+
+
+def test_contradictions_are_found_without_a_repetition(results: LeaderboardResults) -> None:
+    curve = curve_of(results, "mgm")
+    (first, dear), (last, cost) = curve[0], curve[-1]
+    wrong: list[tuple[str, str, dict[str, Any], str]] = [
+        ("random-small-0", "mgm", {"curve": [(first, 1)]}, "the curve reaches 1, but toulbar2"),
+        (
+            "random-small-0",
+            "mgm",
+            {"curve": [(first, dear)]},
+            f"the curve ends with {dear}, but the answer costs {cost}",
+        ),
+        ("random-small-0", "mgm", {"curve": [*curve, (last, cost)]}, "is not better than the one before"),
+        ("random-small-0", "mgm", {"curve": [(last + 1, dear), *curve[1:]]}, "the messages of the curve decrease"),
+        ("random-small-0", "mgm", {"curve": [*curve[:-1], (10**6, cost)]}, "the curve has 1,000,000 messages, but"),
+        ("random-small-0", "mgm", {"bytes": None}, "has a verdict, but not all of messages, bytes"),
+        ("dynamic-small-0", "dpop", {"curve": [(1, 5)]}, "has a curve, although the problem changes"),
+        ("coloring-hard-small-0", "mgm", {"curve": [(1, 5)]}, "has a curve, although the problem has no costs"),
+        ("random-small-0", "afc-ng", {"verdict": "optimal"}, "the protocol does not minimise costs"),
+    ]
+    with cases() as each:
+        for instance, protocol, values, fault in wrong:
+            with each(fault):
+                altered = changed(results, instance, protocol, **values)
+                assert any(fault in line for line in wrong_answers(altered)), list(wrong_answers(altered))
+
+
+def test_profits_that_are_maximised_rise_along_the_curve() -> None:
+    results = run_leaderboard(entrants(["mgm2"]), list(instances(["meetings"], ["small"], [0])), BUDGET)
+    (run,) = results.runs
+    assert len(run.curve) > 1
+    assert list(wrong_answers(results)) == []
+    falling = msgspec.structs.replace(run, curve=run.curve[::-1])
+    assert any("not better" in line for line in wrong_answers(msgspec.structs.replace(results, runs=[falling])))
+
+
+def test_proofs_that_an_incomplete_protocol_claims_are_always_repeated(results: LeaderboardResults) -> None:
+    best = next(run for run in results.runs if (run.instance, run.protocol) == ("random-small-0", "dpop"))
+    answer = {"verdict": "optimal", "cost": best.cost, "assignment": best.assignment}
+    altered = changed(results, "random-small-0", "mgm", **answer, curve=[(5, best.cost)])
+    assert list(wrong_answers(altered)) == []
+    repetition = Repetition(altered, 0)
+    assert [(run.instance, run.protocol) for run in repetition.runs] == [("random-small-0", "mgm")]
+    assert any("another verdict, cost" in line for line in repetition.changed_runs())
+
+
+def with_entrant(results: LeaderboardResults, **values: str) -> LeaderboardResults:
+    entrant = msgspec.structs.replace(results.entrants[0], **values)
+    own = [msgspec.structs.replace(run, protocol=entrant.name) for run in results.runs if run.protocol == "dpop"]
+    return msgspec.structs.replace(results, entrants=[entrant], runs=own)
+
+
+def test_protocols_that_cannot_be_found_are_not_repeated(results: LeaderboardResults) -> None:
+    absent = Repetition(with_entrant(results, name="mine", place="my_module:Mine", source="1"), None)
+    assert absent.runs == []
+    assert absent.remarks == [
+        "4 runs of mine not repeated: its module is not installed; if you trust it, add --protocol my_module:Mine"
+    ]
+    ours = Repetition(with_entrant(results, source="1"), 0)
+    assert list(ours.changed_runs()) == ["dpop: is a protocol of robochoc, but the results have a digest of its files"]
 
 
 def test_invalid_files_are_refused(results: LeaderboardResults, tmp_path: Path) -> None:
@@ -102,6 +167,8 @@ def test_invalid_files_are_refused(results: LeaderboardResults, tmp_path: Path) 
             ({**plain, "entrants": plain["entrants"] * 2}, "names an entrant twice"),
             ({**plain, "runs": [{**first, "cost": 2**60}]}, "has no valid results"),
             ({**plain, "runs": [{**first, "protocol": "\x1b[31m"}]}, "has no valid results"),
+            ({**plain, "entrants": [{"name": "dpop", "place": "a:B\n"}]}, "has no valid results"),
+            ({**plain, "runs": [{**first, "messages": -1}]}, "has no valid results"),
             ({**plain, "more": 1}, "has no valid results"),
             ([], "has no valid results"),
         ]:
