@@ -5,20 +5,32 @@ The package `mcp` is an extra and is imported when a server is made. robochoc ca
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
 from threading import Lock
-from typing import TYPE_CHECKING
+from types import NoneType
+from typing import TYPE_CHECKING, Any
 
+import msgspec
+
+from robochoc.formats.diagnostics import shortened
 from robochoc.seats.moves import Limits
 from robochoc.seats.report import GameReport
 from robochoc.seats.seat_game import SeatGame, value_text
 from robochoc.solver.errors import UnsupportedError
+from robochoc.system.plain_text import counted, listed
 
 if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
 
 MOST_TOKENS = 1 << 53
+_ARGUMENTS: dict[str, dict[str, tuple[type, ...]]] = {
+    "propose": {"value": (int,), "announce": (int, NoneType)},
+    "say": {"to": (str,), "text": (str,)},
+    "end_turn": {"tokens": (int,)},
+}
+"""The arguments of the tools, with their types. The package `mcp` would convert other types: true to 1."""
+_OPTIONAL = {"announce", "tokens"}
 
 
 class SeatTools:
@@ -33,6 +45,12 @@ class SeatTools:
     def __init__(self, game: SeatGame, limits: Limits, described: Callable[[GameReport], Iterable[str]]) -> None:
         self._game, self._limits, self._described = game, limits, described
         self._lock = Lock()  # tools run in threads
+        number = f"choose a number from 1 to {len(game.values)}"
+        neighbours = f"choose one of {', '.join(game.neighbours)}" if game.neighbours else "you have no neighbours"
+        tokens = "give a whole number of at least 0"
+        self._hints = {
+            "value": number, "announce": number, "to": neighbours, "text": "give a text", "tokens": tokens,
+        }  # fmt: skip
         self._value: int | None = None
         self._announce: int | None = None
         self._texts: list[tuple[str, str]] = []
@@ -71,7 +89,7 @@ class SeatTools:
             yield f"{name} says: {text}"
         yield "If these values stay, your values cost:"
         for number, (broken, cost) in enumerate(game.costs(), 1):
-            rules = f", {broken} broken rules" if broken else ""
+            rules = f", {counted(broken, 'broken rule')}" if broken else ""
             yield f"{number}. {value_text(game.values[number - 1])}: {cost:g}{rules}"
 
     def propose(self, value: int, announce: int | None = None) -> str:
@@ -91,9 +109,7 @@ class SeatTools:
         with self._lock:
             self._refuse_after_the_end()
             if to not in self._game.neighbours:
-                raise UnsupportedError(
-                    f"{to!r:.100} is not a neighbour: choose one of {', '.join(self._game.neighbours)}"
-                )
+                raise UnsupportedError(f"{to!r:.100} is not a neighbour: {self._hints['to']}")
             if len(self._texts) >= self._limits.messages:
                 raise UnsupportedError(f"you have sent {self._limits.messages} texts in this round: end your turn")
             if len(text) > self._limits.characters_each:
@@ -109,7 +125,9 @@ class SeatTools:
         """
         with self._lock:
             self._refuse_after_the_end()
-            broken = self._game.play(self._value, self._announce, self._texts, min(max(tokens, 0), MOST_TOKENS))
+            if tokens < 0:
+                raise UnsupportedError(f"tokens cannot be {tokens}: {self._hints['tokens']}")
+            broken = self._game.play(self._value, self._announce, self._texts, min(tokens, MOST_TOKENS))
             self._value = self._announce = None
             self._texts = []
             return "\n".join([*(f"Broken rule: {one.rule} {one.details}" for one in broken), *self._state()])
@@ -120,12 +138,27 @@ class SeatTools:
 
     def _index(self, number: int) -> int:
         if not 1 <= number <= len(self._game.values):
-            raise UnsupportedError(f"there is no value {number}: choose a number from 1 to {len(self._game.values)}")
+            raise UnsupportedError(f"there is no value {number}: {self._hints['value']}")
         return number - 1
 
+    def refuse_wrong_arguments(self, tool: str, given: Mapping[str, object]) -> None:
+        """Raise `UnsupportedError` if arguments of a tool are unknown, missing, or of a wrong type."""
+        types = _ARGUMENTS.get(tool, {})
+        for name, value in given.items():
+            if name not in types:
+                known = f"its arguments are {listed(types)}" if types else "it has no arguments"
+                raise UnsupportedError(f"{tool} has no argument {name!r:.100}: {known}")
+            if type(value) not in types[name]:
+                shown = shortened(msgspec.json.encode(value).decode())
+                raise UnsupportedError(f"{name} cannot be {shown}: {self._hints[name]}")
+        if missing := [name for name in types if name not in given and name not in _OPTIONAL]:
+            raise UnsupportedError(f"{missing[0]} is missing: {self._hints[missing[0]]}")
 
-def seat_server(game: SeatGame, limits: Limits, described: Callable[[GameReport], Iterable[str]]) -> MCPServer:
-    """Return an MCP server with the tools of a seat; for the arguments see `SeatTools`.
+
+def seat_server(
+    game: SeatGame, limits: Limits, described: Callable[[GameReport], Iterable[str]], version: str = ""
+) -> MCPServer:
+    """Return an MCP server with the tools of a seat; for the arguments see `SeatTools`. `version` is robochoc's.
 
     Raises:
         UnsupportedError: if the package `mcp` is not installed.
@@ -136,8 +169,20 @@ def seat_server(game: SeatGame, limits: Limits, described: Callable[[GameReport]
     except ImportError:
         raise UnsupportedError("a seat for MCP clients requires mcp: run pip install 'robochoc[mcp]'") from None
     tools = SeatTools(game, limits, described)
-    server = MCPServer(
+
+    class SeatServer(MCPServer):
+        """A server that checks arguments before the package converts them."""
+
+        async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:  # noqa: ANN401 - as in the base class
+            try:
+                tools.refuse_wrong_arguments(name, arguments)
+            except UnsupportedError as refused:
+                raise ToolError(str(refused)) from None
+            return await super().call_tool(name, arguments, context)
+
+    server = SeatServer(
         "robochoc",
+        version=version,
         instructions=f"You play the robot {game.robot}. Call see_problem first. In each round, call see_messages,"
         " propose a value, say something if you like, and call end_turn.",
         log_level="ERROR",

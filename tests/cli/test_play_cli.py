@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -13,7 +15,7 @@ from robochoc.cli.commands.play import MOST_ROUNDS
 from robochoc.cli.options.value_types import LARGEST_SEED, MOST
 from robochoc.formats import write_team
 from tests.support.limits import HANG_S
-from tests.support.program import robochoc_within
+from tests.support.program import ROOT, robochoc_within
 from tests.support.seats import lamps, program
 
 
@@ -58,6 +60,13 @@ def test_json_and_journal(team: Path, tmp_path: Path) -> None:
     assert robochoc_within("privacy", path).returncode == 0
 
 
+def test_a_client_that_leaves_before_the_end(team: Path) -> None:
+    words = [sys.executable, "-m", "robochoc", "play", str(team), "--mcp", "r1", "--others", "greedy", "--rounds", "2"]
+    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, cwd=ROOT)
+    assert (done.returncode, done.stdout) == (4, "")
+    assert done.stderr == "the MCP client left in round 1 of 2, so there is no report\n"
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
@@ -74,6 +83,7 @@ def test_json_and_journal(team: Path, tmp_path: Path) -> None:
         (("--optimum", "dpopp"), "no protocol"),
         (("--optimum", "dsa"), "dsa is incomplete"),
         (("--coalition", "r1,r1"), "names r1 twice"),
+        (("--mcp", "r1", "--mcp", "r2"), "--mcp is given 2 times"),
     ],
 )  # fmt: skip
 def test_wrong_usage(team: Path, words: tuple[str, ...], says: str) -> None:

@@ -12,7 +12,7 @@ from robochoc.cli.options.paths import TeamFolder, refuse_same_places
 from robochoc.cli.options.recording import journal_option, recording
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.value_types import Number, Seed, WholeNumber
-from robochoc.cli.reports.failures import USAGE, Failure, errors_as_failures, invalid_input_fails
+from robochoc.cli.reports.failures import LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.journal.recorder import JournalRecorder
@@ -36,7 +36,7 @@ _SECTIONS: Sections = {
     help="Let a program play ROBOT. It reads and writes JSON lines.",
 )  # fmt: skip
 @click.option(
-    "--mcp", metavar="ROBOT",
+    "--mcp", "mcps", multiple=True, metavar="ROBOT",
     help="Let an MCP client play ROBOT over standard input and output, without a time limit.",
 )  # fmt: skip
 @click.option(
@@ -75,7 +75,7 @@ def play(  # noqa: PLR0913 - options, by name
     team: Path,
     *,
     seats: tuple[str, ...],
-    mcp: str | None,
+    mcps: tuple[str, ...],
     players: tuple[str, ...],
     others: str,
     rounds: int,
@@ -93,7 +93,8 @@ def play(  # noqa: PLR0913 - options, by name
     A robot is played by an outside program (--seat), such as an agent with a language model or an interface for a
     person, by a built-in player, or by a protocol. The report has the regret to the certified optimum, messages and
     tokens, what was disclosed, lies, and broken rules. A program that is late, ends or breaks a rule loses its move;
-    the game goes on. Exit status: 0 if the game was played to its end, whatever the players did.
+    the game goes on. Exit status: 0 if the game was played to its end, whatever the players did; 4 if an MCP client
+    left before.
 
     \b
     robochoc play out/team --others random                a baseline
@@ -104,7 +105,9 @@ def play(  # noqa: PLR0913 - options, by name
     from robochoc.seats import GameOptions, Limits, header_of, play
     from robochoc.seats.moves import PlayerError
 
-    if mcp and as_json:
+    if len(mcps) > 1:
+        raise Failure(USAGE, f"--mcp is given {len(mcps)} times: one client plays one robot")
+    if mcps and as_json:
         raise Failure(USAGE, "--mcp cannot be used with --json: the client receives the report")
     refuse_same_places({"--journal": journal}, teams=(team,))
     commands = {name: _words(name, text) for name, text in _pairs("--seat", seats).items()}
@@ -122,8 +125,8 @@ def play(  # noqa: PLR0913 - options, by name
     with recording(journal, lambda: header_of(problem, options)) as recorder:
         with errors_as_failures(team):
             try:
-                if mcp:
-                    _serve(problem, mcp, options, recorder)
+                if mcps:
+                    _serve(problem, mcps[0], options, recorder)
                     return
                 report = play(problem, options, recorder)
             except PlayerError as refused:
@@ -133,17 +136,24 @@ def play(  # noqa: PLR0913 - options, by name
 
 
 def _serve(team: Team, robot: str, options: GameOptions, recorder: JournalRecorder | None) -> None:
-    """Let an MCP client play `robot`, until it closes the connection. The report also goes to standard error."""
+    """Let an MCP client play `robot`, until it closes the connection. The report also goes to standard error.
+
+    Raises:
+        Failure: if the client leaves before the end of the game.
+    """
+    from robochoc import __version__
     from robochoc.cli.reports.play import game_lines
     from robochoc.seats.mcp_server import seat_server
     from robochoc.seats.seat_game import SeatGame
 
     game = SeatGame(team, robot, options, recorder)
     try:
-        seat_server(game, options.limits, game_lines).run()
+        seat_server(game, options.limits, game_lines, __version__).run()
     finally:
         game.close()
-    for line in game_lines(game.report) if game.report else ("the client left before the end of the game",):
+    if game.report is None:
+        raise Failure(LOST, f"the MCP client left in round {game.round} of {game.rounds}, so there is no report")
+    for line in game_lines(game.report):
         click.echo(line, err=True)
 
 

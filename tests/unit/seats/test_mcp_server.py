@@ -12,9 +12,10 @@ from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
 from mcp.types import CallToolResult, TextContent
 
+import robochoc
 from robochoc.formats import write_team
 from robochoc.seats import GameOptions, Limits
-from robochoc.seats.mcp_server import seat_server
+from robochoc.seats.mcp_server import SeatTools, seat_server
 from robochoc.seats.seat_game import SeatGame
 from robochoc.solver.errors import UnsupportedError
 from tests.support.limits import HANG_S
@@ -59,6 +60,8 @@ def test_a_game_over_stdio_with_journal(tmp_path: Path) -> None:
     async def play() -> None:
         async with Client(stdio_client(command)) as client:
             with anyio.fail_after(HANG_S):
+                assert client.server_info is not None
+                assert client.server_info.version == robochoc.__version__
                 tools = {tool.name for tool in (await client.list_tools()).tools}
                 assert tools == {"see_problem", "see_messages", "propose", "say", "end_turn"}
                 assert "1. r1.c = 0 (private cost 0)" in text(await client.call_tool("see_problem", {}))
@@ -94,11 +97,19 @@ def test_the_report_has_lies_texts_and_tokens() -> None:
     [
         ("propose", {"value": 4}, "choose a number from 1 to 3"),
         ("propose", {"value": 0}, "choose a number from 1 to 3"),
-        ("propose", {"value": "red"}, "valid integer"),
+        ("propose", {"value": "red"}, 'value cannot be "red": choose a number from 1 to 3'),
+        ("propose", {"value": True}, "value cannot be true: choose a number from 1 to 3"),
+        ("propose", {"value": "1"}, 'value cannot be "1": choose a number from 1 to 3'),
+        ("propose", {"value": 1.0}, "value cannot be 1.0: choose a number from 1 to 3"),
+        ("propose", {}, "value is missing: choose a number from 1 to 3"),
+        ("propose", {"value": 1, "color": 2}, "propose has no argument 'color': its arguments are value and announce"),
+        ("see_problem", {"robot": "r0"}, "see_problem has no argument 'robot': it has no arguments"),
+        ("say", {"to": "r0", "text": 7}, "text cannot be 7: give a text"),
         ("propose", {"value": 1, "announce": -1}, "choose a number from 1 to 3"),
         ("say", {"to": "r3", "text": "hello"}, "choose one of r0, r2"),
         ("say", {"to": "r0", "text": "x" * 21}, "the text has 21 characters"),
-        ("end_turn", {"tokens": "many"}, "valid integer"),
+        ("end_turn", {"tokens": "many"}, 'tokens cannot be "many": give a whole number of at least 0'),
+        ("end_turn", {"tokens": -1}, "tokens cannot be -1: give a whole number of at least 0"),
     ],
 )
 def test_a_wrong_call_is_an_error_in_words(tool: str, given: dict[str, object], says: str) -> None:
@@ -108,6 +119,16 @@ def test_a_wrong_call_is_an_error_in_words(tool: str, given: dict[str, object], 
         assert says in text(result)
 
     in_process(playing)
+
+
+def test_one_broken_rule_is_singular() -> None:
+    model = robochoc.Model("colours")
+    one, other = (model.robot(f"r{number}").variable("c", range(2)) for number in range(2))
+    model.add(one != other)
+    game = SeatGame(model.team, "r1", GameOptions(others="script:0", rounds=2, optimum=None))
+    tools = SeatTools(game, LIMITS, lambda _: [])
+    assert "1. r1.c = 0: 0, 1 broken rule\n" in tools.end_turn()
+    game.close()
 
 
 def test_limits_and_the_end() -> None:
