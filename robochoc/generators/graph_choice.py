@@ -90,7 +90,7 @@ class GraphChoice:
             raise ValueError(f"{dashes}agents is missing")
         if self.kind == GraphKind.RANDOM:
             if density is None:
-                raise ValueError(f"{dashes}{density_name} is missing (without {dashes}graph)")
+                raise ValueError(f"{dashes}{density_name} is missing (required for {dashes}graph random)")
             return None
         if density is not None:
             why = f"of {self.kind} it follows from the other parameters"

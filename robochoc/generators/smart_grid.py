@@ -71,9 +71,16 @@ def smart_grid(
         ValueError: A number is out of bounds, or too many devices can run in the same slot.
     """
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "devices": (devices, 1, MAX_DEVICES)})
-    check_bounds({"slots": (slots, 2, MAX_SLOTS), "duration": (duration, 1, slots)})
-    check_bounds({"window": (window, 1, slots - duration + 1), "consumption": (consumption, 1, MAX_COST)})
+    check_bounds({"slots": (slots, 2, MAX_SLOTS), "duration": (duration, 1, MAX_SLOTS)})
+    check_bounds({"window": (window, 1, MAX_SLOTS), "consumption": (consumption, 1, MAX_COST)})
     check_bounds({"supply": (supply, 0, MAX_COST)})
+    if duration > slots:
+        raise ValueError(f"duration is {duration}, but there are only {slots} slots: use more slots, or a shorter one")
+    if (starts := slots - duration + 1) < window:
+        raise ValueError(
+            f"window is {window}, but a device that runs for {duration} of the {slots} slots can start in only {starts}"
+            " of them: use more slots, a shorter duration or a smaller window"
+        )
     chance = seeded(seed)
     homes: dict[str, list[Device]] = {}
     for home in range(1, agents + 1):

@@ -6,15 +6,17 @@ Workers find protocols by entry points, so each class is declared in a temporary
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from robochoc.run.registry import GROUP
+from robochoc.run.registry import GROUP, UnknownProtocolError, installed_protocol, protocol_names
 
 _PATH = "PYTHONPATH"
+_PLACE = re.compile(r"[\w.]+:[\w.]+")
 
 
 @contextmanager
@@ -22,8 +24,11 @@ def named_protocols(words: Sequence[str]) -> Iterator[list[str]]:
     """Provide the names of protocols, each given as a name or as MODULE:CLASS.
 
     The name of a class is its name in lower case, with hyphens. Modules are also searched in the current folder.
+
+    Raises:
+        UnknownProtocolError: if a word is not valid, a class cannot be used, or its name is that of another protocol.
     """
-    places = {_name(word): word for word in words if ":" in word}
+    places = _places([word for word in words if ":" in word])
     names = [_name(word) if ":" in word else word for word in words]
     if not places:
         yield names
@@ -36,6 +41,9 @@ def named_protocols(words: Sequence[str]) -> Iterator[list[str]]:
         os.environ[_PATH] = os.pathsep.join([*added, *filter(None, [before])])
         sys.path[:0] = added
         try:
+            for name, place in places.items():
+                if fault := installed_protocol(name).broken:
+                    raise UnknownProtocolError(f"{place} {fault}")
             yield names
         finally:
             del sys.path[: len(added)]
@@ -43,6 +51,19 @@ def named_protocols(words: Sequence[str]) -> Iterator[list[str]]:
                 del os.environ[_PATH]
             else:
                 os.environ[_PATH] = before
+
+
+def _places(words: Sequence[str]) -> dict[str, str]:
+    """Return the places of protocols, MODULE:CLASS, by the names of the protocols."""
+    places: dict[str, str] = {}
+    for word in words:
+        if not _PLACE.fullmatch(word):
+            raise UnknownProtocolError(f"{word!r} is not of the form MODULE:CLASS")
+        name = _name(word)
+        if name in protocol_names() or places.get(name, word) != word:
+            raise UnknownProtocolError(f"{word}: another protocol is called {name!r}: rename the class")
+        places[name] = word
+    return places
 
 
 def _declare(metadata: Path, name: str, place: str) -> None:

@@ -53,7 +53,9 @@ class TeamRounds:
         self.problems = {name: LocalProblem(part) for name, part in parts.items()}
         for name, problem in self.problems.items():
             if not problem.values:
-                raise UnsupportedError(f"{name} has no possible value: its private constraints exclude all of them")
+                raise UnsupportedError(
+                    f"{name} has no possible value: relax its private constraints, which exclude all of them"
+                )
         self.violation_cost = withdrawal_cost(self.team) if violation_cost is None else violation_cost
         self._objective = Objective(self.team)
         self.values: dict[str, int] = {}

@@ -133,7 +133,11 @@ def test_what_does_not_fit_is_wrong_usage(tmp_path: Path) -> None:
             ("coloring --agents 5 --graph small-world --neighbours 3", "must be even"),
             ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),
             ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
-            ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
+            ("tasks --agents 3 --tasks 2 --skilled 2", "--skilled is 2"),
+            ("agentsnet --task coloring --agents 3", "--degree is missing (required for --graph random)"),
+            ("agentsnet --task coloring", "--agents is missing"),
+            ("smart-grid --agents 3 --slots 3 --duration 4", "--duration is 4, but there are only 3 slots: use more"),
+            ("smart-grid --agents 3 --slots 3", "--window is 3, but a device that runs for 3 of the 3 slots can start"),
             (f"formation --map {BUILDING}", "agents is missing: give the number of robots, or their places with at"),
             (
                 f"formation --map {BUILDING} --agents 2 --anchor 80,2.5",

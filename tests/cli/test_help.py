@@ -56,6 +56,7 @@ def test_every_command_has_help_without_an_option_that_is_not_explained(every: d
                 done = CliRunner().invoke(cli, [*name.split(), "--help"])
                 assert done.exit_code == 0
                 assert REST not in done.stdout
+                assert "=None" not in done.stdout
                 assert [one.opts for one in options_of(command) if not one.help] == []
 
 

@@ -103,7 +103,14 @@ def test_wrong_usage() -> None:
     with cases() as each:
         for words, message in [
             (["run", "dqop"], "did you mean 'dpop'"),
-            (["run", "nope:Nope"], "No module named 'nope'"),
+            (
+                ["run", "nope:Nope"],
+                "nope:Nope cannot be imported: ModuleNotFoundError: No module named 'nope'",
+            ),
+            (["run", "fake:MGM"], "fake:MGM: another protocol is called 'mgm': rename the class"),
+            (["run", "one:Mine", "other:Mine"], "other:Mine: another protocol is called 'mine': rename the class"),
+            (["run", "evil:"], "'evil:' is not of the form MODULE:CLASS"),
+            (["run", "json:JSONDecoder"], "json:JSONDecoder is not a subclass of Protocol"),
             (["run", "dpop", "--budget", "hours=3"], "'hours=3' is not one of messages, ncccs, cycles, time"),
             (["run", "dpop", "--budget", "messages=0"], "--budget: Expected `int` >= 1"),
             (["run", "dpop", "--family", "rndom"], "did you mean 'random'"),

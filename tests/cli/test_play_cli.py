@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import robochoc
 from robochoc.cli.commands.check import MOST_TEAMS
 from robochoc.cli.commands.play import MOST_ROUNDS
 from robochoc.cli.options.value_types import LARGEST_SEED, MOST
@@ -65,6 +66,15 @@ def test_a_client_that_leaves_before_the_end(team: Path) -> None:
     done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, cwd=ROOT)
     assert (done.returncode, done.stdout) == (4, "")
     assert done.stderr == "the MCP client left in round 1 of 2, so there is no report\n"
+
+
+def test_a_robot_without_a_possible_value(tmp_path: Path) -> None:
+    model = robochoc.Model("stuck")
+    model.add(model.robot("r0").variable("c", range(2)) > 5)
+    write_team(model.team, tmp_path / "stuck")
+    done = robochoc_within("play", tmp_path / "stuck")
+    assert done.returncode == 2
+    assert "r0 has no possible value: relax its private constraints, which exclude all of them" in done.stderr
 
 
 @pytest.mark.parametrize(

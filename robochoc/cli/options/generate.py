@@ -90,7 +90,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     except InvalidInputError:
         raise
     except ValueError as error:
-        raise click.UsageError(str(error)) from None
+        raise click.UsageError(_with_dashes(str(error))) from None
     team, ground = made if isinstance(made, tuple) else (made, None)
     folder = output or Path("instances") / team.name
     other_files = {}
@@ -105,6 +105,16 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")
     if ground:
         click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m, and walls that drones fly around")
+
+
+def _with_dashes(message: str) -> str:
+    """Return `message` with the option of this command for a parameter at its start: `--degree is 9; it must ...`."""
+    name, _, rest = message.partition(" ")
+    context = click.get_current_context(silent=True)
+    for option in context.command.params if context else ():
+        if option.name == name and isinstance(option, click.Option) and rest.startswith(("is ", "has ")):
+            return f"{option.opts[0]} {rest}"
+    return message
 
 
 def next_step(folder: Path | str, robots: int) -> str:

@@ -72,6 +72,10 @@ class Number(click.FloatRange):
 
     noun = "number"
 
+    def _describe_range(self) -> str:
+        """Return the range for --help; empty without limits, for which click would show `x<=None`."""
+        return "" if self.min is None and self.max is None else super()._describe_range()
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature
         """Return the number, or fail with a message in plain English."""
         try:

@@ -152,9 +152,12 @@ def agentsnet(**problem: Any) -> Team:  # noqa: ANN401 - `agentsnet`'s own
     robochoc generate agentsnet --task matching --agents 16 --graph small-world
     robochoc generate agentsnet --task consensus --agents 100 --graph scale-free
     """  # noqa: D301 - \\b keeps click from wrapping the lines
-    from robochoc.generators.families import agentsnet as task_on_graph
+    from robochoc.generators.agentsnet import agentsnet_on
+    from robochoc.generators.coloring import random_graph_of
 
-    return task_on_graph(**problem)
+    task, seed = problem.pop("task"), problem.pop("seed")
+    graph = pop_graph(problem, "degree")
+    return agentsnet_on(random_graph_of(**problem) if graph is None else graph, task, seed)
 
 
 @click.command(short_help="Ising models: spins on a torus, real couplings.")
