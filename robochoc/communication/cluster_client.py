@@ -9,6 +9,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
 
 import msgspec
 
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
 
 class SchedulerLostError(ClusterLostError):
     """The scheduler cannot be reached, or the connection to it was lost."""
+
+
+class InvalidSchedulerError(UnsupportedError):
+    """The address of a scheduler, or its file, is invalid."""
 
 
 class _SchedulerFile(msgspec.Struct):
@@ -44,25 +49,44 @@ def connect(place: str, name: str) -> Client:
         name: The name of the client.
 
     Raises:
+        InvalidSchedulerError: if the address or the file is invalid.
         SchedulerLostError: if the scheduler cannot be reached.
     """
     from distributed import Client  # noqa: PLC0415 - an extra
-    from distributed.comm import resolve_address  # noqa: PLC0415 - the same
 
     try:
         address = place if "://" in place else _address_in(Path(place))
-        resolve_address(address)  # Dask reports an invalid address late, and in several lines
+        _check_address(address, place)
         return Client(address, set_as_default=False, name=name)
-    except FileNotFoundError:
-        hint = "; an address has a scheme, as in tcp://10.0.0.1:8786"
-        raise SchedulerLostError(f"there is no scheduler file {place}{hint}") from None
     except (OSError, ValueError) as error:
         raise SchedulerLostError(f"the scheduler at {place} cannot be reached: {error}") from None
 
 
 def _address_in(file: Path) -> str:
-    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError` if the file contains no address."""
+    """Return the address in a scheduler's file. Raises `InvalidSchedulerError`."""
     try:
         return msgspec.json.decode(file.read_bytes(), type=_SchedulerFile).address
-    except msgspec.MsgspecError as wrong:
-        raise ValueError(f"it is not a scheduler's file: {wrong}") from None
+    except (OSError, msgspec.MsgspecError) as wrong:
+        why = wrong.strerror if isinstance(wrong, OSError) else wrong
+        hint = "name the JSON file of a Dask scheduler, or an address such as tcp://10.0.0.1:8786"
+        raise InvalidSchedulerError(f"{file} is not a scheduler's file ({why}); {hint}") from None
+
+
+def _check_address(address: str, place: str) -> None:
+    """Raise `InvalidSchedulerError` for an invalid address, which Dask reports late, and in several lines.
+
+    Raises `OSError` if the host is unknown.
+    """
+    from distributed.comm import resolve_address  # noqa: PLC0415 - an extra
+
+    try:
+        resolve_address(address)
+        fault = "port 0" if urlsplit(address).port == 0 else ""
+    except ValueError as wrong:
+        fault = str(wrong)
+    if fault:
+        where = "" if address == place else f" in {place}"
+        raise InvalidSchedulerError(
+            f"{address!r}{where} is not the address of a scheduler ({fault});"
+            " expected tcp://HOST:PORT, with a port from 1 to 65535"
+        )

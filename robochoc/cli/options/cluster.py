@@ -35,7 +35,8 @@ def on_cluster(place: str | None) -> Iterator[None]:
 
     if "://" not in place and not Path(place).is_file():
         hint = "name the file of 'dask scheduler --scheduler-file', or an address such as tcp://10.0.0.1:8786"
-        raise Failure(INVALID, f"{place} is not a file; {hint}")
+        named = place or "--cluster ''"
+        raise Failure(INVALID, f"{named} is not a file; {hint}")
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)  # Dask would log the loss of a scheduler with a traceback
     try:

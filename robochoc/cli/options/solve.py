@@ -20,7 +20,7 @@ from robochoc.cli.options.value_types import NameOrFile, Number, ProtocolName, W
 from robochoc.cli.reports.failures import errors_as_failures
 from robochoc.cli.reports.live_sniffer import SnifferRequest
 from robochoc.communication.kill_schedule import Kill
-from robochoc.run.defaults import AUTO
+from robochoc.run.defaults import AUTO, MOST_STANDBYS
 from robochoc.system.lazy_dataclass import dataclass
 
 if TYPE_CHECKING:
@@ -137,7 +137,7 @@ kill_option = click.option(
 )
 standby_option = click.option(
     "--standby",
-    type=WholeNumber(0),
+    type=WholeNumber(0, MOST_STANDBYS),
     default=0,
     metavar="N",
     help="Network: start N standby masters, too.",

@@ -127,6 +127,11 @@ TEAM_RULES = (
         "{protocol} has no array implementation",
         "add --runtime simulator, or choose a protocol that has one ('robochoc protocols --long')",
     ),
+    TeamRule(
+        lambda c: not c.options.standby and MASTER in c.unknown_kills.split(", "),
+        "--kill MASTER kills the first of several masters",
+        "add --runtime network --standby N",
+    ),
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
         lambda c: c.options.count and c.is_distributed and (c.options.runtime == "network" or not c.traits.counts),

@@ -32,7 +32,7 @@ from robochoc.communication.network.robot_process import (
     network_robot_process,
 )
 from robochoc.communication.network.settings import LEASE_MS, PATIENCE_S, NetworkSettings
-from robochoc.communication.search_result import RobotsLostError
+from robochoc.communication.search_result import Progress, RobotsLostError
 from robochoc.journal.events import AnyEvent, Leads
 from robochoc.model.orders import with_order
 from robochoc.model.outcome import Outcome, Verdict
@@ -79,6 +79,7 @@ class _MasterStart(NamedTuple):
     identity: IdentityTexts
     known: StandbyAnswer
     fields: dict[str, Any]
+    shows_progress: bool
 
 
 class _Failed(NamedTuple):
@@ -88,7 +89,7 @@ class _Failed(NamedTuple):
     unsupported: bool
 
 
-_Report = Leads | Outcome | _Failed | None
+_Report = Leads | Progress | Outcome | _Failed | None
 """A report of a master's process; None: another master has ended the run."""
 
 
@@ -139,44 +140,54 @@ class _Site:
         self._context = start_fork_server(protocol_named(options.protocol))
         self._processes: dict[str, BaseProcess] = {}
         self._reports: dict[str, Connection] = {}
+        self._unstopped = ""
+        """The leading master, if it has not received a stop request; empty: none."""
 
     def run(self, context: RunContext) -> Outcome:
         """Start all processes, and return the decision of a master. Raises `NoDecisionError`, `UnsupportedError`."""
-        for rank, name in enumerate(self._names):
-            self._start_master(rank, name)
-        for own in self._compiled.robots.values():
-            name = own.robot.name
-            endpoints = tuple(map(str, self._places))
-            texts = self._authority.identity(name).texts
-            start = NetworkRobotStart(own, texts, endpoints[0], protocol_or_stage, LOOKING_S, LEASE_MS, endpoints[1:])
-            self._start(name, network_robot_process, start)
+        self._start_all(shows_progress=context.progress is not None)
+        show = context.progress or (lambda _progress: None)
         failed: dict[str, _Failed] = {}
-        unstopped = ""
         while self._reports:
             for name, report in self._next_reports():
-                if isinstance(report, Leads):
-                    unstopped = name
-                    context.kills.start(time.monotonic())
-                    _log(f"{report.master} leads in term {report.term}: {report.why}")
-                elif isinstance(report, Outcome):
-                    context.kills.end(time.monotonic())
-                    return report
-                elif report is not None:
-                    failed[name] = report
+                match report:
+                    case Leads(master, term, why):
+                        self._unstopped = name
+                        context.kills.start(time.monotonic())
+                        _log(f"{master} leads in term {term}: {why}")
+                    case Progress():
+                        show(report)
+                    case Outcome():
+                        context.kills.end(time.monotonic())
+                        return report
+                    case _Failed():
+                        failed[name] = report
+                    case None:
+                        pass
             for name in context.kills.due(time.monotonic()):
                 _log(f"{name} is killed")
                 self._processes[name].kill()
-            if unstopped and stop_requested():
-                self._stop_search(unstopped)
-                unstopped = ""
+            self._stop_on_request()
         causes = {name: one.why for name, one in failed.items()} | self._killed()
         why = "; ".join(f"{name}: {cause}" for name, cause in causes.items())
         refusal = UnsupportedError if any(one.unsupported for one in failed.values()) else NoDecisionError
         raise refusal(f"all masters have ended: {why}")
 
-    def _stop_search(self, leader: str) -> None:
-        """Let the leading master end the search with the best answer."""
-        pid = self._processes[leader].pid
+    def _start_all(self, *, shows_progress: bool) -> None:
+        for rank, name in enumerate(self._names):
+            self._start_master(rank, name, shows_progress=shows_progress)
+        first, *others = map(str, self._places)
+        for own in self._compiled.robots.values():
+            name = own.robot.name
+            texts = self._authority.identity(name).texts
+            start = NetworkRobotStart(own, texts, first, protocol_or_stage, LOOKING_S, LEASE_MS, tuple(others))
+            self._start(name, network_robot_process, start)
+
+    def _stop_on_request(self) -> None:
+        """If a stop was requested, let the leading master end the search with the best answer."""
+        if not self._unstopped or not stop_requested():
+            return
+        pid, self._unstopped = self._processes[self._unstopped].pid, ""
         if STOP and pid is not None:
             with suppress(ProcessLookupError):
                 os.kill(pid, STOP)
@@ -191,7 +202,7 @@ class _Site:
                 causes[name] = f"its process was ended by signal {-process.exitcode}"
         return causes
 
-    def _start_master(self, rank: int, name: str) -> None:
+    def _start_master(self, rank: int, name: str, *, shows_progress: bool) -> None:
         authority, hosts = self._authority, (LOOPBACK,)
         identity = authority.standby_identity(name, hosts) if rank else authority.master_identity(hosts)
         roles = {str(Role.ROBOT): self._compiled.team.order, str(Role.MASTER): self._names, str(Role.OBSERVER): ()}
@@ -202,6 +213,7 @@ class _Site:
             identity.texts,
             StandbyAnswer(roles, ()),
             plan_fields(self._compiled.team, self._options),
+            shows_progress,
         )
         self._start(name, _master_process, start, sender)
         sender.close()
@@ -269,12 +281,13 @@ def _master_process(start: _MasterStart, reports: Connection) -> None:
         if isinstance(event, Leads):
             reports.send(event)
 
+    progress = reports.send if start.shows_progress else None
     standby = StandbyPlan(start.leaders, Identity.from_texts(start.identity), start.known)
     plan = MasterPlan(Path(), start.place, standby=standby, **start.fields)
     with suppress(BrokenPipeError):  # the run is over
         try:
             with stop_handled():
-                reports.send(run_master(plan, observer=observe).outcome)
+                reports.send(run_master(plan, observer=observe, progress=progress).outcome)
         except RunOverElsewhereError:
             reports.send(None)
         except RobochocError as error:

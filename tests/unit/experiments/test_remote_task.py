@@ -78,15 +78,15 @@ def test_generated_problems_are_made_there() -> None:
     ("content", "said"),
     [
         ("{}", "missing required field `address`"),
-        ("[1", "it is not a scheduler's file"),
-        ('{"address": "nonsense"}', "missing port number in address 'nonsense'"),
+        ("[1", "is not a scheduler's file"),
+        ('{"address": "nonsense"}', "'nonsense' in .* is not the address of a scheduler"),
     ],
 )
 def test_what_is_no_file_of_a_scheduler_is_told(content: str, said: str, tmp_path: Path) -> None:
     cluster = pytest.importorskip("robochoc.experiments.cluster")
     (tmp_path / "cluster.json").write_text(content)
-    lost = pytest.importorskip("robochoc.communication.cluster_client").SchedulerLostError
-    with pytest.raises(lost, match=said), cluster.ClusterWorkers(str(tmp_path / "cluster.json")):
+    invalid = pytest.importorskip("robochoc.communication.cluster_client").InvalidSchedulerError
+    with pytest.raises(invalid, match=said), cluster.ClusterWorkers(str(tmp_path / "cluster.json")):
         pass
 
 

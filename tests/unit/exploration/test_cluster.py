@@ -91,7 +91,10 @@ def test_a_lost_scheduler_ends_the_check(cluster: Cluster, tmp_path: Path) -> No
     ("place", "status", "said"),
     [
         ("missing.json", 1, "missing.json is not a file; name the file of 'dask scheduler --scheduler-file'"),
-        ("tcp://127.0.0.1", 4, "the scheduler at tcp://127.0.0.1 cannot be reached: missing port number"),
+        ("", 1, "--cluster '' is not a file; name the file of 'dask scheduler --scheduler-file'"),
+        ("tcp://127.0.0.1", 2, "expected tcp://HOST:PORT, with a port from 1 to 65535"),
+        ("tcp://127.0.0.1:65536", 2, "'tcp://127.0.0.1:65536' is not the address of a scheduler"),
+        ("tcp://127.0.0.1:0", 2, "'tcp://127.0.0.1:0' is not the address of a scheduler (port 0)"),
     ],
 )
 def test_a_wrong_cluster_is_refused(place: str, status: int, said: str) -> None:
