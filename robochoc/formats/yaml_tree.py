@@ -53,18 +53,21 @@ class Node:
         line: The line where the value begins, from 1.
         size: The number of values it contains.
         is_named: True if it has an anchor that an alias refers to.
+        written: The text of a truth value or of null in the file, such as `true`; empty for other values.
     """
 
-    __slots__ = ("_asked", "_is_read", "_is_skipped", "_key_lines", "_value", "is_named", "line", "size")
+    __slots__ = ("_asked", "_is_read", "_is_skipped", "_key_lines", "_value", "is_named", "line", "size", "written")
 
     def __init__(
         self,
         line: int,
         value: Scalar | MistakeError | list[Node] | dict[Scalar, Node] = None,
         key_lines: dict[Scalar, int] | None = None,
+        written: str = "",
     ) -> None:
         self.line = line
         self.size = 1
+        self.written = written
         self.is_named = False
         self._value = value
         self._is_read = self._is_skipped = False
@@ -156,7 +159,7 @@ class Node:
 
     def copy(self, line: int) -> Node:
         """Return a node for an alias in `line`, with the same parts."""
-        alias = Node(line, self._value, self._key_lines)
+        alias = Node(line, self._value, self._key_lines, self.written)
         alias.size = self.size
         return alias
 
@@ -335,7 +338,9 @@ class _Composer:
                 case yaml.AliasEvent():
                     self._add(self._alias(str(event.anchor), line))
                 case yaml.ScalarEvent():
-                    self._add(self._anchored(event.anchor, Node(line, self._scalar(event, line))), event)
+                    value = self._scalar(event, line)
+                    written = event.value if value is None or isinstance(value, bool) else ""
+                    self._add(self._anchored(event.anchor, Node(line, value, written=written)), event)
                 case yaml.SequenceStartEvent() | yaml.MappingStartEvent():
                     self._begin(event, line)
                 case yaml.SequenceEndEvent() | yaml.MappingEndEvent():

@@ -135,7 +135,7 @@ class TaskTeamBuilder:
             self._check_orders(orders, workers)
             variables, constraints = several_tasks(workers, jobs, orders)
         if not variables:
-            raise MistakeError("no robot can do any of the tasks", "check skills, needs, loads and deadlines")
+            raise MistakeError("no robot can do any of the tasks", "check skills, needs, teams, loads and deadlines")
         _check_names(variables)
         listed = list(itertools.islice(constraints, MAX_CONSTRAINTS + 1))
         if len(listed) > MAX_CONSTRAINTS:

@@ -169,16 +169,32 @@ class EntryReader:
         node = self.node(key)
         if node is None:
             return None
-        hint = f"write {key}: {{SKILL: NUMBER}}, or {key}: NUMBER, for 1 to {MAX_TEAM} robots"
-        listed = {name_text(name): one.scalar for name, one in node.named()} if node.is_mapping else {"": node.scalar}
-        numbers = {name: one for name, one in listed.items() if isinstance(one, int) and not isinstance(one, bool)}
+        if not node.is_mapping:
+            number = _team_number(node)
+            if number is None:
+                hint = f"write {key}: {{SKILL: NUMBER}}, or {key}: NUMBER, for 1 to {MAX_TEAM} robots"
+                raise self._mistake(key, node, hint)
+            return number, {}
+        numbers = {name_text(name): self._place(key, name_text(name), one) for name, one in node.named()}
         size = sum(numbers.values())
-        if len(numbers) < len(listed) or min(numbers.values(), default=0) < 1 or size > MAX_TEAM:
-            raise self._mistake(key, node, hint)
-        if len(numbers) > MAX_TEAM_SKILLS:
-            what = f"{self._what} has a {key} with {len(numbers)} skills"
-            raise MistakeError(what, f"write at most {MAX_TEAM_SKILLS}", node.line)
-        return size, numbers if node.is_mapping else {}
+        for what, is_wrong, hint in (
+            ("without skills", not numbers, f"write {key}: {{SKILL: NUMBER}}"),
+            (f"of {size} robots", size > MAX_TEAM, f"write at most {MAX_TEAM}"),
+            (f"with {len(numbers)} skills", len(numbers) > MAX_TEAM_SKILLS, f"write at most {MAX_TEAM_SKILLS}"),
+        ):
+            if is_wrong:
+                raise MistakeError(f"{self._what} has a {key} {what}", hint, node.line)
+        return size, numbers
+
+    def _place(self, key: str, skill: str, node: Node) -> int:
+        """Return the number of robots with `skill` in a team."""
+        if not skill.strip():
+            raise MistakeError(f"{self._what} has a {key} with an empty skill", "write its name", node.line)
+        number = _team_number(node)
+        if number is None:
+            what = f"{self._what} cannot have {_shown(node)} as the number of robots with '{shortened(skill)}'"
+            raise MistakeError(what, f"write an integer from 1 to {MAX_TEAM}", node.line)
+        return number
 
     def flag(self, key: str) -> bool:
         """Return a truth value; False if the key is missing."""
@@ -225,8 +241,24 @@ class EntryReader:
         return Fraction(scalar)
 
     def _mistake(self, key: str, node: Node, hint: str) -> MistakeError:
-        value = f"'{shortened(name_text(node.scalar))}'" if node.is_scalar else "this value"
-        return MistakeError(f"{self._what} cannot have {value} as '{key}'", hint, node.line)
+        return MistakeError(f"{self._what} cannot have {_shown(node)} as '{key}'", hint, node.line)
+
+
+def _shown(node: Node) -> str:
+    """Return a value for messages, as written in the file."""
+    if not node.is_scalar:
+        return "this value"
+    if node.is_empty and not node.written:
+        return "an empty value"
+    return f"'{shortened(node.written or name_text(node.scalar))}'"
+
+
+def _team_number(node: Node) -> int | None:
+    """Return a number of robots in a team; None if it is invalid."""
+    value = node.scalar
+    if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_TEAM:
+        return None
+    return value
 
 
 def name_text(value: Scalar) -> str:

@@ -9,7 +9,14 @@ from fractions import Fraction
 from pathlib import Path
 from typing import TypeVar
 
-from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
+from robochoc.formats.diagnostics import (
+    DiagnosticCollector,
+    InvalidInputError,
+    MistakeError,
+    encodable,
+    shortened,
+    suggestion,
+)
 from robochoc.formats.dialects.dialect import ImportOptions, ImportResult
 from robochoc.formats.dialects.pydcop.files import file_text
 from robochoc.formats.yaml_tree import Node, read_yaml, unread_parts
@@ -95,8 +102,11 @@ def _list(head: EntryReader, path: Path, mistakes: DiagnosticCollector) -> TaskL
 
     listed = head.required_node("tasks")
     usual = or_default(lambda: head.number("radius", RADIUS_M) or Fraction(0), RADIUS_M)
-    robots = read_robots(head.required_node("robots"), usual, mistakes)
+    listed_robots = head.required_node("robots")
+    robots = read_robots(listed_robots, usual, mistakes)
     tasks = read_tasks(listed, mistakes)
+    if len(robots) == len([*listed_robots.named()]):  # otherwise not all skills are known
+        _check_skills(robots, tasks, mistakes)
     for what, entries in (("robots", robots), ("tasks", tasks)):
         if len(entries) > MAX_NUMBER:
             raise MistakeError(f"has {len(entries)} {what}", f"write at most {MAX_NUMBER}")
@@ -129,6 +139,20 @@ def _step(head: EntryReader) -> Fraction:
     if not step:
         raise MistakeError("the list has the step 0", "write a number above 0", head.required_node("step").line)
     return step
+
+
+def _check_skills(
+    robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry], mistakes: DiagnosticCollector
+) -> None:
+    """Report skills of teams that no robot has."""
+    known = sorted({skill for robot in robots.values() for skill in robot.skills})
+    for name, task in tasks.items():
+        for skill in task.team:
+            if skill not in known:
+                what = (
+                    f"the task '{shortened(name)}' has a team with the skill '{shortened(skill)}', which no robot has"
+                )
+                mistakes.add(task.line, what, suggestion(skill, known, "skills"))
 
 
 def _check_topics(robots: Mapping[str, RobotEntry], mistakes: DiagnosticCollector) -> None:

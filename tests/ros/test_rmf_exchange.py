@@ -200,3 +200,13 @@ def test_a_fleet_with_mistakes(tmp_path: Path) -> None:
     (tmp_path / "fleet.yaml").write_text("fleet: carts\n")
     done = robochoc_within("rmf", "bid", tmp_path / "fleet.yaml")
     assert (done.returncode, "the fleet has no robots" in done.stderr) == (1, True)
+
+
+def test_a_protocol_that_cannot_minimise_costs(tmp_path: Path) -> None:
+    """It is refused before the domain is joined."""
+    (tmp_path / "fleet.yaml").write_text(FLEET)
+    for words in (("bid", tmp_path / "fleet.yaml"), ("dispatch",)):
+        done = robochoc_within("rmf", *words, "--protocol", "abt", "--ros", f"dds:{free_domain()}")
+        assert (done.returncode, done.stdout, len(done.stderr.splitlines())) == (2, "", 1), done.stderr
+        assert done.stderr.startswith("--protocol abt, tried on two ")
+        assert "which abt does not support" in done.stderr

@@ -117,9 +117,11 @@ def _measure_machines(
 
     growth = growth_of(paths)
     check_is_complete(paths)
+    from robochoc.cli.reports.progress import elapsed_time
     from robochoc.experiments.capacity.machines import measure_machines
 
-    machines = measure_machines(cluster, paths, words, timeout)
+    with elapsed_time(cluster, "measuring each machine"):
+        machines = measure_machines(cluster, paths, words, timeout)
     if as_json:
         import msgspec
 

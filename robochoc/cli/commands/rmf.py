@@ -14,7 +14,7 @@ import click
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.ros_setup import ros_errors_as_failures
 from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
-from robochoc.cli.reports.failures import LIMIT, USAGE, Failure, invalid_input_fails
+from robochoc.cli.reports.failures import LIMIT, USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
     from robochoc.ros.rmf.exchange import Exchange
@@ -84,6 +84,8 @@ def dispatch(place: str, protocol: str, window: float, batch: int, tasks: int | 
     from robochoc.ros.rmf.dispatcher import Dispatcher
     from robochoc.ros.rmf.records import Settings
 
+    with errors_as_failures(f"--protocol {protocol}, tried on two tasks and two fleets"):
+        allocate({"a": {"x": 1, "y": 2}, "b": {"x": 2, "y": 1}}, protocol=protocol)
     prefix = f"{secrets.token_hex(3)}-"
     settings = Settings(time_window_s=window, batch=batch, by_finish=by_finish)
     dispatcher = Dispatcher(
@@ -111,7 +113,8 @@ def dispatch(place: str, protocol: str, window: float, batch: int, tasks: int | 
     sends = (m.ApiResponse, m.BidNotice, m.DispatchCommand, m.DispatchStates, m.TaskStateUpdate)
     with ros_errors_as_failures(), _opened(place, sends, (m.ApiRequest, m.BidResponse, m.DispatchAck)) as exchange:
         click.echo(f"{place}: dispatching", err=True)
-        _run(exchange, dispatcher, report)
+        with errors_as_failures(f"--protocol {protocol}"):
+            _run(exchange, dispatcher, report)
 
 
 @rmf.command(short_help="Bid for RMF's tasks with a fleet of robots.")
@@ -133,8 +136,11 @@ def bid(fleet: Path, place: str, protocol: str, tasks: int | None) -> None:
     from robochoc.ros.rmf import messages as m
     from robochoc.ros.rmf.bidder import Bidder
     from robochoc.ros.rmf.fleet_file import read_rmf_fleet
+    from robochoc.ros.rmf.trips import trial_plan
 
     found = read_rmf_fleet(fleet)
+    with errors_as_failures(f"--protocol {protocol}, tried on two trips"):
+        trial_plan(found, protocol)
     bidder = Bidder(found, epoch_ns=_epoch_ns(), protocol=protocol)
     completed = 0
 
@@ -148,7 +154,8 @@ def bid(fleet: Path, place: str, protocol: str, tasks: int | None) -> None:
     sends = (m.BidResponse, m.DispatchAck, m.ApiResponse, m.TaskStateUpdate)
     with ros_errors_as_failures(), _opened(place, sends, (m.BidNotice, m.DispatchCommand, m.ApiRequest)) as exchange:
         click.echo(f"{place}: {found.name} bids with {len(found.robots)} robots", err=True)
-        _run(exchange, bidder, report)
+        with errors_as_failures(f"--protocol {protocol}"):
+            _run(exchange, bidder, report)
 
 
 @rmf.command(short_help="Request a patrol, a delivery or a cleaning.")

@@ -162,6 +162,13 @@ def plan(
     return timed(fleet, robots, trips, chosen, now_s)
 
 
+def trial_plan(fleet: RmfFleet, protocol: str) -> None:
+    """Plan two trips of no length. Raises `UnknownProtocolError` or `UnsupportedError` if the protocol cannot."""
+    robots = {name: RobotState(robot.at, 0.0, robot.speed_ms) for name, robot in fleet.robots.items()}
+    trip = Trip((next(iter(robots.values())).at,), 0.0)
+    plan(fleet, robots, {"a": trip, "b": trip}, 0.0, protocol=protocol)
+
+
 def timed(
     fleet: RmfFleet,
     robots: Mapping[str, RobotState],
