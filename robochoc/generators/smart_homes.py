@@ -1,4 +1,4 @@
-"""Smart lighting: lamps choose their levels so that rooms are lit as wanted, with little energy.
+"""Smart lighting: lamps choose levels that give rooms the wanted luminosity with little energy.
 
 This is the smart environment configuration problem: Rust, Picard and Ramparany, "Using message-passing DCOP algorithms
 to solve energy-efficient smart environment configuration problems", IJCAI 2016. A robot is a lamp, and its variable is

@@ -193,7 +193,7 @@ def test_with_any_protocol_and_options_no_verdict_is_wrong(runs: int) -> None:
 
 
 def test_all_of_the_three_families_bear_loss() -> None:
-    """`kopt` does not: its robots are told the constraints around them once, and never again. `lamdls-2` waits."""
+    """`kopt` and `lamdls-2` do not: their robots receive some messages only once, and wait for them."""
     assert {"dsa", "mgm", "maxsum", "a-dsa", "async-maxsum", "gdba"} <= set(BEARING)
     assert not any(protocol_named(name).traits.complete for name in BEARING)
     in_cycles = {name for name in OURS if issubclass(protocol_named(name), CycleProtocol)}

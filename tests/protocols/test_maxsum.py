@@ -257,7 +257,7 @@ def test_what_a_half_answers_is_in_the_q_to_the_other_one() -> None:
 
 
 def test_reweighted_functions_are_divided_and_their_r_counts_less_but_is_left_out_as_a_whole() -> None:
-    """Of the function [[3, 1], [4, 6]] divided by a half, B's values cost 6 and 2; C's function adds a half of R."""
+    """With the function [[3, 1], [4, 6]] divided by a half, B's values cost 6 and 2; C's function adds a half of R."""
     robot = informed(reweight=0.5)
     replies(robot, ("RC", R([[4, 2]])))
     assert robot.factors[0].charges.tolist() == [[6, 2], [8, 12]]

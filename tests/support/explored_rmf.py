@@ -24,7 +24,7 @@ Link = tuple[str, str]
 
 @dataclass(frozen=True)
 class Budget:
-    """How often a message may be lost, repeated, or wait while time passes, and how often a bidder may die."""
+    """The limits on lost, repeated and waiting messages, and on bidders that die."""
 
     lost: int = 0
     repeated: int = 0

@@ -168,7 +168,7 @@ class _Site:
                 _log(f"{name} is killed")
                 self._processes[name].kill()
             self._stop_on_request()
-        causes = {name: one.why for name, one in failed.items()} | self._killed()
+        causes = {name: one.why for name, one in failed.items()} | self._failed_processes()
         why = "; ".join(f"{name}: {cause}" for name, cause in causes.items())
         refusal = UnsupportedError if any(one.unsupported for one in failed.values()) else NoDecisionError
         raise refusal(f"all masters have ended: {why}")
@@ -192,14 +192,17 @@ class _Site:
             with suppress(ProcessLookupError):
                 os.kill(pid, STOP)
 
-    def _killed(self) -> dict[str, str]:
-        """Return the reasons for the end of masters whose processes were killed. They have closed their pipes."""
+    def _failed_processes(self) -> dict[str, str]:
+        """Return how the processes of masters that failed have ended. They have closed their pipes."""
         causes = {}
         for name in self._names:
             process = self._processes[name]
             process.join(_GRACE_S)
-            if process.exitcode:
-                causes[name] = f"its process was ended by signal {-process.exitcode}"
+            code = process.exitcode
+            if code:
+                causes[name] = (
+                    f"its process was ended by signal {-code}" if code < 0 else f"it ended with status {code}"
+                )
         return causes
 
     def _start_master(self, rank: int, name: str, *, shows_progress: bool) -> None:

@@ -149,7 +149,7 @@ class SeatPage:
             self._turn.props("no-caps unelevated").classes("go")
         with ui.element("section").classes("panel"):
             _heading("h3", say("seat.neighbours"))
-            _heard(game)
+            _show_messages(game)
             _heading("h3", say("seat.problem"))
             ui.label(game.problem).classes("seat-problem soft").props("tabindex=0")
 
@@ -172,7 +172,7 @@ def _priced(value: str, cost: tuple[int, int | float]) -> str:
     return say("seat.value-broken" if broken else "seat.value", value=value, cost=f"{paid:g}", broken=broken)
 
 
-def _heard(game: SeatGame) -> None:
+def _show_messages(game: SeatGame) -> None:
     """Show the announced values and the texts of the neighbours."""
     if not game.neighbours:
         ui.label(say("seat.alone"))
