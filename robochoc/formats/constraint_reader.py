@@ -13,6 +13,7 @@ from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.global_constraints import is_global, read_global, variables_of
 from robochoc.formats.names import is_name
+from robochoc.formats.objectives import check_objective
 from robochoc.formats.robot_rules import (
     check_constraint,
     check_private,
@@ -51,6 +52,7 @@ class ConstraintContext:
     definitions: Mapping[str, Definition | None]
     symbolic: Mapping[str, bool]
     """For each variable of the robot, whether its values are symbols."""
+    objectives: tuple[str, ...] = ()
 
 
 def read_private(element: etree._Element, context: ConstraintContext) -> Constraint | None:
@@ -108,8 +110,10 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
         violation_cost,
         line(element),
         when_absent=WhenAbsent(when_absent) if when_absent else None,
+        objective=attribute(element, "objective"),
     )
     check_constraint(constraint, context.kind, context.units)
+    check_objective(constraint, context.objectives)
     check_argument_types(constraint, context.symbolic)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint

@@ -108,16 +108,8 @@ class CostConversion:
         """Return `robot` with its costs in the finer unit. Raises `MistakeError` if a cost then has too many digits."""
         constant = int(self.cost(robot.costs.constant))
         places = robot.costs.places + len(str(self._factor)) - 1
-        return replace(
-            robot,
-            private=self.constraints(robot.private),
-            parents=tuple(replace(one, constraints=self.constraints(one.constraints)) for one in robot.parents),
-            children=tuple(
-                replace(one, constraints=self.constraints(one.constraints), copies=self.constraints(one.copies))
-                for one in robot.children
-            ),
-            costs=replace(robot.costs, places=places, constant=constant),
-        )
+        costs = replace(robot.costs, places=places, constant=constant)
+        return replace(robot.with_constraints(self.constraint), costs=costs)
 
     def cost(self, cost: float) -> float:
         """Return `cost` in the finer unit. Raises `MistakeError`."""
@@ -129,9 +121,11 @@ class CostConversion:
 
     def constraints(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         """Return `constraints` in the finer unit. Raises `MistakeError`."""
-        return tuple(
-            replace(one, definition=self.definition(one.definition), cost=self.cost(one.cost)) for one in constraints
-        )
+        return tuple(map(self.constraint, constraints))
+
+    def constraint(self, constraint: Constraint) -> Constraint:
+        """Return `constraint` in the finer unit. Raises `MistakeError`."""
+        return replace(constraint, definition=self.definition(constraint.definition), cost=self.cost(constraint.cost))
 
     def definitions(self, definitions: Mapping[str, Definition | None]) -> dict[str, Definition | None]:
         """Return `definitions` in the finer unit. Raises `MistakeError`."""

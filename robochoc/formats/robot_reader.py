@@ -36,6 +36,7 @@ from robochoc.formats.diagnostics import (
 )
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
+from robochoc.formats.objectives import check_objectives
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
     check_shown_variables,
@@ -202,7 +203,9 @@ class _RobotReader:
         topics = self._topics([name for name, is_symbol in symbolic.items() if is_symbol])
         model = ConstraintModel(attribute(presentation, "constraintModel") or ConstraintModel.TKC)
         units = self._units(presentation, kind)
-        context = ConstraintContext(kind, units, model, self._own, self._definitions(kind, units), symbolic)
+        objectives = self._objectives(presentation, kind, units)
+        definitions = self._definitions(kind, units)
+        context = ConstraintContext(kind, units, model, self._own, definitions, symbolic, objectives)
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         implied: set[str] = set()
@@ -212,7 +215,10 @@ class _RobotReader:
         self._report.finish()
         weight = int(attribute(presentation, "weight") or Robot.weight)
         file = self._report.file
-        robot = Robot(self._name, variables, kind, private, parents, children, topics, file, weight=weight, costs=units)
+        robot = Robot(
+            self._name, variables, kind, private, parents, children, topics, file,
+            weight=weight, costs=units, objectives=objectives,
+        )  # fmt: skip
         places = FileLocations(file, line(presentation), self._own)
         return RobotFile(robot, places, copies, frozenset(implied), context=context)
 
@@ -274,6 +280,12 @@ class _RobotReader:
         with self._report.at(line(presentation)):
             units.append(read_units(presentation, kind, places))
         return units[-1]
+
+    def _objectives(self, presentation: etree._Element, kind: ProblemKind, units: CostUnits) -> tuple[str, ...]:
+        objectives = tuple(attribute(presentation, "objectives").split())
+        with self._report.at(line(presentation)):
+            check_objectives(objectives, kind, units)
+        return objectives
 
     def _definitions(self, kind: ProblemKind, units: CostUnits) -> dict[str, Definition | None]:
         definitions: dict[str, Definition | None] = {}

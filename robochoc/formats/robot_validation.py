@@ -21,6 +21,7 @@ from robochoc.formats.field_types import FIELD_TYPES_HINT, FieldTypeError, check
 from robochoc.formats.global_constraints import check_global
 from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
+from robochoc.formats.objectives import check_objective, check_objectives
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
     check_constraint,
@@ -104,6 +105,7 @@ class RobotValidator:
         with self._at(places.robot):
             check_units(robot.costs, robot.kind)
             check_one_table(robot)
+            check_objectives(robot.objectives, robot.kind, robot.costs)
         self._table = robot.symbol_table
         yield from self._variables(robot, places)
         if not own:
@@ -198,6 +200,7 @@ class RobotValidator:
             refuse_function(robot.kind)
         if is_valid:
             check_constraint(constraint, robot.kind, robot.costs)
+            check_objective(constraint, robot.objectives)
             check_argument_types(constraint, symbolic_by_variable([robot]))
 
     def _check_defined(self, thing: Defined, places: ObjectLocations) -> bool:

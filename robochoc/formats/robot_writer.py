@@ -49,6 +49,8 @@ def robot_xml(robot: Robot) -> bytes:
     if robot.weight != Robot.weight:
         presentation.set("weight", str(robot.weight))
     _write_units(presentation, robot.costs)
+    if robot.objectives:
+        presentation.set("objectives", " ".join(robot.objectives))
     _write_domains(instance, robot)
     variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
     for variable in robot.variables:
@@ -169,6 +171,8 @@ def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint]
             element.set("cost", cost_text(constraint.cost, units))
         if constraint.when_absent:
             element.set("when_absent", constraint.when_absent)
+        if constraint.objective:
+            element.set("objective", constraint.objective)
         if isinstance(constraint.definition, GlobalPredicate):
             parameters = etree.SubElement(element, "parameters")
             write_global(parameters, constraint.definition, constraint.parameters)

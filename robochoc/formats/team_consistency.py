@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from itertools import islice
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
+from robochoc.formats.objectives import mixed_objectives
 from robochoc.formats.symbols import different_tables, mistyped_constraints
 from robochoc.formats.team_members import TeamMembers
 from robochoc.formats.tkc_copies import differing_copies
@@ -33,6 +34,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from out_of_order(members)
     yield from mixed_kinds(members)
     yield from mixed_costs(members)
+    yield from mixed_objectives(members)
     yield from shared_variables(members)
     yield from different_tables(members)
     yield from mistyped_constraints(members)

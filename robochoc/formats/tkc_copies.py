@@ -62,9 +62,10 @@ def _content(group: Iterable[Constraint]) -> Counter[Hashable]:
         definition = constraint.definition
         if isinstance(definition, Relation):
             tuples = frozenset(zip(definition.tuples, definition.costs or definition.tuples, strict=True))
-            contents[definition.semantics, definition.default_cost, constraint.parameters, tuples] += 1
+            key = definition.semantics, definition.default_cost, constraint.parameters, tuples
+            contents[*key, constraint.objective] += 1
         else:
-            contents[type(definition), _applied(constraint), constraint.cost] += 1
+            contents[type(definition), _applied(constraint), constraint.cost, constraint.objective] += 1
     return contents
 
 
@@ -99,6 +100,8 @@ def _difference(
     """Return the first difference between the two groups in words; empty if they are equal. Costs are in `units`."""
     if any(variable not in domains for variable in variables):
         return ""  # variables of a robot whose file is invalid
+    if {one.objective for one in copies} != {one.objective for one in originals}:
+        return "belongs to another objective than the child's constraint"
     if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
         return (
             "has another definition than the child's constraint, and has too many tuples to compare"

@@ -38,12 +38,14 @@ class Extras:
         weights: The weights of robots; the default is 1.
         parts: The parts of partially known constraints (PKC), by the robot that knows them. Each part is over variables
             of that robot and of one other robot. If the other robot has no part, it gets a part that allows everything.
+        objectives: The first objectives of the team, followed by those that only constraints name.
     """
 
     links: Sequence[tuple[str, str]] = ()
     topics: Mapping[str, Sequence[Topic]] = field(default_factory=dict)
     weights: Mapping[str, int] = field(default_factory=dict)
     parts: Mapping[str, Sequence[Constraint]] = field(default_factory=dict)
+    objectives: Sequence[str] = ()
 
 
 def assemble(
@@ -86,6 +88,8 @@ def assemble(
     for one, other in extras.links:
         links.link(one, other)
     links.place()
+    priced = [*with_variables, *(part for parts in extras.parts.values() for part in parts)]
+    objectives = dict.fromkeys([*extras.objectives, *(one.objective for one in priced if one.objective)])
     robots = tuple(
         Robot(
             name=robot,
@@ -97,6 +101,7 @@ def assemble(
             topics=tuple(extras.topics.get(robot, ())),
             weight=extras.weights.get(robot, 1),
             costs=costs if number == 0 else replace(costs, constant=0),
+            objectives=tuple(objectives),
         )
         for number, (robot, own) in enumerate(variables.items())
     )

@@ -219,6 +219,7 @@ class Constraint:
         line: The line in the file from which the constraint was read.
         offset: The number subtracted from each cost of the constraint, so that no cost is negative (`model/costs.py`).
         when_absent: The meaning when a robot is absent. None: the form of the constraint determines it.
+        objective: The objective to which the costs belong, in a team with several objectives. Empty: there is one.
         original: The original form of a constraint that was restated for the remaining robots.
         absent: The variables of `original` whose robots are absent.
         robots: The robots of `original`, in priority order, if some of them have left the team.
@@ -233,6 +234,7 @@ class Constraint:
     line: int = field(default=0, compare=False)
     offset: int = 0
     when_absent: WhenAbsent | None = None
+    objective: str = ""
     original: Constraint | None = field(default=None, compare=False, repr=False)
     absent: tuple[str, ...] = field(default=(), compare=False, repr=False)
     robots: tuple[str, ...] = field(default=(), compare=False, repr=False)
@@ -241,6 +243,19 @@ class Constraint:
     def variables(self) -> tuple[str, ...]:
         """The distinct variables of the scope, in its order."""
         return tuple(dict.fromkeys([term for term in self.scope if isinstance(term, str)]))
+
+    @property
+    def has_costs(self) -> bool:
+        """True if the constraint is a soft relation, a function, or a predicate with a finite cost."""
+        match self.definition:
+            case Relation(semantics=semantics):
+                return semantics == Semantics.SOFT
+            case Predicate():
+                return self.cost < INFINITE
+            case Function():
+                return True
+            case never:
+                assert_never(never)
 
     @property
     def is_hard(self) -> bool:

@@ -37,8 +37,26 @@ MAX_TRIED = 4096
 Domains = Mapping[str, Domain]
 
 
-class UnboundedCostError(RobochocError, ValueError):
+class NormalizationError(RobochocError, ValueError):
+    """Raised if the costs of a team cannot be normalised."""
+
+
+class UnboundedCostError(NormalizationError):
     """Raised if the cost of a function has no bounds, because the domain of a variable is unknown."""
+
+
+class SeveralObjectivesError(NormalizationError):
+    """Raised if a single cost is required, but the team has several objectives."""
+
+
+def refuse_several_objectives(one: Team | Robot) -> None:
+    """Raise `SeveralObjectivesError` if the costs of a team or a robot belong to several objectives."""
+    if one.objectives:
+        weights = ",".join(f"{name}=1" for name in one.objectives)
+        raise SeveralObjectivesError(
+            f"there are several objectives ({', '.join(one.objectives)}), and this requires a single cost: combine them"
+            f" with --objectives, for example 'robochoc solve --objectives weighted:{weights}'"
+        )
 
 
 _NORMALIZED = "_normalized"
@@ -53,6 +71,7 @@ def normalized(team: Team) -> Team:
 
     Raises:
         UnboundedCostError: if the cost of a function has no bounds.
+        SeveralObjectivesError: if there are several objectives.
     """
     stored = vars(team)
     if _NORMALIZED not in stored:
@@ -85,19 +104,13 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
 
     Raises:
         UnboundedCostError: if the cost of a function has no bounds.
+        SeveralObjectivesError: if there are several objectives.
     """
+    refuse_several_objectives(robot)
     finer = 10 ** (units.places - robot.costs.places)
-
-    def all_of(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
-        return tuple(normalized_constraint(one, units, domains, finer) for one in constraints)
-
+    normalized_costs = robot.with_constraints(lambda one: normalized_constraint(one, units, domains, finer))
     return replace(
-        robot,
-        private=all_of(robot.private),
-        parents=tuple(replace(one, constraints=all_of(one.constraints)) for one in robot.parents),
-        children=tuple(
-            replace(one, constraints=all_of(one.constraints), copies=all_of(one.copies)) for one in robot.children
-        ),
+        normalized_costs,
         costs=PLAIN_COSTS,
         user_units=CostUnits(units.maximize, units.places, robot.costs.constant * finer),
     )
@@ -192,7 +205,7 @@ def _needs_normalizing(robot: Robot) -> bool:
     """Return whether the costs of `robot` are not normalised yet."""
     if robot.user_units != PLAIN_COSTS:
         return False
-    return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, robot.constraints()))
+    return bool(robot.objectives) or robot.costs != PLAIN_COSTS or any(map(_may_be_negative, robot.constraints()))
 
 
 def _may_be_negative(constraint: Constraint) -> bool:

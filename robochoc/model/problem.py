@@ -11,8 +11,8 @@ violated hard constraints.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import field
+from collections.abc import Callable, Iterator
+from dataclasses import field, replace
 from enum import StrEnum
 from functools import cached_property
 from importlib import import_module
@@ -147,6 +147,7 @@ class Robot:
         costs: The unit of the robot's costs, and whether their sum is minimised or maximised.
         symbols: The names of the team's symbols, if none of the robot's domains is symbolic.
         user_units: The user's units of costs, if the robot's costs are normalised (`model/costs.py`).
+        objectives: The names of the team's objectives, if there are several (`model/objectives.py`).
     """
 
     name: str
@@ -162,6 +163,7 @@ class Robot:
     costs: CostUnits = PLAIN_COSTS
     symbols: tuple[str, ...] = ()
     user_units: CostUnits = PLAIN_COSTS
+    objectives: tuple[str, ...] = ()
 
     def constraints(self) -> Iterator[Constraint]:
         """Yield every constraint in the robot's file: private and shared ones, and parts of partially known ones."""
@@ -169,6 +171,18 @@ class Robot:
         yield from self.shared
         for child in self.children:
             yield from child.constraints
+
+    def with_constraints(self, convert: Callable[[Constraint], Constraint]) -> Robot:
+        """Return this robot with each constraint, and each copy of a child's constraint, replaced by `convert`."""
+        return replace(
+            self,
+            private=tuple(map(convert, self.private)),
+            parents=tuple(replace(one, constraints=tuple(map(convert, one.constraints))) for one in self.parents),
+            children=tuple(
+                replace(one, constraints=tuple(map(convert, one.constraints)), copies=tuple(map(convert, one.copies)))
+                for one in self.children
+            ),
+        )
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
@@ -301,6 +315,11 @@ class Team:
     def kind(self) -> ProblemKind:
         """The kind of problem, the same for all robots. Without robots it is a DisCSP."""
         return self.robots[0].kind if self.robots else ProblemKind.DISCSP
+
+    @property
+    def objectives(self) -> tuple[str, ...]:
+        """The names of the objectives, the same for all robots. Empty: the team has a single cost, or none."""
+        return self.robots[0].objectives if self.robots else ()
 
     @cached_property
     def user_units(self) -> CostUnits:

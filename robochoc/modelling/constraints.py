@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robochoc.model.constraint import WhenAbsent
@@ -26,6 +27,7 @@ class ModelConstraint:
         cost: The cost of violating the constraint. None: the constraint is hard.
         place: The line that added the constraint.
         when_absent: The constraint's meaning when a robot in its scope is absent. None: the default for its form.
+        objective: The objective to which the cost belongs. Empty: the model has a single cost.
     """
 
     name: str
@@ -33,6 +35,7 @@ class ModelConstraint:
     cost: Exact | None
     place: SourceLine
     when_absent: WhenAbsent | None = None
+    objective: str = ""
 
     def __repr__(self) -> str:
         return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {shown(self.cost)}'}>"
@@ -45,7 +48,8 @@ class ModelConstraint:
             in_pairs = self.when_absent != WhenAbsent.DROP  # pairs of the remaining robots would stay
             drafts = conditions(self.term, self.name, self.place, in_pairs=in_pairs)
         else:
-            drafts = iter([soft_condition(self.term, self.cost, self.name, self.place)])
+            soft = soft_condition(self.term, self.cost, self.name, self.place)
+            drafts = iter([replace(soft, objective=self.objective)])
         for draft in drafts:
             yield draft.with_when_absent(self.when_absent)
 

@@ -50,6 +50,7 @@ class Draft:
         is_penalty: True if the costs in a soft table are costs of violating a condition. If a sum is maximised, they
             are subtracted from it.
         when_absent: The constraint's meaning when a robot is absent. None: the default for its form.
+        objective: The objective to which the costs belong.
     """
 
     name: str
@@ -63,6 +64,7 @@ class Draft:
     default: Price = 0
     is_penalty: bool = False
     when_absent: WhenAbsent | None = None
+    objective: str = ""
 
     def with_when_absent(self, when_absent: WhenAbsent | None) -> Draft:
         """Return this draft with `when_absent` set. Raises `ModelError` if the constraint cannot be restated."""
@@ -128,28 +130,36 @@ class ObjectiveTerm(NamedTuple):
         term: The term.
         place: The line that added the term.
         places: The number of decimal places to which costs are rounded. None: costs are exact.
+        objective: The objective to which the term belongs. Empty: the model has a single cost.
     """
 
     factor: Exact
     term: Term
     place: SourceLine
     places: int | None = None
+    objective: str = ""
 
 
 def costs_of(parts: Iterable[ObjectiveTerm], name: str) -> list[Draft]:
-    """Return the cost functions for a sum: one draft for all terms with the same variables and rounding."""
-    groups: dict[tuple[frozenset[str], int | None], list[ObjectiveTerm]] = {}
+    """Return the cost functions for a sum: one draft for all terms with the same variables, rounding and objective."""
+    groups: dict[tuple[frozenset[str], int | None, str], list[ObjectiveTerm]] = {}
     for part in parts:
-        key = frozenset(one.name for one in part.term.variables), part.places
+        key = frozenset(one.name for one in part.term.variables), part.places, part.objective
         groups.setdefault(key, []).append(part)
-    return [_sum(group, f"{name}{number}") for number, group in enumerate(groups.values(), 1)]
+    return [
+        replace(_sum(group, f"{name}{number}"), objective=objective)
+        for number, ((_, _, objective), group) in enumerate(groups.items(), 1)
+    ]
 
 
-def split(term: Term, place: SourceLine, places: int | None = None) -> tuple[list[ObjectiveTerm], Exact]:
+def split(
+    term: Term, place: SourceLine, places: int | None = None, objective: str = ""
+) -> tuple[list[ObjectiveTerm], Exact]:
     """Return the terms of a sum with their factors, and the constant of the sum."""
     if isinstance(term, Linear):
-        return [ObjectiveTerm(factor, one, place, places) for factor, one in term.parts], rounded(term.constant, places)
-    return [ObjectiveTerm(1, term, place, places)], 0
+        parts = [ObjectiveTerm(factor, one, place, places, objective) for factor, one in term.parts]
+        return parts, rounded(term.constant, places)
+    return [ObjectiveTerm(1, term, place, places, objective)], 0
 
 
 def _sum(group: Sequence[ObjectiveTerm], name: str) -> Draft:
@@ -248,9 +258,9 @@ class Definitions:
         self._numbers = {"P": 0, "F": 0, "R": 0}
 
     def constraint(self, draft: Draft, places: int, sign: int) -> Constraint:
-        """Return the constraint of a draft, as `_constraint` does, with its meaning when a robot is absent."""
+        """Return the constraint of a draft, with its objective and its meaning when a robot is absent."""
         made = self._constraint(draft, places, sign)
-        return replace(made, when_absent=draft.when_absent) if draft.when_absent else made
+        return replace(made, when_absent=draft.when_absent, objective=draft.objective)
 
     def _constraint(self, draft: Draft, places: int, sign: int) -> Constraint:
         """Return the constraint of a draft, with costs in units of `places` decimal places.

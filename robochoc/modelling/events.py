@@ -80,9 +80,10 @@ class ModelEvent:
         cost: object = None,
         name: str | None = None,
         when_absent: WhenAbsent | str | None = None,
+        objective: str = "",
     ) -> ModelConstraint:
         """Add constraints, each between variables of several robots, as `Model.add` does."""
-        rule = self._model.rule(constraints, cost, name, self, when_absent)
+        rule = self._model.rule(constraints, cost, name, self, when_absent, objective)
         self._add(rule)
         return rule
 

@@ -169,6 +169,7 @@ class Model(Solvable):
         cost: object = None,
         name: str | None = None,
         when_absent: WhenAbsent | str | None = None,
+        objective: str = "",
     ) -> ModelConstraint:
         """Add constraints. Constraints between variables of a single robot are private: no other robot learns them.
 
@@ -180,6 +181,7 @@ class Model(Solvable):
             when_absent: The meaning of the constraints when a robot in their scopes withdraws, is lost or leaves:
                 `restate` them for the other robots, `drop` them, or `fail`. None: the default for their form
                 (documentation, page When a robot is absent).
+            objective: The objective to which the cost belongs, if the model has several objectives (see `minimize`).
 
         Returns:
             A single constraint: the conjunction of all `constraints`.
@@ -187,7 +189,7 @@ class Model(Solvable):
         Raises:
             ModelError: if a constraint is not a condition over variables of this model, or cannot be restated.
         """
-        rule = self.rule(constraints, cost, name, when_absent=when_absent)
+        rule = self.rule(constraints, cost, name, when_absent=when_absent, objective=objective)
         self._constraints.append(rule)
         self.changed()
         return rule
@@ -213,7 +215,7 @@ class Model(Solvable):
         self.add(constraints)
         return self
 
-    def minimize(self, costs: object, *, places: int | None = None) -> None:
+    def minimize(self, costs: object, *, places: int | None = None, objective: str = "") -> None:
         """Minimise a sum of terms. The sums of repeated calls are added up.
 
         Terms over the same variables become one cost function. Integers, `Decimal` and `Fraction` are exact; a float
@@ -223,17 +225,19 @@ class Model(Solvable):
             costs: The sum.
             places: The number of decimal places (0 to 9) to which each cost is rounded, for distances and other real
                 numbers. None: costs are exact, and costs with more than 9 places are rejected.
+            objective: The name of the objective to which the sum belongs, if the model has two or three objectives.
+                Then each cost of the model belongs to an objective, and `solve` returns the Pareto front.
 
         Raises:
             ModelError: if the sum is not a number, or another sum of the model is maximised.
         """
-        self._optimize(costs, places, maximize=False)
+        self._optimize(costs, places, objective, maximize=False)
 
-    def maximize(self, utilities: object, *, places: int | None = None) -> None:
+    def maximize(self, utilities: object, *, places: int | None = None, objective: str = "") -> None:
         """Maximise a sum of terms; see `minimize`. The costs of violated soft constraints are subtracted."""
-        self._optimize(utilities, places, maximize=True)
+        self._optimize(utilities, places, objective, maximize=True)
 
-    def _optimize(self, given: object, places: int | None, *, maximize: bool) -> None:
+    def _optimize(self, given: object, places: int | None, objective: str, *, maximize: bool) -> None:
         place = calling_line()
         if self.maximized not in {None, maximize}:
             words = ("minimised", "maximised")
@@ -243,7 +247,9 @@ class Model(Solvable):
             )
         term = number(given)
         check_owned(term, self.variables, place)
-        parts, constant = split(term, place, check_places(places))
+        parts, constant = split(term, place, check_places(places), objective)
+        if objective and constant:
+            raise ModelError("the sum of an objective has a constant", "leave it out: it changes no choice", place)
         self._objective += parts
         self.constant += constant
         self.maximized = maximize
@@ -256,13 +262,14 @@ class Model(Solvable):
         name: str | None,
         event: object = None,
         when_absent: WhenAbsent | str | None = None,
+        objective: str = "",
     ) -> ModelConstraint:
         """Return a constraint without adding it."""
         place = calling_line()
         term = all_of(conditions_in(constraints, place))
         check_owned(term, self.variables, place, event)
         absence = absence_or_none(when_absent, place)
-        rule = ModelConstraint(name or self._free_name(), term, exact_or_none(cost), place, absence)
+        rule = ModelConstraint(name or self._free_name(), term, exact_or_none(cost), place, absence, objective)
         if absence == WhenAbsent.RESTATE:
             list(rule.drafts())
         return rule

@@ -131,7 +131,9 @@ class ModelRobot:
         """Add a variable that is true or false. It is a condition, and counts as 0 or 1 where a number is expected."""
         return self.variable(name, bool)
 
-    def knows(self, *constraints: object, cost: object = None, name: str | None = None) -> ModelConstraint:
+    def knows(
+        self, *constraints: object, cost: object = None, name: str | None = None, objective: str = ""
+    ) -> ModelConstraint:
         """Add this robot's part of a constraint shared with another robot, which never learns this part.
 
         Two values are allowed if both robots' parts allow them (a partially known constraint, PKC).
@@ -140,11 +142,12 @@ class ModelRobot:
             *constraints: Conditions over variables of this robot and of one other robot.
             cost: The cost for this robot if the conditions do not hold. None: they must hold.
             name: The constraint's name.
+            objective: The objective to which the cost belongs; see `Model.minimize`.
 
         Raises:
             ModelError: if the scope does not consist of variables of this robot and exactly one other robot.
         """
-        rule = self._model.rule(constraints, cost, name)
+        rule = self._model.rule(constraints, cost, name, objective=objective)
         owners = dict.fromkeys(variable.owner for variable in rule.term.variables)
         if self.name not in owners or len(owners) != 2:  # noqa: PLR2004 - a pair
             hint = f"use variables of {self.name} and of one other robot; add any other constraint by Model.add"

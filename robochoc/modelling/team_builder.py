@@ -117,7 +117,7 @@ class _Builder:
 
     def team(self) -> Team:
         """Return the team with its scenario."""
-        given = self._model.given
+        given, minimised = self._model.given, self._model.objective
         constraints = [self._finished(draft) for draft in self._drafts]
         parts = {name: [self._finished(draft) for draft in drafts] for name, drafts in self._parts.items()}
         if given:
@@ -135,6 +135,7 @@ class _Builder:
                 topics={robot.name: robot.topics for robot in self._robots},
                 weights={robot.name: robot.weight for robot in self._robots},
                 parts=parts,
+                objectives=[*(given.objectives if given else ()), *filter(None, (one.objective for one in minimised))],
             ),
         )
         whole = replace(team, scenario=self._scenario(team))

@@ -25,6 +25,7 @@ class TeamContents:
         parts: The parts of partially known constraints, by the robot that knows them.
         links: Pairs of neighbours, the parent first.
         events: The scenario.
+        objectives: The names of the objectives, if there are several.
     """
 
     kind: ProblemKind
@@ -33,6 +34,7 @@ class TeamContents:
     parts: Mapping[str, Sequence[Constraint]]
     links: Sequence[tuple[str, str]]
     events: Sequence[ScenarioEvent]
+    objectives: Sequence[str] = ()
 
     @property
     def names(self) -> set[str]:
@@ -69,7 +71,7 @@ def contents_of(team: Team) -> TeamContents:
             else:
                 constraints.append(one)
     links = [(parent.name, robot.name) for robot in team.robots for parent in robot.parents]
-    return TeamContents(team.kind, units, constraints, parts, links, team.scenario)
+    return TeamContents(team.kind, units, constraints, parts, links, team.scenario, team.objectives)
 
 
 def model_variable(variable: Variable, owner: str, symbols: Symbols, place: SourceLine) -> ModelVariable:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.model.costs import UnboundedCostError, normalized
+from robochoc.model.costs import NormalizationError, normalized
 from robochoc.model.problem import Team
 from robochoc.protocols.traits import Traits
 from robochoc.run.choice_rules import RULES
@@ -68,7 +68,7 @@ def _suited(names: Sequence[str], team: Team, options: Options) -> list[str]:
     """
     try:
         facts = Facts(normalized(team), loss=options.message_loss)
-    except UnboundedCostError:
+    except NormalizationError:
         chosen = []
     else:
         chosen = [rule.protocol for rule in RULES if rule.protocol in names and not rule.unmet(facts)]

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
-from robochoc.model.costs import UnboundedCostError, normalized
+from robochoc.model.costs import NormalizationError, normalized
 from robochoc.model.orders import Order
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.alternatives import refuse_team
@@ -104,7 +104,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> ProtocolChoi
     """Choose the protocol, since `options` do not name one."""
     try:
         team = normalized(team)
-    except UnboundedCostError:  # the run reports this error
+    except NormalizationError:  # the run reports this error
         return ProtocolChoice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
     withdrawal = options.withdraw is not None
     facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss, withdrawal)

@@ -11,7 +11,7 @@ from robochoc.communication.search_result import Progress
 from robochoc.formats import check_team, with_checked_events
 from robochoc.journal.events import Observer
 from robochoc.model.change import team_after_events
-from robochoc.model.costs import UnboundedCostError, normalized
+from robochoc.model.costs import NormalizationError, normalized
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
@@ -115,7 +115,7 @@ class PreparedRun:
                 outcome = _solve_centrally(counted, context)
             else:
                 outcome = _solve_distributed(counted, context, environment, audience)
-        except (OrderError, UnboundedCostError) as refused:
+        except (OrderError, NormalizationError) as refused:
             raise UnsupportedError(str(refused)) from None
         if counted is not team and environment is None:
             _check_costs(team, outcome)

@@ -26,7 +26,7 @@ from robochoc.model.change import (
     rejoin,
     team_after_events,
 )
-from robochoc.model.costs import UnboundedCostError, normalized_joining
+from robochoc.model.costs import NormalizationError, normalized_joining
 from robochoc.model.orders import with_priorities
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
@@ -265,7 +265,7 @@ class ScenarioRun:
                 try:
                     self._reread(name)
                     back.append(name)
-                except (InvalidInputError, ChangeError, UnboundedCostError, OSError) as why:
+                except (InvalidInputError, ChangeError, NormalizationError, OSError) as why:
                     self.failed_returns.append(f"{name} could not come back: {why}")
         self.lost_for_good += [name for name in lost if name not in back]
         if back:

@@ -185,13 +185,7 @@ def max_cost(constraint: Constraint) -> Cost:
 
 def is_soft(constraint: Constraint) -> bool:
     """Return whether `constraint` may have finite costs."""
-    match constraint.definition:
-        case Relation(semantics=semantics):
-            return semantics == Semantics.SOFT
-        case Predicate():
-            return constraint.cost < INFINITE
-        case Function():
-            return True
+    return constraint.has_costs
 
 
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:

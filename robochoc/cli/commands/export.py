@@ -72,10 +72,12 @@ def _written(team: Team, kind: str, options: ExportOptions) -> ExportResult:
     """Return the files of `team` in the format `kind`."""
     from robochoc.formats.dialects.dialect import notes_on_absence
     from robochoc.formats.dialects.registry import find_dialect
+    from robochoc.model.costs import refuse_several_objectives
 
     dialect = find_dialect(kind)
     if dialect is None or dialect.write is None:
         raise Failure(USAGE, f"this version cannot write {kind}")
+    refuse_several_objectives(team)
     written = dialect.write(team, options)
     return written._replace(notes=(*written.notes, *notes_on_absence(team)))
 

@@ -72,6 +72,7 @@ def _status(error: Exception) -> int | None:
     """Return the exit status for `error`, or None for an unforeseen error."""
     from robochoc.communication.search_result import ClusterLostError, RobotsLostError
     from robochoc.formats import InvalidInputError
+    from robochoc.model.costs import SeveralObjectivesError
     from robochoc.run.registry import UnknownProtocolError
     from robochoc.solver.compile import CompileError, CompileTimeoutError
     from robochoc.solver.compiled_domain import TooManySolutionsError
@@ -81,7 +82,7 @@ def _status(error: Exception) -> int | None:
 
     statuses: dict[int, tuple[type[Exception], ...]] = {
         INVALID: (InvalidInputError,),
-        USAGE: (UnknownProtocolError, UnsupportedError, SolverMissingError),
+        USAGE: (UnknownProtocolError, UnsupportedError, SolverMissingError, SeveralObjectivesError),
         LIMIT: (TooManySolutionsError, CompileTimeoutError),
         LOST: (RobotsLostError, ClusterLostError, CompileError, SolverLostError, RefutedError, ChildDiedError),
     }

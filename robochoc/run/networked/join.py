@@ -16,7 +16,7 @@ from robochoc.communication.network.robot import Ending
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.robot_votes import RobotVotes
 from robochoc.formats import check_robot
-from robochoc.model.costs import UnboundedCostError, normalized_robot
+from robochoc.model.costs import NormalizationError, normalized_robot
 from robochoc.model.problem import Robot
 from robochoc.run.networked.address import Address
 from robochoc.run.registry import protocol_or_stage
@@ -83,7 +83,7 @@ def _normalized(robot: Robot) -> Robot:
     """Return `robot` with costs in the internal units of the protocols. Raises `UnsupportedError`."""
     try:
         return normalized_robot(robot, robot.costs, {one.name: one.domain for one in robot.variables})
-    except UnboundedCostError as error:
+    except NormalizationError as error:
         raise UnsupportedError(f"{error}; the domains of other robots are not known across machines") from None
 
 
