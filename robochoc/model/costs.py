@@ -52,11 +52,8 @@ class SeveralObjectivesError(NormalizationError):
 def refuse_several_objectives(one: Team | Robot) -> None:
     """Raise `SeveralObjectivesError` if the costs of a team or a robot belong to several objectives."""
     if one.objectives:
-        weights = ",".join(f"{name}=1" for name in one.objectives)
-        raise SeveralObjectivesError(
-            f"there are several objectives ({', '.join(one.objectives)}), and this requires a single cost: combine them"
-            f" with --objectives, for example 'robochoc solve --objectives weighted:{weights}'"
-        )
+        names = ", ".join(one.objectives)
+        raise SeveralObjectivesError(f"there are several objectives ({names}), and this requires a single cost")
 
 
 _NORMALIZED = "_normalized"
