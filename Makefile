@@ -10,6 +10,9 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
+# Some machines set this variable. Then each program that a test starts would compile all imported modules again.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: demo demo-11 docs docs-version test quick test-more test-slow test-all test-part compiled test-compiled coverage fuzz simulate mutate lint type format bench benchmark-set leaderboard journals lock sbom release audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt

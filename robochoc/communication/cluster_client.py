@@ -14,6 +14,7 @@ from urllib.parse import urlsplit
 import msgspec
 
 from robochoc.communication.search_result import ClusterLostError
+from robochoc.formats.diagnostics import invalid_input
 from robochoc.solver.errors import UnsupportedError
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ class SchedulerLostError(ClusterLostError):
 
 
 class InvalidSchedulerError(UnsupportedError):
-    """The address of a scheduler, or its file, is invalid."""
+    """The address of a scheduler is invalid."""
 
 
 class _SchedulerFile(msgspec.Struct):
@@ -49,27 +50,30 @@ def connect(place: str, name: str) -> Client:
         name: The name of the client.
 
     Raises:
-        InvalidSchedulerError: if the address or the file is invalid.
+        InvalidSchedulerError: if the address is invalid.
+        InvalidInputError: if the file is missing or invalid.
         SchedulerLostError: if the scheduler cannot be reached.
     """
     from distributed import Client  # noqa: PLC0415 - an extra
 
     try:
-        address = place if "://" in place else _address_in(Path(place))
+        address = address_of(place)
         _check_address(address, place)
         return Client(address, set_as_default=False, name=name)
     except (OSError, ValueError) as error:
         raise SchedulerLostError(f"the scheduler at {place} cannot be reached: {error}") from None
 
 
-def _address_in(file: Path) -> str:
-    """Return the address in a scheduler's file. Raises `InvalidSchedulerError`."""
+def address_of(place: str) -> str:
+    """Return the address of a scheduler: `place`, or the address in this file. Raises `InvalidInputError`."""
+    if "://" in place:
+        return place
     try:
-        return msgspec.json.decode(file.read_bytes(), type=_SchedulerFile).address
+        return msgspec.json.decode(Path(place).read_bytes(), type=_SchedulerFile).address
     except (OSError, msgspec.MsgspecError) as wrong:
         why = wrong.strerror if isinstance(wrong, OSError) else wrong
-        hint = "name the JSON file of a Dask scheduler, or an address such as tcp://10.0.0.1:8786"
-        raise InvalidSchedulerError(f"{file} is not a scheduler's file ({why}); {hint}") from None
+        hint = "name the file of 'dask scheduler --scheduler-file', or an address such as tcp://10.0.0.1:8786"
+        raise invalid_input(place or "--cluster ''", f"is not a scheduler's file: {why}", hint) from None
 
 
 def _check_address(address: str, place: str) -> None:

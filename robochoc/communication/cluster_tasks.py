@@ -11,7 +11,7 @@ from queue import Empty, SimpleQueue
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
-from distributed import CancelledError, Client, Future
+from distributed import CancelledError, Client, Future, get_worker
 
 from robochoc.communication.cluster_client import SchedulerLostError, connect
 
@@ -84,3 +84,15 @@ def result_of(future: Future) -> Any:  # noqa: ANN401 - the result of any task
         return future.result()
     except CancelledError:
         raise SchedulerLostError("the scheduler of the cluster was lost: repeat the command") from None
+
+
+def discarded_check() -> Callable[[], bool]:
+    """Return a function by which the current task of this worker checks whether its result is no longer wanted."""
+    worker = get_worker()
+    key = worker.get_current_task()
+
+    def is_discarded() -> bool:
+        task = worker.state.tasks.get(key)
+        return task is None or task.state == "cancelled"
+
+    return is_discarded

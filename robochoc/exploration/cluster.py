@@ -10,10 +10,10 @@ import uuid
 from collections.abc import Callable, Iterable
 from contextlib import suppress
 
-from distributed import Event, Future, get_worker
+from distributed import Event, Future
 from distributed.scheduler import KilledWorker
 
-from robochoc.communication.cluster_tasks import ClusterTasks, result_of
+from robochoc.communication.cluster_tasks import ClusterTasks, discarded_check, result_of
 from robochoc.communication.search_result import ClusterLostError
 from robochoc.exploration.check import Case, CheckOptions, Explored, case_of, explore
 from robochoc.exploration.team_state import Exploration
@@ -94,8 +94,7 @@ class _StopCheck:
     """Asks from time to time whether this worker's task must stop. `name`: the name of the event."""
 
     def __init__(self, name: str) -> None:
-        self._event, self._worker = Event(name), get_worker()
-        self._key = self._worker.get_current_task()
+        self._event, self._is_discarded = Event(name), discarded_check()
         self._next = time.monotonic()
         self._is_stopped = False
 
@@ -105,11 +104,6 @@ class _StopCheck:
             self._next = time.monotonic() + POLL_S
             self._is_stopped = self._is_discarded() or self._stop_requested()
         return self._is_stopped
-
-    def _is_discarded(self) -> bool:
-        """Return whether nobody waits for the result any more."""
-        task = self._worker.state.tasks.get(self._key)
-        return task is None or task.state == "cancelled"
 
     def _stop_requested(self) -> bool:
         try:

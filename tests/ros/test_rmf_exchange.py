@@ -189,7 +189,13 @@ def test_nobody_answers() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"), [(("delivery", "a"), "'delivery' needs 2 places"), (("clean", "a", "b"), "1 place")]
+    ("words", "told"),
+    [
+        (("delivery", "a"), "'delivery' needs 2 places"),
+        (("clean", "a", "b"), "1 place"),
+        (("patrol", "a", "--fleet", ""), "the name is empty"),
+        (("patrol", ""), "the name is empty"),
+    ],
 )
 def test_places_that_do_not_fit(words: tuple[str, ...], told: str) -> None:
     done = robochoc_within("rmf", "request", *words)

@@ -39,6 +39,16 @@ class Cluster:
             )
         assert not run.is_over, run.errors()
 
+    def is_idle(self) -> bool:
+        """Return whether no worker executes a task."""
+        from distributed import Client  # noqa: PLC0415 - an extra
+
+        with Client(scheduler_file=str(self.file), set_as_default=False) as client:
+            return not any(client.call_stack().values())
+
+    def wait_until_idle(self) -> None:
+        wait_until(self.is_idle, "the workers continue")
+
     def _start(self, name: str, words: list[str]) -> Run:
         command = [sys.executable, "-m", f"distributed.cli.{words[0]}", *words[1:]]
         return self._stack.enter_context(running(command, self._home / name))

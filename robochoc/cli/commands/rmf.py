@@ -13,7 +13,7 @@ import click
 
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.ros_setup import ros_errors_as_failures
-from robochoc.cli.options.value_types import Number, ProtocolName, WholeNumber
+from robochoc.cli.options.value_types import Name, Number, ProtocolName, WholeNumber
 from robochoc.cli.reports.failures import LIMIT, USAGE, Failure, errors_as_failures, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -160,12 +160,12 @@ def bid(fleet: Path, place: str, protocol: str, tasks: int | None) -> None:
 
 @rmf.command(short_help="Request a patrol, a delivery or a cleaning.")
 @click.argument("category", type=click.Choice(["patrol", "delivery", "clean"]))
-@click.argument("places", nargs=-1, required=True, metavar="PLACE ...")
+@click.argument("places", type=Name(), nargs=-1, required=True, metavar="PLACE ...")
 @_ros
 @click.option(
     "--rounds", type=WholeNumber(1, 1000), default=1, show_default=True, metavar="N", help="Rounds of a patrol."
 )
-@click.option("--fleet", metavar="NAME", help="The only fleet that may do the task.")
+@click.option("--fleet", type=Name(), metavar="NAME", help="The only fleet that may do the task.")
 @click.option("--count", type=WholeNumber(1, 1000), default=1, show_default=True, metavar="N", help="Number of tasks.")
 @click.option(
     "--timeout",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import click
 
@@ -22,26 +21,26 @@ def on_cluster(place: str | None) -> Iterator[None]:
     """Prepare the use of a cluster, and convert its loss to a `Failure`. None: no cluster is used.
 
     Raises:
-        Failure: if Dask is not installed, or `place` cannot be that of a scheduler.
+        Failure: if Dask is not installed, or `place` is not that of a scheduler.
     """
     if place is None:
         yield
         return
     import logging
 
-    from robochoc.communication.cluster_client import require_dask
+    from robochoc.communication.cluster_client import address_of, require_dask
     from robochoc.communication.search_result import ClusterLostError
+    from robochoc.formats import InvalidInputError
     from robochoc.solver.errors import UnsupportedError
 
-    if "://" not in place and not Path(place).is_file():
-        hint = "name the file of 'dask scheduler --scheduler-file', or an address such as tcp://10.0.0.1:8786"
-        named = place or "--cluster ''"
-        raise Failure(INVALID, f"{named} is not a file; {hint}")
     before = logging.root.manager.disable
     logging.disable(logging.CRITICAL)  # Dask would log the loss of a scheduler with a traceback
     try:
         require_dask()
+        address_of(place)
         yield
+    except InvalidInputError as invalid:
+        raise Failure(INVALID, str(invalid)) from None
     except UnsupportedError as refused:
         raise Failure(USAGE, str(refused)) from None
     except ClusterLostError as lost:

@@ -101,6 +101,18 @@ class Finite(Number):
         return math.isfinite(number)
 
 
+class Name(click.ParamType[str]):
+    """A name. An empty name is an error; otherwise an unset shell variable would mean the default."""
+
+    name = "name"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Return the name."""
+        if not value.strip():
+            self.fail("the name is empty", param, ctx)
+        return value
+
+
 class ProtocolName(click.ParamType[str]):
     """The name of an installed protocol, in upper or lower case. The run rejects other words with a hint."""
 

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from distributed import CancelledError, Client, Future
 from distributed.scheduler import KilledWorker
 
 from robochoc.communication.cluster_client import SchedulerLostError, connect
-from robochoc.communication.cluster_tasks import result_of
+from robochoc.communication.cluster_tasks import discarded_check, result_of
 from robochoc.experiments.capacity.search import Capacity
 from robochoc.experiments.remote_task import files_of, write_files
 from robochoc.formats.diagnostics import on_one_line, shortened
@@ -64,7 +64,7 @@ def measure_machines(cluster: str, paths: Sequence[Path], options: Sequence[str]
             raise SchedulerLostError(f"the cluster at {cluster} has no workers: start workers by 'dask worker'")
         futures = {
             host: client.submit(
-                run_capacity, files, words, timeout_s + START_S,
+                _run_on_worker, files, words, timeout_s + START_S,
                 key=f"robochoc-capacity-{uuid.uuid4().hex}", workers=[address], pure=False,
             )
             for host, address in workers.items()
@@ -78,17 +78,42 @@ def measure_machines(cluster: str, paths: Sequence[Path], options: Sequence[str]
 
 
 def run_capacity(
-    files: Sequence[tuple[str, Mapping[str, bytes]]], options: Sequence[str], limit_s: float
+    files: Sequence[tuple[str, Mapping[str, bytes]]],
+    options: Sequence[str],
+    limit_s: float,
+    is_discarded: Callable[[], bool] = lambda: False,
 ) -> tuple[bytes, str]:
-    """Run `robochoc capacity` on a worker, and return its standard output and the reason if it has none."""
+    """Run `robochoc capacity`, and return its standard output and the reason if it has none.
+
+    Args:
+        files: The names of teams or task lists, with the content of their files.
+        options: The options of `robochoc capacity`.
+        limit_s: The longest time, in seconds.
+        is_discarded: Called from time to time. If it returns True, the program is ended.
+    """
+    until_s = time.monotonic() + limit_s
     with PrivateFolder() as folder:
         paths = [str(write_files(some, Path(folder) / str(number), name)) for number, (name, some) in enumerate(files)]
         command = [sys.executable, "-m", "robochoc", "capacity", *paths, *options, "--json"]
-        try:
-            done = subprocess.run(command, capture_output=True, timeout=limit_s, check=False)  # noqa: S603 - this program
-        except subprocess.TimeoutExpired:
-            return b"", f"no result within {limit_s:g} s"
-    return done.stdout, done.stderr.decode(errors="replace")
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as program:  # noqa: S603 - this program
+            while True:
+                left_s = until_s - time.monotonic()
+                if left_s <= 0 or is_discarded():
+                    program.terminate()
+                    with suppress(subprocess.TimeoutExpired):
+                        program.wait(START_S)
+                    program.kill()
+                    return b"", f"no result within {limit_s:g} s"
+                with suppress(subprocess.TimeoutExpired):
+                    output, errors = program.communicate(timeout=min(left_s, _POLL_S))
+                    return output, errors.decode(errors="replace")
+
+
+def _run_on_worker(
+    files: Sequence[tuple[str, Mapping[str, bytes]]], options: Sequence[str], limit_s: float
+) -> tuple[bytes, str]:
+    """Run `robochoc capacity` as a task of a worker, until the client is gone."""
+    return run_capacity(files, options, limit_s, discarded_check())
 
 
 def worker_of_each_host(workers: Mapping[str, Mapping[str, Any]]) -> dict[str, str]:

@@ -40,6 +40,7 @@ def test_a_worker_without_a_result_says_why(tmp_path: Path) -> None:
     assert not content
     assert "worth" in why
     assert machines.run_capacity([], _FAST, 0.001) == (b"", "no result within 0.001 s")
+    assert machines.run_capacity([], _FAST, 10_000, lambda: True) == (b"", "no result within 10000 s")
 
 
 def test_one_worker_of_each_machine_is_chosen() -> None:
@@ -72,6 +73,17 @@ def test_a_cluster_is_measured(cluster: Cluster, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     (machine,) = msgspec.json.decode(done.stdout)["machines"]
     assert (machine["error"], machine["capacity"]["robots"]) == ("", 4)
+
+
+@pytest.mark.slow
+def test_an_interrupted_command_stops_the_workers(cluster: Cluster, tmp_path: Path) -> None:
+    write_team(triangle(3), tmp_path / "team")
+    words = [PROGRAM, "capacity", str(tmp_path / "team"), "--timeout", "1000", "--cluster", str(cluster.file)]
+    with running(words, tmp_path / "run") as run:
+        cluster.wait_for_blocks(run)
+        run.strike(signal.SIGINT)
+        assert run.status() == 130, run.errors()
+    cluster.wait_until_idle()
 
 
 @pytest.mark.slow

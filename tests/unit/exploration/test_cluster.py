@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.cases import cases
 from tests.support.compiled import plain_python_only
 from tests.support.dask_cluster import Cluster
 from tests.support.faults import PROGRAM, Run, running
 from tests.support.limits import wait_until
-from tests.support.program import robochoc, robochoc_within
+from tests.support.program import ROOT, robochoc, robochoc_within
 
 pytestmark = plain_python_only
 slow = pytest.mark.slow
@@ -27,16 +28,8 @@ def cluster(tmp_path: Path) -> Iterator[Cluster]:
         yield Cluster(stack, tmp_path)
 
 
-def _is_idle(cluster: Cluster) -> bool:
-    """Return whether no worker executes a task."""
-    from distributed import Client  # noqa: PLC0415 - an extra
-
-    with Client(scheduler_file=str(cluster.file), set_as_default=False) as client:
-        return not any(client.call_stack().values())
-
-
 def _wait_for_tasks(cluster: Cluster, run: Run) -> None:
-    wait_until(lambda: not _is_idle(cluster) or run.is_over, lambda: f"no task begins: {run.errors()}")
+    wait_until(lambda: not cluster.is_idle() or run.is_over, lambda: f"no task begins: {run.errors()}")
     assert not run.is_over, run.errors()
 
 
@@ -66,7 +59,7 @@ def test_a_signal_stops_the_workers(cluster: Cluster, tmp_path: Path, signum: si
         run.strike(signum)
         assert run.status() == status, run.errors()
         assert "Traceback" not in run.errors()
-    wait_until(lambda: _is_idle(cluster), "the workers continue")
+    cluster.wait_until_idle()
 
 
 @slow
@@ -74,7 +67,7 @@ def test_the_time_limit_keeps_the_states_so_far(cluster: Cluster) -> None:
     done = robochoc("check", "abt", *ENDLESS, "--timeout", "3", "--cluster", cluster.file)
     assert done.returncode == 3, done.stderr
     assert "increase --timeout" in done.stderr
-    assert _is_idle(cluster)
+    assert cluster.is_idle()
 
 
 @slow
@@ -90,16 +83,20 @@ def test_a_lost_scheduler_ends_the_check(cluster: Cluster, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("place", "status", "said"),
     [
-        ("missing.json", 1, "missing.json is not a file; name the file of 'dask scheduler --scheduler-file'"),
-        ("", 1, "--cluster '' is not a file; name the file of 'dask scheduler --scheduler-file'"),
+        ("missing.json", 1, "missing.json: is not a scheduler's file: No such file or directory (name the file"),
+        ("", 1, "--cluster '': is not a scheduler's file: Is a directory (name the file"),
         ("tcp://127.0.0.1", 2, "expected tcp://HOST:PORT, with a port from 1 to 65535"),
         ("tcp://127.0.0.1:65536", 2, "'tcp://127.0.0.1:65536' is not the address of a scheduler"),
         ("tcp://127.0.0.1:0", 2, "'tcp://127.0.0.1:0' is not the address of a scheduler (port 0)"),
     ],
 )
-def test_a_wrong_cluster_is_refused(place: str, status: int, said: str) -> None:
+def test_each_command_refuses_a_wrong_cluster_in_the_same_way(place: str, status: int, said: str) -> None:
     pytest.importorskip("distributed")
-    done = robochoc_within("check", "abt", "--cluster", place)
-    assert done.returncode == status
-    assert said in done.stderr
-    assert done.stderr.count("\n") == 1
+    solve = ("solve", ROOT / "instances" / "queens3d-4", "--runtime", "arrays", "--protocol", "dsa")
+    with cases() as each:
+        for command in (("check", "abt"), ("capacity", ROOT / "instances" / "queens3d-4"), solve):
+            with each(command[0]):
+                done = robochoc_within(*command, "--cluster", place)
+                assert done.returncode == status, done.stderr
+                assert said in done.stderr
+                assert done.stderr.count("\n") == 1
