@@ -72,7 +72,7 @@ def address_of(place: str) -> str:
         return msgspec.json.decode(Path(place).read_bytes(), type=_SchedulerFile).address
     except (OSError, msgspec.MsgspecError) as wrong:
         why = wrong.strerror if isinstance(wrong, OSError) else wrong
-        hint = "name the file of 'dask scheduler --scheduler-file', or an address such as tcp://10.0.0.1:8786"
+        hint = "name the JSON file of a Dask scheduler, or an address such as tcp://10.0.0.1:8786"
         raise invalid_input(place or "--cluster ''", f"is not a scheduler's file: {why}", hint) from None
 
 

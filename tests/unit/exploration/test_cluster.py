@@ -83,8 +83,8 @@ def test_a_lost_scheduler_ends_the_check(cluster: Cluster, tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("place", "status", "said"),
     [
-        ("missing.json", 1, "missing.json: is not a scheduler's file: No such file or directory (name the file"),
-        ("", 1, "--cluster '': is not a scheduler's file: Is a directory (name the file"),
+        ("missing.json", 1, "missing.json: is not a scheduler's file: No such file or directory (name the JSON file"),
+        ("", 1, "--cluster '': is not a scheduler's file: Is a directory (name the JSON file"),
         ("tcp://127.0.0.1", 2, "expected tcp://HOST:PORT, with a port from 1 to 65535"),
         ("tcp://127.0.0.1:65536", 2, "'tcp://127.0.0.1:65536' is not the address of a scheduler"),
         ("tcp://127.0.0.1:0", 2, "'tcp://127.0.0.1:0' is not the address of a scheduler (port 0)"),
