@@ -123,7 +123,7 @@ class TeamEnv(ParallelEnv):
         self._round = 0
         self._is_reset = False
 
-    def values(self, agent: str) -> list[dict[str, int | str]]:
+    def values(self, agent: str) -> list[dict[str, float | str]]:
         """Return the values of a robot in the order of their indices, each by variable, in the user's notation.
 
         Raises:

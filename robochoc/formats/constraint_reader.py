@@ -20,7 +20,7 @@ from robochoc.formats.robot_rules import (
     check_shared,
     refuse_private_part,
 )
-from robochoc.formats.symbols import check_argument_types
+from robochoc.formats.symbols import SYMBOL, check_argument_types
 from robochoc.formats.xml import attribute, line
 from robochoc.model.problem import (
     INFINITE,
@@ -50,8 +50,8 @@ class ConstraintContext:
     own: Collection[str]
     """The robot's own variables."""
     definitions: Mapping[str, Definition | None]
-    symbolic: Mapping[str, bool]
-    """For each variable of the robot, whether its values are symbols."""
+    kinds: Mapping[str, str]
+    """For each variable of the robot, the kind of its values (`formats/symbols.py`)."""
     objectives: tuple[str, ...] = ()
 
 
@@ -90,7 +90,7 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
     definition: Definition | None
     if is_global(reference):
         definition, parameters = read_global(reference, given, scope), variables_of(given, scope)
-        if any(context.symbolic.get(str(term)) for term in parameters) and reference == "global:allDifferent":
+        if any(context.kinds.get(str(term)) == SYMBOL for term in parameters) and reference == "global:allDifferent":
             definition = replace(definition, symbolic=definition.parameters)
     else:
         _refuse_elements(given)
@@ -114,7 +114,7 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
     )
     check_constraint(constraint, context.kind, context.units)
     check_objective(constraint, context.objectives)
-    check_argument_types(constraint, context.symbolic)
+    check_argument_types(constraint, context.kinds)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint
 

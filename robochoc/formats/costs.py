@@ -16,6 +16,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import BEYOND, check_integer, digits
 from robochoc.formats.xml import attribute
 from robochoc.model.cost_units import MAX_PLACES, CostUnits
+from robochoc.model.expression.fixed_point import VALUE_PLACES
 from robochoc.model.problem import (
     INFINITE,
     Constraint,
@@ -66,7 +67,12 @@ def places_used(root: etree._Element) -> int:
         text = relation.text or ""
         if "." in text and attribute(relation, "semantics") == Semantics.SOFT:
             words += [part.partition(":")[0].strip() for part in text.split("|") if ":" in part]
-    return max((_places(word) for word in words if "." in word), default=0)
+    places = [_places(word) for word in words if "." in word]
+    for function in root.iter("function"):
+        is_real = "real" in (function.findtext("parameters") or "").split()[::2]
+        scale = attribute(function, "scale")
+        places.append(places_of_scale(scale) or 0 if scale else VALUE_PLACES * is_real)
+    return max(places, default=0)
 
 
 def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> CostUnits:
@@ -173,10 +179,16 @@ def _scale(presentation: etree._Element, places: int) -> int:
     given = attribute(presentation, "scale")
     if not given:
         return places
-    if not _SCALE.fullmatch(given):
+    found = places_of_scale(given)
+    if found is None:
         hint = f"expected a power of ten of at most {MAX_PLACES} places: 1, 0.1, 0.01, ..."
         raise MistakeError(f"invalid scale '{shortened(given)}'", hint)
-    return len(given.partition(".")[2])
+    return found
+
+
+def places_of_scale(text: str) -> int | None:
+    """Return the number of decimal places in a scale: 3 for 0.001. None: it is not a scale."""
+    return len(text.partition(".")[2]) if _SCALE.fullmatch(text) else None
 
 
 def _decimal(value: int, places: int) -> str:

@@ -20,10 +20,13 @@ from robochoc.formats.definitions import (
     parse_once,
 )
 from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.real_numbers import REAL_KINDS, read_real_domain, read_value_places
 from robochoc.formats.symbols import SymbolTable, codes_of
 from robochoc.formats.xml import attribute, line
 from robochoc.model.expression import Expression, ExpressionError, SymbolNames, Type, parse
+from robochoc.model.expression.fixed_point import fixed_point
 from robochoc.model.problem import INFINITE, CostUnits, Domain, Function, Predicate, Relation, Semantics, Topic
+from robochoc.model.real import RealParameters
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _NUMERIC = re.compile(r"[-+.0-9]+$")
@@ -44,13 +47,21 @@ def check_count(element: etree._Element, name: str, found: int) -> None:
         raise MistakeError(f"{name} is {given}, but there are {found}", f'write {name}="{found}" or leave it out')
 
 
-def read_domain(element: etree._Element, table: SymbolTable) -> Domain:
-    """Return a domain from XCSP ranges (`1..4 7 9..12`), which become ascending ranges, or from symbols.
+def read_domain(element: etree._Element, table: SymbolTable, places: int) -> Domain:
+    """Return a domain from XCSP ranges (`1..4 7 9..12`), which become ascending ranges, from symbols or an interval.
 
-    A symbolic domain gets the symbols that are in the `table` so far. Raises `MistakeError`.
+    A symbolic domain gets the symbols that are in the `table` so far. A real domain has `places` decimal places. Raises
+    `MistakeError`.
     """
     name, words = attribute(element, "name"), (element.text or "").split()
-    if attribute(element, "type") == "symbolic":
+    kind = attribute(element, "type")
+    if kind == "real":
+        domain = read_real_domain(element, places)
+        check_count(element, "nbValues", len(domain))
+        return domain
+    if element.get("points") is not None:
+        raise MistakeError("only a real domain has points", 'write type="real", or delete the points')
+    if kind == "symbolic":
         codes = codes_of(words, table)
         domain = Domain(name, tuple(range(code, code + 1) for code in codes), table.names)
     else:
@@ -139,20 +150,22 @@ def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
     return int(given) if given else len(tuples[0])
 
 
-def read_predicate(element: etree._Element, code: Callable[[str], int]) -> Predicate:
-    """Return a predicate from `int X symbol Y` and a Boolean functional expression. Raises `MistakeError`.
+def read_predicate(element: etree._Element, code: Callable[[str], int], places: int) -> Predicate:
+    """Return a predicate from `int X symbol Y real Z` and a Boolean functional expression. Raises `MistakeError`.
 
-    `code` returns the code of a symbol.
+    `code` returns the code of a symbol. Real numbers have `places` decimal places.
     """
-    return Predicate(attribute(element, "name"), *_read_intension(element, Type.BOOLEAN, code))
+    return Predicate(attribute(element, "name"), *_read_intension(element, Type.BOOLEAN, code, (places, 0)))
 
 
-def read_function(element: etree._Element, code: Callable[[str], int]) -> Function:
-    """Return a function from `int X symbol Y` and an integer functional expression. Raises `MistakeError`.
+def read_function(element: etree._Element, code: Callable[[str], int], places: int) -> Function:
+    """Return a function from `int X symbol Y real Z` and a functional expression for a number. Raises `MistakeError`.
 
-    `code` returns the code of a symbol.
+    `code` returns the code of a symbol. Real numbers have `places` decimal places.
     """
-    return Function(attribute(element, "name"), *_read_intension(element, Type.INTEGER, code))
+    value_places = read_value_places(element)
+    read = _read_intension(element, Type.INTEGER, code, (places, value_places))
+    return Function(attribute(element, "name"), *read, value_places)
 
 
 def read_topic(
@@ -189,17 +202,27 @@ def _unparsed_if_unknown(code: Callable[[str], int]) -> Callable[[str], int]:
 
 
 def _read_intension(
-    element: etree._Element, wanted: Type, code: Callable[[str], int]
-) -> tuple[tuple[str, ...], Expression, tuple[str, ...]]:
-    """Return the formal parameters of a predicate or function, its body, and the symbolic parameters."""
-    parameters, symbolic = _read_parameters(element.findtext("parameters") or "")
+    element: etree._Element, wanted: Type, code: Callable[[str], int], places: tuple[int, int]
+) -> tuple[tuple[str, ...], Expression, tuple[str, ...], RealParameters | None]:
+    """Return the formal parameters of a predicate or function, its body, and its symbolic and real parameters.
+
+    `places`: the decimal places of real parameters, and of the value.
+    """
+    parameters, kinds = _read_parameters(element.findtext("parameters") or "")
+    symbolic = tuple(name for name, kind in zip(parameters, kinds, strict=True) if kind == "symbol")
+    real = tuple(name for name, kind in zip(parameters, kinds, strict=True) if kind in REAL_KINDS)
     functional = element.find("expression/functional")
     body = (functional.text if functional is not None else None) or ""
     try:
-        if symbolic:
-            symbols = SymbolNames(symbolic, _unparsed_if_unknown(code))
-            return parameters, parse(body, parameters, wanted, symbols), symbolic
-        return parameters, parse_once(body, parameters, wanted), ()
+        symbols = SymbolNames(symbolic, _unparsed_if_unknown(code)) if symbolic else None
+        if "real" in kinds:
+            source = parse(body, parameters, wanted, symbols, decimals=True)
+            steps = fixed_point(source, real, places[0], wanted, places[1])
+            return parameters, steps, symbolic, RealParameters(real, places[0], source)
+        real_parameters = RealParameters(real, places[0]) if real else None
+        if symbols:
+            return parameters, parse(body, parameters, wanted, symbols), symbolic, real_parameters
+        return parameters, parse_once(body, parameters, wanted), (), real_parameters
     except ExpressionError as error:
         below = body[: error.position].count("\n")
         start = line(element if functional is None else functional)
@@ -208,11 +231,13 @@ def _read_intension(
 
 
 def _read_parameters(text: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names in `int X symbol Y`, and the symbolic ones among them. Raises `MistakeError`."""
+    """Return the names in `int X symbol Y real Z`, and their kinds. Raises `MistakeError`."""
     words = text.split()
-    names = tuple(words[1::2])
-    if len(words) % 2 or not {*words[::2]} <= {"int", "symbol"}:
-        hint = "write int X int Y, and symbol Z for a parameter that is a symbol"
+    kinds, names = tuple(words[::2]), tuple(words[1::2])
+    if len(words) % 2 or not {*kinds} <= {"int", "symbol", *REAL_KINDS}:
+        hint = "write int X int Y, symbol Z for a parameter that is a symbol, or real Z for a real number"
         raise MistakeError(f"invalid parameters '{shortened(' '.join(words))}'", hint)
+    if {*kinds} >= {*REAL_KINDS}:
+        raise MistakeError("real and steps cannot be mixed in the parameters of one definition", "write real X real Y")
     check_parameter_names(names)
-    return names, tuple(name for kind, name in zip(words[::2], names, strict=True) if kind == "symbol")
+    return names, kinds

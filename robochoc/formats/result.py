@@ -4,7 +4,7 @@ It is converted from and to the types in `model/outcome.py`; no field is declare
 `Outcome` only in these points:
 
 * Fields of an answer with their default value are omitted, except those in `_FIRST`.
-* Values of symbolic variables are their symbols.
+* Values of symbolic variables are their symbols, and values of real variables are numbers in the user's unit.
 * `metrics` has the number of `messages`, and `messages_by_type`. The metrics of an epoch are in the epoch's object.
 * `at_s` is called `seconds`. Measured seconds have six decimal places.
 * `names`, `places` and `values` are added by the caller.
@@ -22,6 +22,7 @@ from typing import Any, NoReturn
 import msgspec
 
 from robochoc.model.outcome import Answer, CheckCounts, Improvement, Metrics, Optima, Outcome, SearchStage
+from robochoc.model.real import MOST_PLACES
 from robochoc.system.decode_errors import describe_decode_error
 from robochoc.system.errors import RobochocError
 
@@ -167,6 +168,8 @@ class _Symbols:
     def __init__(self, result: Json) -> None:
         self.codes = {symbol: code for code, symbol in enumerate(_texts(result, "symbols"))}
         self.variables = dict.fromkeys(_texts(result, "symbolic"))
+        places = result.get("real_places")
+        self._places: Json = places if isinstance(places, dict) else {}
 
     def codes_of(self, assignment: Any) -> Any:  # noqa: ANN401 - JSON; anything invalid is refused later
         """Return an assignment with codes instead of symbols."""
@@ -175,6 +178,10 @@ class _Symbols:
         return {name: self._code(name, value) for name, value in assignment.items()}
 
     def _code(self, name: str, value: object) -> object:
+        places = self._places.get(name)
+        if type(places) is int and 0 <= places <= MOST_PLACES and isinstance(value, int | Decimal):
+            steps = Decimal(value).scaleb(places)
+            return int(steps) if steps == int(steps) else value
         if not isinstance(value, str):
             return value
         self.variables[name] = None

@@ -37,6 +37,7 @@ from robochoc.formats.diagnostics import (
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
 from robochoc.formats.objectives import check_objectives
+from robochoc.formats.real_numbers import check_function_places, read_precision
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
     check_shown_variables,
@@ -44,7 +45,7 @@ from robochoc.formats.robot_rules import (
     repeated_neighbours,
 )
 from robochoc.formats.schema import SchemaError, schema_for, without_schema_errors
-from robochoc.formats.symbols import SymbolTable
+from robochoc.formats.symbols import SYMBOL, SymbolTable, kind_of
 from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
@@ -54,6 +55,7 @@ from robochoc.model.problem import (
     CostUnits,
     Definition,
     Domain,
+    Function,
     Parent,
     ProblemKind,
     Robot,
@@ -61,6 +63,7 @@ from robochoc.model.problem import (
     Topic,
     Variable,
 )
+from robochoc.model.real import DEFAULT_PLACES
 from robochoc.model.symbols import with_table
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -194,18 +197,21 @@ class _RobotReader:
         self._instance = instance
         self._report = DiagnosticCollector(str(path))
         self._own: dict[str, int] = {}
+        self._places = DEFAULT_PLACES
 
     def robot_file(self) -> RobotFile:
         presentation = next(self._instance.iterchildren("presentation"))
+        with self._report.at(line(presentation)):
+            self._places = read_precision(presentation)
         kind = ProblemKind(attribute(presentation, "type"))
         variables = self._variables(self._domains())
-        symbolic = {one.name: bool(one.domain.symbols) for one in variables}
-        topics = self._topics([name for name, is_symbol in symbolic.items() if is_symbol])
+        kinds = {one.name: kind_of(one.domain) for one in variables}
+        topics = self._topics([name for name, one in kinds.items() if one == SYMBOL])
         model = ConstraintModel(attribute(presentation, "constraintModel") or ConstraintModel.TKC)
         units = self._units(presentation, kind)
         objectives = self._objectives(presentation, kind, units)
         definitions = self._definitions(kind, units)
-        context = ConstraintContext(kind, units, model, self._own, definitions, symbolic, objectives)
+        context = ConstraintContext(kind, units, model, self._own, definitions, kinds, objectives)
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         implied: set[str] = set()
@@ -235,10 +241,12 @@ class _RobotReader:
             with self._report.at(line(element)):
                 check_unique("domain", attribute(element, "name"), domains)
                 domains[attribute(element, "name")] = None
-                domains[attribute(element, "name")] = self._once(element, lambda one: read_domain(one, self._table))
+                domains[attribute(element, "name")] = self._once(
+                    element, lambda one: read_domain(one, self._table, self._places), self._places
+                )
         return domains
 
-    def _once(self, element: etree._Element, read: Callable[[etree._Element], _Part], units: object = None) -> _Part:
+    def _once(self, element: etree._Element, read: Callable[[etree._Element], _Part], units: object) -> _Part:
         """Return the result of `read`. Elements with equal texts, read in equal `units`, share one object."""
         text = etree.tostring(element, with_tail=False) if len(element) else element.text
         key = units, element.tag, *element.attrib.items(), text
@@ -294,11 +302,14 @@ class _RobotReader:
             with self._report.at(line(element)):
                 check_semantics(Semantics(attribute(element, "semantics")), kind)
         for element in self._elements("predicates", "predicate", "nbPredicates"):
-            self._define(element, read_predicate, definitions)
+            self._define(element, lambda one, code: read_predicate(one, code, self._places), definitions, self._places)
         for element in self._elements("functions", "function", "nbFunctions"):
-            self._define(element, read_function, definitions)
+            self._define(element, lambda one, code: read_function(one, code, self._places), definitions, self._places)
             with self._report.at(line(element)):
                 refuse_function(kind)
+                function = definitions.get(attribute(element, "name"))
+                if isinstance(function, Function):
+                    check_function_places(function, units)
         return definitions
 
     def _define(
@@ -306,7 +317,7 @@ class _RobotReader:
         element: etree._Element,
         read: Callable[[etree._Element, Callable[[str], int]], Definition],
         definitions: dict[str, Definition | None],
-        units: CostUnits | None = None,
+        units: CostUnits | int,
     ) -> None:
         name = attribute(element, "name")
         with self._report.at(line(element)):

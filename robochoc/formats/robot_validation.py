@@ -22,6 +22,7 @@ from robochoc.formats.global_constraints import check_global
 from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
 from robochoc.formats.objectives import check_objective, check_objectives
+from robochoc.formats.real_numbers import check_function_places, check_real_domain
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
     check_constraint,
@@ -39,7 +40,7 @@ from robochoc.formats.symbols import (
     check_one_table,
     check_symbolic_definition,
     check_symbolic_domain,
-    symbolic_by_variable,
+    kinds_by_variable,
 )
 from robochoc.model.problem import (
     Constraint,
@@ -198,10 +199,11 @@ class RobotValidator:
             check_semantics(definition.semantics, robot.kind)
         if isinstance(definition, Function):
             refuse_function(robot.kind)
+            check_function_places(definition, robot.costs)
         if is_valid:
             check_constraint(constraint, robot.kind, robot.costs)
             check_objective(constraint, robot.objectives)
-            check_argument_types(constraint, symbolic_by_variable([robot]))
+            check_argument_types(constraint, kinds_by_variable([robot]))
 
     def _check_defined(self, thing: Defined, places: ObjectLocations) -> bool:
         """Return whether a domain or a definition is valid. Its error is reported for the first robot that uses it."""
@@ -239,6 +241,8 @@ def _check_defined(thing: Defined, table: tuple[str, ...]) -> None:
         check_domain(thing)
         if thing.symbols:
             check_symbolic_domain(thing)
+        if thing.real:
+            check_real_domain(thing, thing.real)
         return
     if PREDEFINED.get(thing.name) == thing:
         return

@@ -13,6 +13,7 @@ from lxml import etree
 from robochoc.formats.costs import cost_text, scale_text
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.global_constraints import write_global
+from robochoc.formats.real_numbers import real_domain_text, source_of
 from robochoc.model.expression import text
 from robochoc.model.problem import (
     INFINITE,
@@ -29,6 +30,7 @@ from robochoc.model.problem import (
     Term,
     Topic,
 )
+from robochoc.model.real import DEFAULT_PLACES
 
 _Named = TypeVar("_Named", Domain, Definition)
 _TABLE = "symbols"
@@ -51,6 +53,7 @@ def robot_xml(robot: Robot) -> bytes:
     _write_units(presentation, robot.costs)
     if robot.objectives:
         presentation.set("objectives", " ".join(robot.objectives))
+    _write_precision(presentation, robot)
     _write_domains(instance, robot)
     variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
     for variable in robot.variables:
@@ -72,6 +75,17 @@ def _write_units(presentation: etree._Element, units: CostUnits) -> None:
         presentation.set("constant", cost_text(units.constant, units))
 
 
+def _write_precision(presentation: etree._Element, robot: Robot) -> None:
+    """Write the precision of real numbers, if the robot or its constraints have any. It is the same for all."""
+    found = [variable.domain.real.places for variable in robot.variables if variable.domain.real]
+    for constraint in robot.constraints():
+        definition = constraint.definition
+        if not isinstance(definition, Relation) and definition.real:
+            found.append(definition.real.places)
+    if found and found[0] != DEFAULT_PLACES:
+        presentation.set("precision", scale_text(found[0]))
+
+
 def _write_domains(instance: etree._Element, robot: Robot) -> None:
     domains = _by_name(variable.domain for variable in robot.variables)
     table = robot.symbol_table
@@ -86,6 +100,9 @@ def _write_domains(instance: etree._Element, robot: Robot) -> None:
         if domain.symbols:
             element.set("type", "symbolic")
             element.text = " ".join(str(domain.label(value)) for value in domain)
+        elif domain.real:
+            element.set("type", "real")
+            element.text = real_domain_text(domain, domain.real)
         else:
             element.text = " ".join(map(_range, domain.ranges))
 
@@ -129,6 +146,8 @@ def _write_definitions(instance: etree._Element, robot: Robot) -> None:
         for function in functions:
             element = etree.SubElement(section, "function", name=function.name)
             element.set("return", "int")
+            if function.places:
+                element.set("scale", scale_text(function.places))
             _write_expression(element, function, table)
 
 
@@ -150,10 +169,16 @@ def _write_relation(section: etree._Element, relation: Relation, robot: Robot) -
 
 
 def _write_expression(element: etree._Element, definition: Predicate | Function, table: Sequence[str]) -> None:
-    kinds = {name: "symbol" if name in definition.symbolic else "int" for name in definition.parameters}
+    """Write the parameters and the body; over real numbers, the expression from which the body was made, if known."""
+    kinds = dict.fromkeys(definition.parameters, "int") | dict.fromkeys(definition.symbolic, "symbol")
+    body = definition.body
+    if definition.real:
+        source = source_of(definition, definition.real)
+        kinds |= dict.fromkeys(definition.real.names, "steps" if source is None else "real")
+        body = source or body
     etree.SubElement(element, "parameters").text = " ".join(f"{kind} {name}" for name, kind in kinds.items())
     expression = etree.SubElement(element, "expression")
-    etree.SubElement(expression, "functional").text = text(definition.body, definition.symbolic, table)
+    etree.SubElement(expression, "functional").text = text(body, definition.symbolic, table)
 
 
 def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint], units: CostUnits) -> None:

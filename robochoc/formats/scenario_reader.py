@@ -14,13 +14,14 @@ from robochoc.formats.constraint_reader import ConstraintContext, read_shared
 from robochoc.formats.costs import places_used
 from robochoc.formats.definition_reader import read_integer
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
+from robochoc.formats.real_numbers import read_steps
 from robochoc.formats.robot_reader import RobotFile, read_robot_file
 from robochoc.formats.robot_rules import (
     NO_ROBOTS_LEFT,
     check_added_constraint,
     check_constraint_of_added_robot,
 )
-from robochoc.formats.symbols import SymbolTable, check_argument_types, symbolic_by_variable
+from robochoc.formats.symbols import SymbolTable, check_argument_types, kinds_by_variable
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
@@ -148,13 +149,15 @@ class _ScenarioReader:
                 return RemoveConstraint(*(attribute(element, name) for name in ("agent", "parent", "name")))
 
     def _value(self, element: etree._Element) -> int:
-        """Return an integer, or the code of a symbol if the variable's domain is symbolic. Raises `MistakeError`."""
+        """Return an integer, the code of a symbol, or the steps of a real number. Raises `MistakeError`."""
         variable, word = attribute(element, "variable"), attribute(element, "value")
         if self._team is None:
             return 0  # the variable's domain is unknown
         known = self._team.variables.get(variable)
         if known and known.domain.symbols:
             return self._table.declare(word)
+        if known and known.domain.real:
+            return read_steps(word, known.domain.real)
         return read_integer(word)
 
     def _read_added_robot(self, name: str) -> Robot | None:
@@ -199,7 +202,7 @@ class _ScenarioReader:
     def _apply(self, change: Change, place: int) -> None:
         """Apply a change to the team. Raises `MistakeError` if it is impossible."""
         if self._team is not None and isinstance(change, AddConstraint):
-            check_argument_types(change.constraint, symbolic_by_variable(self._team.robots))
+            check_argument_types(change.constraint, kinds_by_variable(self._team.robots))
         while self._team is not None:
             try:
                 self._team = apply_changes(self._team, [change])

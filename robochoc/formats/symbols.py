@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 
+from robochoc.formats.costs import scale_text
 from robochoc.formats.definitions import MAX_VALUES, PREDEFINED
 from robochoc.formats.diagnostics import Diagnostic, MistakeError, shortened, suggestion
 from robochoc.formats.names import check_word
@@ -15,6 +16,8 @@ from robochoc.formats.team_members import TeamMembers
 from robochoc.model.problem import Constraint, Definition, Domain, Relation, Robot
 from robochoc.model.symbols import EITHER
 
+INTEGER, SYMBOL = "an integer", "a symbol"
+"""Kinds of values, in words. Real numbers have the kinds `real_kind`."""
 MAX_SYMBOL = 100
 """The maximum length of a symbol's name."""
 
@@ -125,44 +128,70 @@ def check_symbolic_definition(definition: Definition, table: Sequence[str]) -> N
                 raise MistakeError(message, "use an index of `Robot.symbols`")
 
 
-def check_argument_types(constraint: Constraint, symbolic: Mapping[str, bool]) -> None:
-    """Raise `MistakeError` if a constraint uses a symbol as an integer, or an integer as a symbol.
+def kind_of(domain: Domain) -> str:
+    """Return the kind of values in a domain, in words: `INTEGER`, `SYMBOL`, or a real number with its precision."""
+    return real_kind(domain.real.places) if domain.real else SYMBOL if domain.symbols else INTEGER
+
+
+def real_kind(places: int) -> str:
+    """Return the kind of real numbers with `places` decimal places, in words."""
+    return f"a real number with the precision {scale_text(places)}"
+
+
+def check_argument_types(constraint: Constraint, known: Mapping[str, str]) -> None:
+    """Raise `MistakeError` if an argument of a constraint is of another kind than its parameter.
 
     Args:
         constraint: The constraint.
-        symbolic: For each known variable, whether its values are symbols.
+        known: For each known variable, the kind of its values.
     """
     kinds = _kinds(constraint.definition)
     if len(kinds) != len(constraint.parameters):
         return  # another mistake
-    given = [False if isinstance(term, int) else symbolic.get(term) for term in constraint.parameters]
-    if True not in given and True not in kinds:
-        return  # integers only
+    given = [INTEGER if isinstance(term, int) else known.get(term) for term in constraint.parameters]
+    if {*given, *kinds} <= {INTEGER, None}:
+        return
     for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True):
-        if None not in {wanted, kind} and wanted is not kind:
+        if None not in {wanted, kind} and wanted != kind:
             name = shortened(constraint.definition.name)
-            message = f"{name} expects {_TYPES[bool(wanted)]}, but '{term}' is {_TYPES[bool(kind)]}"
-            raise MistakeError(message, "write symbol X or int X among its parameters, like the argument")
+            raise MistakeError(f"{name} expects {wanted}, but '{term}' is {kind}", _hint(str(wanted), str(kind)))
     if isinstance(constraint.definition, Relation):
         return  # a column in a relation without tuples fits any domain
     loose = {
-        kind: term for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True) if wanted is None
+        kind: term
+        for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True)
+        if wanted is None and kind is not None
     }
-    if loose.keys() >= {True, False}:
-        message = f"'{loose[True]}' is a symbol, but '{loose[False]}' is an integer"
-        raise MistakeError(message, "compare symbols with symbols; in an expression, quote a symbol: eq(X, 'red')")
+    if SYMBOL in loose and constraint.definition.name not in EITHER:
+        message = f"{constraint.definition.name} expects {INTEGER}, but '{loose[SYMBOL]}' is {SYMBOL}"
+        raise MistakeError(message, _hint(INTEGER, SYMBOL))
+    if len(loose) > 1:
+        kind, other = sorted(loose, key=lambda one: (one != SYMBOL, one == INTEGER))[:2]
+        hint = "use a predicate with parameters real X int Y"
+        if kind == SYMBOL:
+            hint = "compare symbols with symbols; in an expression, quote a symbol: eq(X, 'red')"
+        raise MistakeError(f"'{loose[kind]}' is {kind}, but '{loose[other]}' is {other}", hint)
+
+
+def _hint(wanted: str, given: str) -> str:
+    """Return the correction for an argument of another kind."""
+    if INTEGER in {wanted, given} and SYMBOL in {wanted, given}:
+        return "write symbol X or int X among its parameters, like the argument"
+    if wanted not in {INTEGER, SYMBOL} and given not in {INTEGER, SYMBOL}:
+        return "use one precision in all files of the team"
+    return "write real X or int X among its parameters of a predicate or function, like the argument"
 
 
 def mistyped_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
-    """Yield constraints that use another robot's symbols as integers, or its integers as symbols."""
-    if not any(robot.symbol_table for robot in members.robots):
+    """Yield constraints whose arguments among another robot's variables are of another kind than the parameters."""
+    known = kinds_by_variable(members.robots)
+    if {*known.values()} <= {INTEGER} and not any(robot.symbol_table for robot in members.robots):
         return
-    symbolic = symbolic_by_variable(members.robots)
     for robot in members.robots:
         parts = [part for child in robot.children for part in (*child.constraints, *child.copies)]
         for constraint in (*robot.shared, *parts):
             try:
-                check_argument_types(constraint, symbolic)
+                check_argument_types(constraint, known)
             except MistakeError as mistake:
                 place = members.files[robot.name].places.constraint(constraint)
                 yield place.mistake(mistake.message, mistake.hint)
@@ -179,23 +208,29 @@ def different_tables(members: TeamMembers) -> Iterator[Diagnostic]:
                 yield members.place(robot.name).mistake(message, _ONE_TABLE)
 
 
-def symbolic_by_variable(robots: Iterable[Robot]) -> dict[str, bool]:
-    """Return for each variable of `robots` whether its values are symbols."""
-    return {one.name: bool(one.domain.symbols) for robot in robots for one in robot.variables}
+def kinds_by_variable(robots: Iterable[Robot]) -> dict[str, str]:
+    """Return for each variable of `robots` the kind of its values."""
+    return {one.name: kind_of(one.domain) for robot in robots for one in robot.variables}
 
 
-_TYPES = {True: "a symbol", False: "an integer"}
 _ONE_TABLE = "use one table in all domains of a team; the ranges of a domain select its symbols"
 
 
-def _kinds(definition: Definition) -> list[bool | None]:
-    """Return, for each parameter, whether it is a symbol, or None if both are possible."""
+def _kinds(definition: Definition) -> list[str | None]:
+    """Return the kind of each parameter; None if several kinds are possible."""
     if isinstance(definition, Relation):
         known = bool(definition.tuples or definition.symbolic)
-        return [place in definition.symbolic if known else None for place in range(definition.arity)]
-    if definition.name in EITHER and PREDEFINED[definition.name] == definition:
+        return [
+            (SYMBOL if place in definition.symbolic else INTEGER) if known else None
+            for place in range(definition.arity)
+        ]
+    if PREDEFINED.get(definition.name) == definition:
         return [None, None]
-    return [name in definition.symbolic for name in definition.parameters]
+    kinds: dict[str, str | None] = dict.fromkeys(definition.parameters, INTEGER)
+    kinds |= dict.fromkeys(definition.symbolic, SYMBOL)
+    if definition.real:
+        kinds |= dict.fromkeys(definition.real.names, real_kind(definition.real.places))
+    return [*kinds.values()]
 
 
 def codes_of(words: Collection[str], table: SymbolTable) -> list[int]:

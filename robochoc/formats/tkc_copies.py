@@ -133,7 +133,7 @@ def _cost_function(
         slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]
         return lambda values: definition.cost([values[slot] if slot >= 0 else constant for slot, constant in slots])
     value = compile_expression(_applied(constraint), variables)
-    one: int = 10**units.places
+    one: int = 10 ** (units.places - definition.places) if isinstance(definition, Function) else 1
 
     def price(values: tuple[int, ...]) -> float:
         try:

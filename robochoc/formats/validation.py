@@ -23,7 +23,7 @@ from robochoc.formats.robot_rules import (
     check_constraint_of_added_robot,
 )
 from robochoc.formats.robot_validation import RobotValidator, repeated_robots
-from robochoc.formats.symbols import check_argument_types, symbolic_by_variable
+from robochoc.formats.symbols import check_argument_types, kinds_by_variable
 from robochoc.formats.team_consistency import check_between_robots
 from robochoc.formats.team_members import TeamMember, TeamMembers
 from robochoc.model.change import ExcessiveChangeError, apply_changes
@@ -259,7 +259,7 @@ def _change_mistakes(robots: Mapping[str, Robot], change: Change, place: Locatio
                     check_constraint_of_added_robot(constraint)
             case AddConstraint(agent, _, constraint):
                 check_added_constraint(constraint)
-                check_argument_types(constraint, symbolic_by_variable(robots.values()))
+                check_argument_types(constraint, kinds_by_variable(robots.values()))
                 if agent in robots:
                     yield from RobotValidator().mistakes_of_constraint(constraint, robots[agent])
             case AddValue(variable, value) | RemoveValue(variable, value):

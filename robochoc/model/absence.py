@@ -134,7 +134,8 @@ def _remaining(constraint: Constraint, gone: Collection[str]) -> Constraint | No
         if body is None:
             return None
         name = f"{definition.name}_{zlib.crc32(text(body).encode()):08x}"  # one definition may have several of them
-        left = replace(definition, name=name, parameters=remaining, body=body, symbolic=symbolic)
+        real = definition.real and definition.real.only(remaining)
+        left = replace(definition, name=name, parameters=remaining, body=body, symbolic=symbolic, real=real)
         terms = [formals[name] for name in remaining]
     if left is None:
         return None

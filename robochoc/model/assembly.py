@@ -122,7 +122,8 @@ def _without_constants(
             first = next(own[0].name for own in variables.values() if own)
             found.append(Constraint(constraint.name, _NEVER, (first,), (first,)))
         elif price:
-            unit = 10**costs.places if isinstance(constraint.definition, Function) else 1
+            places = constraint.definition.places if isinstance(constraint.definition, Function) else costs.places
+            unit = 10 ** (costs.places - places)
             costs = replace(costs, constant=costs.constant + int(price) * unit)
     return found, costs
 

@@ -134,7 +134,7 @@ def describe_change(change: Change, team: Team) -> str:
             assert_never(never)
 
 
-def _label(team: Team, variable: str, value: int) -> int | str:
+def _label(team: Team, variable: str, value: int) -> float | str:
     known = team.variables.get(variable)
     return known.domain.label(value) if known else value
 

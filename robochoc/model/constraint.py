@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import assert_never
 
 from robochoc.model.expression import Expression, UndefinedValueError, evaluate
+from robochoc.model.real import RealInterval, RealParameters
 from robochoc.system.lazy_dataclass import dataclass
 
 Assignment = Mapping[str, int]
@@ -66,11 +67,13 @@ class Domain:
         ranges: The values.
         symbols: The names of all symbols of the team, if the domain is symbolic: the value 2 means `symbols[2]`. All
             symbolic domains of a team have the same `symbols`, so that equal values have equal names.
+        real: The interval, if the values are real numbers. The values are then numbers of steps (`model/real.py`).
     """
 
     name: str
     ranges: tuple[range, ...]
     symbols: tuple[str, ...] = ()
+    real: RealInterval | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ranges", merge_ranges(self.ranges))
@@ -85,8 +88,10 @@ class Domain:
     def __contains__(self, value: object) -> bool:
         return any(value in part for part in self.ranges)
 
-    def label(self, value: int) -> int | str:
-        """Return `value`, or its name if the domain is symbolic."""
+    def label(self, value: int) -> float | str:
+        """Return `value`, its name if the domain is symbolic, or its number if the domain is real."""
+        if self.real is not None:
+            return self.real.number(value)
         return self.symbols[value] if 0 <= value < len(self.symbols) else value
 
 
@@ -153,13 +158,15 @@ class Relation:
 class Predicate:
     """The definition of a constraint in intension: a Boolean expression over formal `parameters`.
 
-    Parameters are integers. Those in `symbolic`, and constants compared with them, are symbols.
+    Parameters are integers. Those in `symbolic`, and constants compared with them, are symbols. Those in `real` are
+    real numbers, and the body is over their steps.
     """
 
     name: str
     parameters: tuple[str, ...]
     body: Expression
     symbolic: tuple[str, ...] = ()
+    real: RealParameters | None = None
 
     def holds(self, arguments: Sequence[int]) -> bool:
         """Return whether the body is true for `arguments`. An undefined value (division by zero) counts as false."""
@@ -184,14 +191,16 @@ class GlobalPredicate(Predicate):
 class Function:
     """The definition of a cost function in intension: an integer expression over `parameters`, whose value is the cost.
 
-    The value is in whole units of the user, not scaled by `CostUnits.places`. As in predicates, parameters in
-    `symbolic` are symbols.
+    The value is in units of 10**-`places` of the user's unit, whatever `CostUnits.places` is. As in predicates,
+    parameters in `symbolic` are symbols, and those in `real` are real numbers.
     """
 
     name: str
     parameters: tuple[str, ...]
     body: Expression
     symbolic: tuple[str, ...] = ()
+    real: RealParameters | None = None
+    places: int = 0
 
     def cost(self, arguments: Sequence[int]) -> float:
         """Return the cost of `arguments`: `INFINITE` if the value is undefined (division by zero)."""

@@ -122,7 +122,7 @@ def normalized_constraint(constraint: Constraint, units: CostUnits, domains: Dom
         case Predicate() as predicate if constraint.cost < INFINITE:
             return _with_predicate(constraint, predicate, int(constraint.cost) * sign * finer)
         case Function() as function:
-            return _with_function(constraint, function, sign * 10**units.places, domains)
+            return _with_function(constraint, function, sign * 10 ** (units.places - function.places), domains)
         case Relation() | Predicate():
             return constraint
 
@@ -284,7 +284,8 @@ def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> 
     if cost >= 0:
         return replace(constraint, cost=cost)
     body = Apply("if", (predicate.body, Constant(-cost), Constant(0)))
-    function = Function(predicate.name.removeprefix("global:"), predicate.parameters, body, predicate.symbolic)
+    name = predicate.name.removeprefix("global:")
+    function = Function(name, predicate.parameters, body, predicate.symbolic, predicate.real)
     return replace(constraint, definition=function, cost=INFINITE, offset=cost)
 
 
@@ -300,7 +301,7 @@ def _with_function(constraint: Constraint, function: Function, factor: int, doma
         body = Apply("min", (body, Constant(most)))
     if low < 0:
         body = Apply("max", (body, Constant(0)))
-    return replace(constraint, definition=replace(function, body=body), offset=min(0, least))
+    return replace(constraint, definition=replace(function, body=body, places=0), offset=min(0, least))
 
 
 def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...], domains: Domains) -> tuple[int, int]:

@@ -78,7 +78,10 @@ class Magnitudes:
         first = {term: place for place, term in reversed(list(enumerate(terms)))}
         key = (
             id(definition),
-            tuple(term if isinstance(term, int) else (first[term], self._domains[term].ranges) for term in terms),
+            tuple(
+                term if isinstance(term, int) else (first[term], self._domains[term].ranges, self._domains[term].real)
+                for term in terms
+            ),
         )
         if key not in self._known:
             self._known[key] = definition, self._excess(definition, terms)
@@ -91,19 +94,22 @@ class Magnitudes:
         found = excess(definition.body, limits)
         if found is None and isinstance(definition, Function):
             interval = bounds(definition.body, limits)
-            found = Excess(definition.body, interval) if self._is_excessive_cost(*interval) else None
+            found = Excess(definition.body, interval) if self._is_excessive_cost(definition, *interval) else None
         if found is None or not self._is_confirmed(definition, terms):
             return None
         return found
 
-    def _is_excessive_cost(self, *costs: float) -> bool:
-        return any(abs(cost) > self._max_cost for cost in costs)
+    def _is_excessive_cost(self, function: Function, *costs: float) -> bool:
+        most = self._max_cost * 10**function.places
+        return any(abs(cost) > most for cost in costs)
 
     def _is_confirmed(self, definition: Predicate | Function, terms: Sequence[Actual]) -> bool:
         """Return whether trying all values finds a too large result. True if there are too many values to try."""
         names = tuple(dict.fromkeys(term for term in terms if isinstance(term, str)))
         if math.prod(len(self._domains[name]) for name in names) > MAX_TRIED:
             return True
+        if any(self._domains[name].real for name in names):
+            return True  # other grids have other values
         body = compile_expression(definition.body, definition.parameters)
         for row in itertools.product(*(self._domains[name] for name in names)):
             values = dict(zip(names, row, strict=True))
@@ -113,15 +119,14 @@ class Magnitudes:
                 return True
             except UndefinedValueError:
                 continue
-            if isinstance(definition, Function) and self._is_excessive_cost(result):
+            if isinstance(definition, Function) and self._is_excessive_cost(definition, result):
                 return True
         return False
 
     def _interval(self, term: Actual) -> Interval:
         if isinstance(term, int):
             return Interval(term, term)
-        ranges = self._domains[term].ranges
-        return Interval(ranges[0][0], ranges[-1][-1])
+        return extent(self._domains[term])
 
     def _error(self, constraint: Constraint, definition: Predicate | Function, found: Excess) -> MagnitudeError:
         actual = dict(zip(definition.parameters, constraint.parameters, strict=True))
@@ -134,6 +139,13 @@ class Magnitudes:
             unit = f" in units of 10^-{self._places}" if self._places else ""
             message = f"the cost '{shown}' may reach {reached}; costs have at most 18 digits{unit}"
         return MagnitudeError(message, "use smaller values or coefficients, or a relation (a table)")
+
+
+def extent(domain: Domain) -> Interval:
+    """Return the interval from the smallest to the largest value of a non-empty domain, on any grid if it is real."""
+    if domain.real is not None:
+        return Interval(domain.real.low, domain.real.high)
+    return Interval(domain.ranges[0][0], domain.ranges[-1][-1])
 
 
 def _renamed(expression: Expression, actual: Mapping[str, Actual]) -> Expression:

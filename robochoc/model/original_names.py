@@ -27,6 +27,7 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
         claimed_by=_one(outcome.claimed_by, names),
         epochs=tuple(_epoch(epoch, names) for epoch in outcome.epochs),
         symbolic=_all(outcome.symbolic, names),
+        real_places={names.get(name, name): places for name, places in outcome.real_places.items()},
     )
 
 

@@ -326,6 +326,7 @@ class Outcome(Answer):
         term: The term in which it led. A takeover by another master begins a later term.
         symbols: The names of the team's symbols, if any: the value 2 means the symbol at index 2.
         symbolic: The variables whose values are symbols.
+        real_places: The decimal places of variables whose values are real numbers: an integer 1500 with 3 is 1.5.
         chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.
         stages: The stages of the run, if several protocols have searched in turn.
     """
@@ -344,6 +345,7 @@ class Outcome(Answer):
     term: int | None = None
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
+    real_places: dict[str, int] = field(default_factory=dict)
     chosen: dict[str, str] = field(default_factory=dict)
     stages: tuple[SearchStage, ...] = ()
 
@@ -357,11 +359,15 @@ class Outcome(Answer):
         """
         return _without_measurements(self, Outcome) == _without_measurements(other, Outcome)
 
-    def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
-        """Return `assignment`, from this outcome or one of its epochs, with symbols given by their names."""
+    def labelled(self, assignment: Mapping[str, int]) -> dict[str, float | str]:
+        """Return `assignment`, from this outcome or one of its epochs, with real numbers, and names of symbols."""
         named = set(self.symbolic)
         return {
-            name: self.symbols[value] if name in named and 0 <= value < len(self.symbols) else value
+            name: self.symbols[value]
+            if name in named and 0 <= value < len(self.symbols)
+            else value / 10 ** self.real_places[name]
+            if name in self.real_places
+            else value
             for name, value in assignment.items()
         }
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 
-from robochoc.model.constraint import Constraint, Definition, Domain, Predicate, Relation
+from robochoc.model.constraint import Constraint, Definition, Domain, Predicate, Relation, Variable
 from robochoc.model.expression import Apply, Name
 from robochoc.model.problem import AddAgent, Change, Robot, Team
 
@@ -20,9 +20,21 @@ def symbol_table(robots: Iterable[Robot]) -> tuple[str, ...]:
 
 def symbolic_variables(team: Team) -> tuple[str, ...]:
     """Return the variables with symbols as values, in `team` and in robots that its scenario adds."""
-    changes = [change for event in team.scenario for change in event.changes]
-    robots = [*team.robots, *(change.robot for change in changes if isinstance(change, AddAgent))]
-    return tuple(dict.fromkeys(one.name for robot in robots for one in robot.variables if one.domain.symbols))
+    return tuple(dict.fromkeys(one.name for one in _all_variables(team) if one.domain.symbols))
+
+
+def real_places(team: Team) -> dict[str, int]:
+    """Return the decimal places of each variable with real numbers as values, in `team` and its scenario."""
+    return {one.name: one.domain.real.places for one in _all_variables(team) if one.domain.real}
+
+
+def _all_variables(team: Team) -> Iterator[Variable]:
+    for robot in team.robots:
+        yield from robot.variables
+    for event in team.scenario:
+        for change in event.changes:
+            if isinstance(change, AddAgent):
+                yield from change.robot.variables
 
 
 def with_marked_symbols(constraints: Iterable[Constraint], symbolic: Collection[str]) -> list[Constraint]:

@@ -15,7 +15,7 @@ from robochoc.model.costs import NormalizationError, normalized
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.model.symbols import symbol_table, symbolic_variables
+from robochoc.model.symbols import real_places, symbol_table, symbolic_variables
 from robochoc.run.choice import ProtocolChoice, choose, choose_without_analysis
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.setting_rules import refuse_settings
@@ -219,4 +219,5 @@ def _header(team: Team, options: Options) -> Outcome:
         channel=options.channel.name if options.channel else None,
         symbols=symbol_table(team.robots),
         symbolic=symbolic_variables(team),
+        real_places=real_places(team),
     )

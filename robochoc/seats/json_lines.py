@@ -19,7 +19,7 @@ from robochoc.system.plain_text import LONGEST_REASON, on_one_line, printable
 VERSION = 1
 """The version of the protocol. It is increased if something is removed or changes its meaning."""
 MAX_TOKENS = 1 << 53
-Labelled = dict[str, int | str]
+Labelled = dict[str, float | str]
 """The values of a robot's variables, in the user's notation."""
 
 
@@ -74,7 +74,7 @@ class Notation:
         pairs = zip(team[robot].interface, value, strict=True)
         return {name: team.variables[name].domain.label(part) for name, part in pairs if part is not None}
 
-    def index(self, labelled: Mapping[str, int | str]) -> int | None:
+    def index(self, labelled: Mapping[str, float | str]) -> int | None:
         """Return the index of the robot's value; None if it cannot have it."""
         if labelled.keys() != {*self._names}:
             return None

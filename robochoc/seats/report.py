@@ -120,7 +120,7 @@ class SeatReport:
 
     robot: str
     player: str
-    value: Mapping[str, int | str]
+    value: Mapping[str, float | str]
     cost: float | None
     regret: float | None
     messages: int
@@ -183,7 +183,7 @@ class GameReport:
     certified_by: str
     regret: float | None
     costs: tuple[Cost | None, ...]
-    assignment: Mapping[str, int | str]
+    assignment: Mapping[str, float | str]
     seats: tuple[SeatReport, ...] = field(default=())
     coalitions: tuple[CoalitionReport, ...] = ()
 
@@ -218,7 +218,7 @@ def report_of(
     disclosed = disclosed_by(rounds, ledger)
     labels = {name: variable.domain.label for name, variable in rounds.team.variables.items()}
 
-    def labelled(values: Mapping[str, int]) -> dict[str, int | str]:
+    def labelled(values: Mapping[str, int]) -> dict[str, float | str]:
         return {name: labels[name](part) for name, part in values.items()}
 
     def seat(name: str) -> SeatReport:

@@ -151,6 +151,6 @@ class SeatGame:
         self._turns.close()
 
 
-def value_text(labelled: Mapping[str, int | str]) -> str:
+def value_text(labelled: Mapping[str, float | str]) -> str:
     """Return a value in words: `V1 = 2, V2 = red`."""
     return ", ".join(f"{name} = {part}" for name, part in labelled.items())

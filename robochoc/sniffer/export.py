@@ -213,7 +213,7 @@ def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
     return part
 
 
-def _notes(data: PageData, messages: Sequence[int]) -> list[tuple[int, Mapping[str, int | str]]]:
+def _notes(data: PageData, messages: Sequence[int]) -> list[tuple[int, Mapping[str, float | str]]]:
     """Return the decisions between the first and the last message."""
     if not messages:
         return []
@@ -222,7 +222,7 @@ def _notes(data: PageData, messages: Sequence[int]) -> list[tuple[int, Mapping[s
     return [(step, data.names.labelled(taken)) for step, taken in trace.decisions if first <= step <= last]
 
 
-def _note(trace: Trace, step: int, assignment: Mapping[str, int | str], drawn: set[int]) -> list[str]:
+def _note(trace: Trace, step: int, assignment: Mapping[str, float | str], drawn: set[int]) -> list[str]:
     robot = trace.steps.robot[step]
     if robot not in drawn:
         return []

@@ -58,7 +58,7 @@ class TeamNames:
             names = names._replace(interfaces=_DecidedVariables(self._trace.variables))
         return names.wording(sender, receiver, on_tree=self._uses_tree(run))
 
-    def labelled(self, values: Mapping[str, int]) -> Mapping[str, int | str]:
+    def labelled(self, values: Mapping[str, int]) -> Mapping[str, float | str]:
         """Return decided values, with the names of symbols known from the last run."""
         symbols = self._of_run(len(self._trace.runs) - 1).symbols if self._trace.runs else {}
         if not symbols:

@@ -111,7 +111,8 @@ def check_user_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
             in_force = restated(constraint, absent)
             if in_force is not None:
                 paid = int(constraint_cost(in_force, assignment))
-                total += paid if isinstance(constraint.definition, Function) else paid * unit
+                definition = constraint.definition
+                total += paid * (Fraction(1, 10**definition.places) if isinstance(definition, Function) else unit)
     if Fraction(cost) != total:
         exact = Decimal(int(total * 10**places)).scaleb(-places)
         raise RefutedError(

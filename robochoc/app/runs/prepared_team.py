@@ -101,7 +101,8 @@ def _of_files(team: Team) -> PreparedTeam:
 
 
 def _label(domains: Mapping[str, Domain], name: str, code: int) -> Value:
-    return domains[name].label(code) if name in domains else code
+    shown = domains[name].label(code) if name in domains else code
+    return str(shown) if isinstance(shown, float) else shown
 
 
 def value_of(model: Model, variable: str, code: int) -> Value:

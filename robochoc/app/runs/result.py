@@ -48,7 +48,8 @@ class RunResult(Outcome):
     def values_of(self, answer: Answer) -> dict[str, Value]:
         """Return the user's values in this result, or in one of its epochs, by `ROBOT.DECISION`."""
         named = self.labelled(answer.assignment)
-        return {name: self.labels.get(str(value), value) for name, value in named.items()}
+        shown = {name: str(value) if isinstance(value, float) else value for name, value in named.items()}
+        return {name: self.labels.get(str(value), value) for name, value in shown.items()}
 
     def value(self, robot: str, decision: str) -> Value | None:
         """Return the value that a robot chose for a decision."""

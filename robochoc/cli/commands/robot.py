@@ -102,7 +102,7 @@ def _run(
     credentials: tuple[Path | None, str | None],
     given: dict[str, Any],
     show_stage: Callable[[str], None],
-) -> tuple[Ending, dict[str, int | str], list[str]]:
+) -> tuple[Ending, dict[str, float | str], list[str]]:
     """Run the robot in `file`, and publish its decision.
 
     Args:
@@ -161,7 +161,7 @@ class _LostMasterReporter:
         print_above(on_one_line(f"{self._name}: left the master at {place}: {why}; looking for another master"))
 
 
-def _labelled(own: Robot, assignment: Assignment) -> dict[str, int | str]:
+def _labelled(own: Robot, assignment: Assignment) -> dict[str, float | str]:
     """Return the robot's values, in which symbols are replaced by their names."""
     domains = {variable.name: variable.domain for variable in own.variables}
     return {name: domains[name].label(value) for name, value in assignment.items()}
@@ -188,7 +188,7 @@ class _DecisionReporter:
             failure.show()
 
 
-def _decision_line(name: str, why: str, values: Mapping[str, int | str]) -> str:
+def _decision_line(name: str, why: str, values: Mapping[str, float | str]) -> str:
     from robochoc.system.plain_text import on_one_line
 
     decision = ", ".join(f"{variable} = {value}" for variable, value in values.items())
@@ -196,7 +196,7 @@ def _decision_line(name: str, why: str, values: Mapping[str, int | str]) -> str:
 
 
 def _print_ending(
-    name: str, ending: Ending, values: Mapping[str, int | str], published: Sequence[str], *, as_json: bool
+    name: str, ending: Ending, values: Mapping[str, float | str], published: Sequence[str], *, as_json: bool
 ) -> None:
     if as_json:
         import msgspec

@@ -301,7 +301,7 @@ def _simulated(outcome: Outcome) -> str:
     return f"; {f'{seconds:,.2f} s' if seconds >= 1 else f'{seconds * 1000:,.2f} ms'} simulated ({outcome.channel})"
 
 
-def _values(team: Team, assignment: Mapping[str, int | str], places: Mapping[str, Place]) -> list[str]:
+def _values(team: Team, assignment: Mapping[str, float | str], places: Mapping[str, Place]) -> list[str]:
     """Return a table of tasks, a board, or a list of values, with their positions if these are known."""
     if tasks := task_table(team, assignment):
         return tasks
@@ -315,7 +315,7 @@ def _at(place: Place | None) -> str:
     return f" ({','.join(f'{part:.10g}' for part in place)} m)" if place else ""
 
 
-def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
+def _board(team: Team, assignment: Mapping[str, float | str]) -> list[str]:
     """Return a board, if variables are named after its cells (`V3.1`) and it is not too wide."""
     cells = {}
     for name in team.variables:
@@ -331,7 +331,7 @@ def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     return [head, *(f"  {row:>10}" + "".join(f"{cells[row, column]:>{width}}" for column in columns) for row in rows)]
 
 
-def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
+def _list(team: Team, assignment: Mapping[str, float | str]) -> list[str]:
     owners = sorted({team.owner[name] for name in assignment}, key=natural_key)
     own = {owner: [variable.name for variable in team[owner].variables] for owner in owners}
     values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}
@@ -339,7 +339,7 @@ def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     return _wrapped([values[owner] if alike else f"{owner}: {values[owner]}" for owner in owners])
 
 
-def task_table(team: Team, values: Mapping[str, int | str]) -> list[str]:
+def task_table(team: Team, values: Mapping[str, float | str]) -> list[str]:
     """Return a table of robots and their tasks (`tasks.yaml`), and the unassigned tasks; empty for other problems."""
     could = {robot.name: _tasks_of(robot) for robot in team.robots}
     if not all(could.values()):
@@ -366,7 +366,7 @@ def task_table(team: Team, values: Mapping[str, int | str]) -> list[str]:
     ]
 
 
-def _tasks_of(robot: Robot) -> dict[str, tuple[str, int | str]]:
+def _tasks_of(robot: Robot) -> dict[str, tuple[str, float | str]]:
     """Return the variable and the value by which `robot` does each task; empty if the robot has any other variable."""
     first = f"{robot.name}."
     if [one.name for one in robot.variables] == [first + _ONLY]:

@@ -172,7 +172,7 @@ _Pattern = tuple[int | tuple[int], ...]
 
 def _price(definition: Predicate | Function, cost: float, places: int) -> Callable[[Sequence[int]], Amount]:
     if isinstance(definition, Function):
-        return lambda values: _amount(definition.cost(values), 0)
+        return lambda values: _amount(definition.cost(values), definition.places)
     broken = _amount(cost, places)
     return lambda values: 0 if definition.holds(values) else broken
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import NamedTuple
 
 from robochoc.model.expression.operators import ALIASES, OPERATORS, Operator
-from robochoc.model.expression.tree import SYMBOLIC, Apply, Constant, Expression, Name, Type, text
+from robochoc.model.expression.tree import DECIMAL, SYMBOLIC, Apply, Constant, Expression, Name, Type, text
 from robochoc.system.errors import RobochocError
 from robochoc.system.lazy_dataclass import dataclass
 
@@ -41,7 +41,9 @@ class SymbolNames:
     code: Callable[[str], int]
 
 
-def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames | None = None) -> Expression:
+def parse(
+    text: str, names: Collection[str], wanted: Type, symbols: SymbolNames | None = None, *, decimals: bool = False
+) -> Expression:
     """Parse a functional expression over `names`.
 
     This is the functional form of XCSP 2.1 with the extensions in Figure 2: an argument list in additional parentheses,
@@ -53,6 +55,7 @@ def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames 
         wanted: The type of the expression's value.
         symbols: The `names` that are symbols, if any; then other words, and words in quotes (`'red'`), are names
             of symbols. Only eq, ne and in compare symbols.
+        decimals: True if decimals (`2.5`) are allowed. They become `DECIMAL` operators.
 
     Raises:
         ExpressionError: if the text is not a valid expression. It contains the position and a suggestion to the user.
@@ -61,7 +64,7 @@ def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames 
         raise ExpressionError(
             f"the expression has {len(text)} characters", MAX_TEXT, f"use at most {MAX_TEXT}: split the predicate"
         )
-    return _Parser(text, names, symbols).expression(wanted)
+    return _Parser(text, names, symbols, decimals=decimals).expression(wanted)
 
 
 class _Token(NamedTuple):
@@ -108,17 +111,22 @@ _SIGNS = {
 }
 """The operators that other languages write with these signs."""
 _SIGN = re.compile("|".join(re.escape(sign) for sign in sorted(_SIGNS, key=len, reverse=True)))
-_TOKEN = re.compile(r"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|[0-9]+|\*(?!\*)|-(?!>)|[+(),]|'[^'\s]+')|(\S))")
+_TOKEN, _REAL_TOKEN = (
+    re.compile(rf"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|{number}|\*(?!\*)|-(?!>)|[+(),]|'[^'\s]+')|(\S))")
+    for number in ("[0-9]+", r"[0-9]+(?:\.[0-9]+)?")
+)
 _INFIX = {operator.infix: name for name, operator in OPERATORS.items() if operator.infix and name != "dist"}
 
 
 class _Parser:
     """Recursive descent: sum = product {+- product}; product = atom {* atom}; atom = integer, name, call or (sum)."""
 
-    def __init__(self, text: str, names: Collection[str], symbols: SymbolNames | None = None) -> None:
+    def __init__(
+        self, text: str, names: Collection[str], symbols: SymbolNames | None = None, *, decimals: bool = False
+    ) -> None:
         self._names = names
         self._symbols = symbols
-        self._tokens = _tokens(text)
+        self._tokens = _tokens(text, _REAL_TOKEN if decimals else _TOKEN)
         self._closing = _parentheses(self._tokens)
         self._next = 0
         self._nodes = 0
@@ -165,8 +173,8 @@ class _Parser:
             return self._parenthesised(level)._replace(infix="", operands=(), position=token.position)
         if token.text == "-":
             return self._negative(token)
-        if token.text.isdecimal():
-            return self._integer(token, 1)
+        if _is_number(token.text):
+            return self._number(token, 1)
         if token.text in {"", ")", ",", "+", "*"}:
             what = f"'{token.text}'" if token.text else "the end"
             raise ExpressionError(f"expected a term, found {what}", token.position, "add an integer, a name or a call")
@@ -214,17 +222,21 @@ class _Parser:
         return parsed
 
     def _negative(self, sign: _Token) -> _Parsed:
-        if not self._peek().text.isdecimal():
+        if not _is_number(self._peek().text):
             raise ExpressionError("'-' must be followed by an integer", sign.position, "write neg(...)")
-        return self._integer(self._advance(), -1)._replace(position=sign.position)
+        return self._number(self._advance(), -1)._replace(position=sign.position)
 
-    def _integer(self, token: _Token, sign: int) -> _Parsed:
-        if len(token.text) > MAX_DIGITS:
+    def _number(self, token: _Token, sign: int) -> _Parsed:
+        whole, _, decimals = token.text.partition(".")
+        if len(whole + decimals) > MAX_DIGITS:
             raise ExpressionError(
                 f"an integer has {len(token.text)} digits", token.position, f"use at most {MAX_DIGITS} digits"
             )
         self._count(token.position)
-        return _Parsed(Constant(sign * int(token.text)), Type.INTEGER, token.position)
+        number: Expression = Constant(sign * int(whole + decimals))
+        if decimals:
+            number = Apply(DECIMAL, (number, Constant(len(decimals))))
+        return _Parsed(number, Type.INTEGER, token.position)
 
     def _call(self, name: _Token, level: int) -> _Parsed:
         resolved = ALIASES.get(name.text, name.text)
@@ -308,10 +320,14 @@ class _Parser:
         return token
 
 
-def _tokens(text: str) -> list[_Token]:
+def _is_number(token: str) -> bool:
+    return token[:1].isdecimal()
+
+
+def _tokens(text: str, pattern: re.Pattern[str]) -> list[_Token]:
     """Return the tokens of `text`; the last one is empty and marks the end."""
     tokens = []
-    for match in _TOKEN.finditer(text):
+    for match in pattern.finditer(text):
         if match[2]:
             position = match.start(2)
             sign = _SIGN.match(text, position)

@@ -57,6 +57,12 @@ class ExcessiveValueError(UndefinedValueError):
 PARTIAL = frozenset({"div", "mod", "pow"})
 """The operators that are undefined for some integers within the bounds."""
 
+DECIMAL = "decimal"
+"""The operator of a decimal in an expression over real numbers: its digits, and its number of decimal places.
+
+`model/expression/fixed_point.py` replaces decimals by integers. No other operator contains them.
+"""
+
 SYMBOLIC = ("eq", "ne", "in")
 """The operators that compare symbols."""
 
@@ -82,6 +88,9 @@ def text(expression: Expression, symbolic: Collection[str] = (), symbols: Sequen
             return str(value)
         case Name(name):
             return name
+        case Apply(operator, (Constant(value), Constant(places))) if operator == DECIMAL:
+            digits = str(abs(value)).rjust(places + 1, "0")
+            return f"{'-' * (value < 0)}{digits[:-places]}.{digits[-places:]}"
         case Apply(operator, arguments):
             named = bool(symbolic) and operator in SYMBOLIC and any(_is_in(one, symbolic) for one in arguments)
             written = [

@@ -28,7 +28,7 @@ from robochoc.formats.result import ResultError, read_result, result_json
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.model.symbols import symbol_table, symbolic_variables
+from robochoc.model.symbols import real_places, symbol_table, symbolic_variables
 from robochoc.run.choice import choose_for_private_team
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.setting_rules import refuse_settings
@@ -314,6 +314,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience
         seed=plan.seed,
         symbols=symbol_table(team.robots),
         symbolic=symbolic_variables(team),
+        real_places=real_places(team),
         chosen=dict(options.chosen),
     )
     outcome = _led(master, claimed(solve_distributed(machines, protocol, header)))
