@@ -18,8 +18,9 @@ import robochoc
 
 PROBLEMS = 100
 PROTOCOLS = (
-    *("dsa", "a-dsa", "mixed-dsa", "dsa-sdp", "mgm", "mgm2", "gdba", "lamdls", "regret-matching", "d-gibbs", "duct"),
-    *("cocoa", "maxsum", "async-maxsum", "maxsum-ad", "bounded-maxsum", "acls", "gca-mgm", "mcs-mgm"),
+    *("dsa", "a-dsa", "mixed-dsa", "dsa-sdp", "mgm", "mgm2", "gdba", "dgls", "lamdls", "lamdls-2", "regret-matching"),
+    *("d-gibbs", "duct", "cocoa", "maxsum", "async-maxsum", "maxsum-ad", "bounded-maxsum", "adpop", "acls"),
+    *("gca-mgm", "mcs-mgm"),
 )
 
 

@@ -20,7 +20,7 @@ The paper's three choices, 24 variants in all:
     effective cost: additive (A), multiplicative (M)                `modifier`, `_effective`
     violated: non-zero, non-minimum, maximum cost (NZ, NM, MX)      `violation`, `_violated`
     scope of a raise: entry, row, column, table (E, R, C, T)        `scope`, `_key`
-    send value, send improvement, raise or move                     `exchange_values`, `_send_improve`, `_move`
+    send value, send improvement, raise or move                     `exchange_values`, `send_improve`, `_move`
 
 With A and R, or A and T, all values of a robot are raised equally, so no decision changes: these variants are exactly
 MGM. E and C leave minima fastest, but never settle; their last cycle may be far from the best one.
@@ -45,6 +45,7 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, Literal
 
@@ -94,8 +95,56 @@ MOST = 1 << 62
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class GDBA(Gainers):
-    """One agent of GDBA. A cycle has two phases: all robots send their values, then their reductions.
+class Breakout(Gainers):
+    """The common base of GDBA and DGLS. A cycle has two phases: all robots send their values, then their reductions."""
+
+    improve: ClassVar[type[Improve]] = Improve
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.charged: list[Charged] = []
+
+    @abstractmethod
+    def effective_costs(self) -> list[LexicographicCost]:
+        """Return the effective cost of each of this robot's values; `charged` are its costs in each constraint."""
+
+    def start_cycle(self, view: Mapping[str, wire.Value], messages: Mapping[str, wire.Message]) -> None:
+        """Process the neighbours' messages with their values; `view` are these values."""
+
+    @abstractmethod
+    def penalise(self) -> None:
+        """Penalise the violated constraints, in a quasi-local minimum."""
+
+    def start_cycles(self) -> None:
+        """Choose a random value."""
+        self.choose(self.any_value())
+        self.exchange_values(self.send_improve)
+
+    def send_improve(self, messages: Mapping[str, wire.Message]) -> None:
+        """Send the reduction by this robot's best move, once all neighbours' values are known."""
+        view = self.checked_values(messages)
+        self.start_cycle(view, messages)
+        self.charged = self.problem.charged(view)
+        self.find_best_move(self.effective_costs())
+        broken, cost = self.gain
+        self.gain = broken, max(-MOST, min(MOST, cost))
+        self.multicast(self.problem.neighbours, self.improve(*self.gain))
+        self.listen(self.problem.neighbours, self._move)
+
+    def _move(self, messages: Mapping[str, wire.Message]) -> None:
+        """Move if this robot's reduction is the largest; penalise constraints in a quasi-local minimum."""
+        complete = len(messages) == len(self.problem.neighbours)
+        others = [(message.broken, message.cost) for message in messages.values() if isinstance(message, Improve)]
+        if complete and max(self.gain, *others) <= NO_GAIN:
+            self.penalise()
+        self.choose(self.target if complete and self.wins(messages) else self.present)
+        if not self.finished:
+            self.exchange_values(self.send_improve)
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class GDBA(Breakout):
+    """One agent of GDBA.
 
     `raised` are the modifiers: for each constraint, by its number, the number of raises of its entries.
     """
@@ -117,44 +166,19 @@ class GDBA(Gainers):
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.raised: dict[int, dict[Key, Raised]] = {}
-        self._charged: list[Charged] = []
         self._ranges: dict[int, tuple[Cost, Cost]] = {}
 
-    def start_cycles(self) -> None:
-        """Choose a random value."""
-        self.choose(self.any_value())
-        self.exchange_values(self._send_improve)
-
-    def _send_improve(self, messages: Mapping[str, wire.Message]) -> None:
-        """Send the reduction by this robot's best move, once all neighbours' values are known."""
-        self._charged = self.problem.charged(self.checked_values(messages))
-        self.find_best_move(self._effective_costs())
-        broken, cost = self.gain
-        self.gain = broken, max(-MOST, min(MOST, cost))
-        self.multicast(self.problem.neighbours, Improve(*self.gain))
-        self.listen(self.problem.neighbours, self._move)
-
-    def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if this robot's reduction is the largest; raise modifiers in a quasi-local minimum."""
-        complete = len(messages) == len(self.problem.neighbours)
-        others = [(message.broken, message.cost) for message in messages.values() if isinstance(message, Improve)]
-        if complete and max(self.gain, *others) <= NO_GAIN:
-            self._raise_modifiers()
-        self.choose(self.target if complete and self.wins(messages) else self.present)
-        if not self.finished:
-            self.exchange_values(self._send_improve)
-
-    def _effective_costs(self) -> list[LexicographicCost]:
+    def effective_costs(self) -> list[LexicographicCost]:
         """Return the effective cost of each of this robot's values."""
-        alone = [_pair(cost) for cost in self.problem.charges]
-        rows = [alone, *(self._effective(one) for one in self._charged)]
+        alone = [pair(cost) for cost in self.problem.charges]
+        rows = [alone, *(self._effective(one) for one in self.charged)]
         return [(sum(broken for broken, _ in row), sum(cost for _, cost in row)) for row in zip(*rows, strict=True)]
 
     def _effective(self, charged: Charged) -> Sequence[LexicographicCost]:
         """Return the effective cost of each of this robot's values in one constraint."""
         raised = self.raised.get(charged.number)
         if raised is None:
-            return [_pair(cost) for cost in charged.costs]
+            return [pair(cost) for cost in charged.costs]
         weighed = self._added if self.settings.modifier == "A" else self._multiplied
         return [
             weighed(cost, raised.get(self._key(code, charged.others), (0, 0)))
@@ -163,18 +187,18 @@ class GDBA(Gainers):
 
     @staticmethod
     def _added(cost: Cost, raised: Raised) -> LexicographicCost:
-        broken, paid = _pair(cost)
+        broken, paid = pair(cost)
         return broken + raised[0], paid + raised[1]
 
     @staticmethod
     def _multiplied(cost: Cost, raised: Raised) -> LexicographicCost:
-        broken, paid = _pair(cost)
+        broken, paid = pair(cost)
         times = 1 + raised[0] + raised[1]
         return broken * times, paid * times
 
-    def _raise_modifiers(self) -> None:
+    def penalise(self) -> None:
         """Raise the modifiers of the violated constraints (increase-mod)."""
-        for number, others, codes, costs in self._charged:
+        for number, others, codes, costs in self.charged:
             cost = costs[self.present]
             if self._violated(number, cost):
                 raised = self.raised.setdefault(number, {})
@@ -197,5 +221,6 @@ class GDBA(Gainers):
         return code if scope in "EC" else None, others if scope in "ER" else None
 
 
-def _pair(cost: Cost) -> LexicographicCost:
+def pair(cost: Cost) -> LexicographicCost:
+    """Return a cost as a number of broken hard constraints and a finite cost."""
     return (1, 0) if cost == INFINITE else (0, cost)
