@@ -121,6 +121,7 @@ class Game:
         self.rounds = TeamRounds(team)
         self._ledger = Ledger([*self.rounds.problems])
         self._heard: dict[str, list[Delivery]] = {name: [] for name in self.rounds.problems}
+        self._kinds: dict[str, str] = {}
 
     def play(self) -> GameReport:
         """Play all rounds, and return the report."""
@@ -136,16 +137,23 @@ class Game:
         """
         with self._seated() as players:
             self._report_start()  # not before: a refused game does not overwrite a journal
+            self._kinds = {name: one.kind for one in players for name in one.robots}
             for number in range(1, self._options.rounds + 1):
                 seen = {name: Seen(number, self.rounds.view(name), self._heard[name]) for name in self.rounds.problems}
                 yield seen
                 self._play_round(seen, players)
             for one in players:
                 one.end(self.rounds)
-            kinds = {name: one.kind for one in players for name in one.robots}
-        outside = tuple(self._options.commands)
-        coalitions = [*self._options.coalitions, *([outside] if len(outside) > 1 else [])]
-        self.report = report_of(self._team, self.rounds, self._ledger, kinds, self._optimum, coalitions)
+        self.report = self.report_so_far()
+
+    def report_so_far(self) -> GameReport:
+        """Return the report of the rounds that have been played."""
+        options = self._options
+        outside = tuple(options.commands)
+        coalitions = [*options.coalitions, *([outside] if len(outside) > 1 else [])]
+        return report_of(
+            self._team, self.rounds, self._ledger, self._kinds, self._optimum, coalitions, planned=options.rounds
+        )
 
     def outcome(self) -> Outcome:
         """Return the result of the game, for the journal."""

@@ -5,11 +5,12 @@ The package `mcp` is an extra and is imported when a server is made. robochoc ca
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
 from threading import Lock
 from types import NoneType
-from typing import TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING, Any, cast
 
 import msgspec
 
@@ -31,6 +32,34 @@ _ARGUMENTS: dict[str, dict[str, tuple[type, ...]]] = {
 }
 """The arguments of the tools, with their types. The package `mcp` would convert other types: true to 1."""
 _OPTIONAL = {"announce", "tokens"}
+MOST_BYTES = 1 << 20
+"""The maximum number of bytes in a line of a client."""
+
+
+class ClientLines:
+    """The lines that a client sends over standard input.
+
+    Attributes:
+        error: The reason why no more lines are read, as a clause; empty if the client has closed its end.
+    """
+
+    def __init__(self) -> None:
+        self.error = ""
+
+    def readline(self) -> str:
+        """Return the next line, or an empty text at the end."""
+        if sys.stdin is None:
+            self.error = "standard input is closed"
+            return ""
+        try:
+            line = sys.stdin.buffer.readline(MOST_BYTES + 1)
+        except OSError as error:
+            self.error = f"standard input cannot be read: {error.strerror}"
+            return ""
+        if len(line) > MOST_BYTES:
+            self.error = f"it sent a line with more than {MOST_BYTES:,} bytes"
+            return ""
+        return line.decode(errors="replace")
 
 
 class SeatTools:
@@ -156,22 +185,36 @@ class SeatTools:
 
 
 def seat_server(
-    game: SeatGame, limits: Limits, described: Callable[[GameReport], Iterable[str]], version: str = ""
+    game: SeatGame,
+    limits: Limits,
+    described: Callable[[GameReport], Iterable[str]],
+    version: str = "",
+    lines: ClientLines | None = None,
 ) -> MCPServer:
     """Return an MCP server with the tools of a seat; for the arguments see `SeatTools`. `version` is robochoc's.
+
+    `lines` are the lines of the client; None: the package reads standard input.
 
     Raises:
         UnsupportedError: if the package `mcp` is not installed.
     """
     try:
+        from anyio import wrap_file  # noqa: PLC0415 - comes with mcp
         from mcp.server.mcpserver import MCPServer  # noqa: PLC0415 - an extra
         from mcp.server.mcpserver.exceptions import ToolError  # noqa: PLC0415
+        from mcp.server.stdio import stdio_server  # noqa: PLC0415
     except ImportError:
         raise UnsupportedError("a seat for MCP clients requires mcp: run pip install 'robochoc[mcp]'") from None
     tools = SeatTools(game, limits, described)
 
     class SeatServer(MCPServer):
-        """A server that checks arguments before the package converts them."""
+        """A server that reads `lines`, and checks arguments before the package converts them."""
+
+        async def run_stdio_async(self) -> None:
+            stdin = wrap_file(cast("IO[str]", lines)) if lines else None
+            async with stdio_server(stdin=stdin) as (received, sent):
+                server = self._lowlevel_server
+                await server.run(received, sent, server.create_initialization_options())
 
         async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> Any:  # noqa: ANN401 - as in the base class
             try:

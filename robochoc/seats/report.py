@@ -161,7 +161,8 @@ class GameReport:
 
     Attributes:
         team: The name of the team.
-        rounds: The number of rounds.
+        rounds: The number of rounds that were played.
+        planned_rounds: The number of rounds of the whole game. If it is larger than `rounds`, the report is partial.
         feasible: True if the final values violate no hard constraint.
         violations: The number of violated hard constraints.
         cost: The cost of the final values; None if they violate a hard constraint.
@@ -186,6 +187,7 @@ class GameReport:
     assignment: Mapping[str, float | str]
     seats: tuple[SeatReport, ...] = field(default=())
     coalitions: tuple[CoalitionReport, ...] = ()
+    planned_rounds: int = 0
 
     def __getitem__(self, robot: str) -> SeatReport:
         return next(one for one in self.seats if one.robot == robot)
@@ -198,8 +200,9 @@ def report_of(
     kinds: Mapping[str, str],
     optimum: Optimum | None,
     coalitions: Sequence[tuple[str, ...]],
+    planned: int,
 ) -> GameReport:
-    """Return the report of a finished game.
+    """Return the report of the rounds that have been played.
 
     Args:
         team: The team as its user wrote it.
@@ -208,6 +211,7 @@ def report_of(
         kinds: The kind of the player of each robot.
         optimum: The certified optimum, if it was computed.
         coalitions: The groups whose joint regret is reported.
+        planned: The number of rounds of the whole game.
     """
     cost, violations = rounds.user_cost, rounds.team_cost[0]
     final = rounds.assignment()
@@ -257,6 +261,7 @@ def report_of(
         assignment=labelled(final),
         seats=tuple(seat(name) for name in rounds.problems),
         coalitions=tuple(_coalition(group, regrets) for group in coalitions),
+        planned_rounds=planned,
     )
 
 

@@ -81,6 +81,10 @@ class SeatGame:
         """The report; None before the end of the game."""
         return self._game.report
 
+    def report_so_far(self) -> GameReport | None:
+        """Return the report of the rounds that have been played; None if there are none."""
+        return self._game.report_so_far() if self.round > 1 or self.report else None
+
     @property
     def round(self) -> int:
         """The number of the present round, from 1; after the game, the number of rounds."""

@@ -7,6 +7,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from typing import IO
 
 import pytest
 
@@ -61,11 +62,46 @@ def test_json_and_journal(team: Path, tmp_path: Path) -> None:
     assert robochoc_within("privacy", path).returncode == 0
 
 
+SERVE = (sys.executable, "-m", "robochoc", "play", "--mcp", "r1", "--others", "greedy", "--rounds", "2")
+
+
+def served(team: Path, stdin: int | IO[bytes]) -> subprocess.CompletedProcess[str]:
+    """A game for an MCP client that sends `stdin`."""
+    return subprocess.run([*SERVE, str(team)], stdin=stdin, capture_output=True, text=True, check=False, cwd=ROOT)
+
+
 def test_a_client_that_leaves_before_the_end(team: Path) -> None:
-    words = [sys.executable, "-m", "robochoc", "play", str(team), "--mcp", "r1", "--others", "greedy", "--rounds", "2"]
-    done = subprocess.run(words, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, cwd=ROOT)
+    done = served(team, subprocess.DEVNULL)
     assert (done.returncode, done.stdout) == (4, "")
     assert done.stderr == "the MCP client left in round 1 of 2, so there is no report\n"
+    about = {"protocolVersion": "2025-06-18", "capabilities": {}, "clientInfo": {"name": "client", "version": "1"}}
+    said: list[dict[str, object]] = [
+        {"id": 1, "method": "initialize", "params": about},
+        {"method": "notifications/initialized"},
+        {"id": 2, "method": "tools/call", "params": {"name": "end_turn", "arguments": {}}},
+    ]
+    pipe = subprocess.PIPE
+    with subprocess.Popen([*SERVE, str(team)], stdin=pipe, stdout=pipe, stderr=pipe, text=True, cwd=ROOT) as game:
+        assert game.stdin
+        assert game.stdout
+        for one in said:
+            print(json.dumps({"jsonrpc": "2.0", **one}), file=game.stdin, flush=True)
+        while json.loads(game.stdout.readline()).get("id") != 2:
+            pass
+        _, errors = game.communicate()
+    first, *_, last = errors.splitlines()
+    assert game.returncode == 4
+    assert first.startswith("lamps: 1 of 2 rounds (a partial report), ")
+    assert last == "the MCP client left in round 2 of 2, so the report is partial"
+
+
+def test_a_client_whose_input_cannot_be_read(team: Path, tmp_path: Path) -> None:
+    with (tmp_path / "written").open("wb") as unreadable:
+        done = served(team, unreadable)
+    left = "the MCP client left in round 1 of 2, so there is no report"
+    assert (done.returncode, done.stderr) == (4, f"{left}: standard input cannot be read: Bad file descriptor\n")
+    with Path("/dev/zero").open("rb") as endless:
+        assert served(team, endless).stderr == f"{left}: it sent a line with more than 1,048,576 bytes\n"
 
 
 def test_a_robot_without_a_possible_value(tmp_path: Path) -> None:

@@ -138,23 +138,28 @@ def play(  # noqa: PLR0913 - options, by name
 def _serve(team: Team, robot: str, options: GameOptions, recorder: JournalRecorder | None) -> None:
     """Let an MCP client play `robot`, until it closes the connection. The report also goes to standard error.
 
+    If the client leaves early, the report is about the rounds that were played.
+
     Raises:
         Failure: if the client leaves before the end of the game.
     """
     from robochoc import __version__
     from robochoc.cli.reports.play import game_lines
-    from robochoc.seats.mcp_server import seat_server
+    from robochoc.seats.mcp_server import ClientLines, seat_server
     from robochoc.seats.seat_game import SeatGame
 
-    game = SeatGame(team, robot, options, recorder)
+    game, lines = SeatGame(team, robot, options, recorder), ClientLines()
     try:
-        seat_server(game, options.limits, game_lines, __version__).run()
+        seat_server(game, options.limits, game_lines, __version__, lines).run()
     finally:
         game.close()
-    if game.report is None:
-        raise Failure(LOST, f"the MCP client left in round {game.round} of {game.rounds}, so there is no report")
-    for line in game_lines(game.report):
+    report = game.report_so_far()
+    for line in game_lines(report) if report else ():
         click.echo(line, err=True)
+    if game.report is None:
+        why = f": {lines.error}" if lines.error else ""
+        result = "so the report is partial" if report else "so there is no report"
+        raise Failure(LOST, f"the MCP client left in round {game.round} of {game.rounds}, {result}{why}")
 
 
 def _print(report: GameReport, *, as_json: bool) -> None:

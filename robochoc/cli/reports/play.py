@@ -21,7 +21,10 @@ def print_game(report: GameReport) -> None:
 
 def game_lines(report: GameReport) -> Iterator[str]:
     """Yield the result of the game, a table of the robots, and who lied or broke which rule."""
-    yield on_one_line(f"{report.team}: {counted(report.rounds, 'round')}, {_result(report)}")
+    played = counted(report.rounds, "round")
+    if report.rounds < report.planned_rounds:
+        played = f"{report.rounds} of {counted(report.planned_rounds, 'round')} (a partial report)"
+    yield on_one_line(f"{report.team}: {played}, {_result(report)}")
     titles = ["robot", "player", "value", "regret", "messages", "texts", "tokens", "disclosed"]
     rows = [_row(one) for one in report.seats]
     for line in table_lines(titles, rows, right=titles[3:]):
