@@ -13,11 +13,10 @@ from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.settings import read_settings
 from robochoc.run.incumbent import best_known
 from robochoc.solver.compiled_team import CompiledTeam
-from tests.protocols.test_gdba import pair, weighted_colouring
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
-from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.cost_problems import pair, random_cost_team, random_hard_team, weighted_colouring
 from tests.support.examples import count, drawn
 from tests.support.local_search_runs import any_schedule, domains_of, played
 from tests.support.problems import team_of

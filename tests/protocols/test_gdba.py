@@ -7,7 +7,7 @@ from random import Random
 
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, Relation, Semantics, Team
 from robochoc.protocols.local_search.gdba import GDBA, MOST, Improve
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.settings import read_settings
@@ -17,17 +17,11 @@ from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.agents import replies, robot_of, started, value
 from tests.support.brute_force import least_cost
 from tests.support.cases import looped
-from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.cost_problems import pair, random_cost_team, random_hard_team, weighted_colouring
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, domains_of, played
-from tests.support.problems import team_of
 
 VARIANTS = [*itertools.product("AM", ("NZ", "NM", "MX"), "ERCT")]
-TABLE = Relation("T", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (2, 5, 3, 4))
-
-
-def pair(relation: Relation = TABLE) -> Team:
-    return team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", relation, ("A", "B"), ("A", "B"))])
 
 
 def robot(team: Team, **settings: str) -> GDBA:
@@ -148,22 +142,6 @@ def test_every_variant_comes_close_to_the_least_cost(teams: int) -> None:
             runs += 1
             optimal += found.cost == least
     assert optimal > runs // 2
-
-
-def weighted_colouring(chance: Random, robots: int, degree: float, colours: int) -> Team:
-    """A random graph; two neighbours of one colour cost 1 to 10."""
-    names = [f"X{number:02}" for number in range(robots)]
-    pairs = chance.sample([*itertools.combinations(names, 2)], round(robots * degree / 2))
-    constraints = [
-        Constraint(
-            "C",
-            Relation("R", 2, Semantics.SOFT, tuple((c, c) for c in range(colours)), (chance.randint(1, 10),) * colours),
-            one,
-            one,
-        )
-        for one in pairs
-    ]
-    return team_of(dict.fromkeys(names, range(colours)), constraints)
 
 
 @count("teams", 2, 20)

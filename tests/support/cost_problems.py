@@ -149,3 +149,27 @@ def random_tree(chance: Random) -> Team:
         relation = Relation("R", 2, Semantics.SOFT, tuple(rows), costs)
         constraints.append(Constraint("C", relation, pair, pair))
     return team_of(domains, constraints)
+
+
+PAIR_COSTS = Relation("T", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (2, 5, 3, 4))
+
+
+def pair(relation: Relation = PAIR_COSTS) -> Team:
+    """Two robots A and B, each with the values 1 and 2, and a constraint between them."""
+    return team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", relation, ("A", "B"), ("A", "B"))])
+
+
+def weighted_colouring(chance: Random, robots: int, degree: float, colours: int) -> Team:
+    """A random graph; two neighbours of one colour cost 1 to 10."""
+    names = [f"X{number:02}" for number in range(robots)]
+    pairs = chance.sample([*itertools.combinations(names, 2)], round(robots * degree / 2))
+    constraints = [
+        Constraint(
+            "C",
+            Relation("R", 2, Semantics.SOFT, tuple((c, c) for c in range(colours)), (chance.randint(1, 10),) * colours),
+            one,
+            one,
+        )
+        for one in pairs
+    ]
+    return team_of(dict.fromkeys(names, range(colours)), constraints)
