@@ -14,6 +14,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from robochoc.run.registry import GROUP, UnknownProtocolError, installed_protocol, protocol_names
+from robochoc.system.installed import all_entry_points
 
 _PATH = "PYTHONPATH"
 _PLACE = re.compile(r"[\w.]+:[\w.]+")
@@ -23,11 +24,14 @@ _PLACE = re.compile(r"[\w.]+:[\w.]+")
 def named_protocols(words: Sequence[str]) -> Iterator[list[str]]:
     """Provide the names of protocols, each given as a name or as MODULE:CLASS.
 
-    The name of a class is its name in lower case, with hyphens. Modules are also searched in the current folder.
+    The name of an installed class is the one under which it is installed, and that of any other class its name in
+    lower case, with hyphens. Modules are also searched in the current folder.
 
     Raises:
         UnknownProtocolError: if a word is not valid, a class cannot be used, or its name is that of another protocol.
     """
+    installed = {entry.value: entry.name for entry, _ in all_entry_points(GROUP)}
+    words = [installed.get(word, word) for word in words]
     places = _places([word for word in words if ":" in word])
     names = [_name(word) if ":" in word else word for word in words]
     if not places:
@@ -60,10 +64,17 @@ def _places(words: Sequence[str]) -> dict[str, str]:
         if not _PLACE.fullmatch(word):
             raise UnknownProtocolError(f"{word!r} is not of the form MODULE:CLASS")
         name = _name(word)
-        if name in protocol_names() or places.get(name, word) != word:
-            raise UnknownProtocolError(f"{word}: another protocol is called {name!r}: rename the class")
+        other = _place_of(name) if name in protocol_names() else places.get(name, word)
+        if other != word:
+            raise UnknownProtocolError(f"{word} would be called {name!r}, as {other} already is: rename the class")
         places[name] = word
     return places
+
+
+def _place_of(name: str) -> str:
+    """Return the place of an installed protocol, and its package."""
+    offer = installed_protocol(name)
+    return f"{offer.place} ({offer.package})"
 
 
 def _declare(metadata: Path, name: str, place: str) -> None:

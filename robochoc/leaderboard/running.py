@@ -16,6 +16,7 @@ from robochoc.journal.reader import read_journal
 from robochoc.leaderboard.instances import SET_VERSION, Instance
 from robochoc.leaderboard.results import FORMAT, Budget, Entrant, LeaderboardResults, RunResult
 from robochoc.privacy import Measure, PrivacyError, privacy_of
+from robochoc.run.distributed import COUNTED_LIMIT
 from robochoc.run.options import ScheduleName
 from robochoc.run.registry import installed_protocol, installed_spelling, protocol_named
 
@@ -121,6 +122,11 @@ def _privacy(journal: bytes) -> float | None:
         if known and len(known) == len(losses):
             return round(sum(known) / len(known), _DIGITS)
     return None
+
+
+def met_time_limit(run: RunResult) -> bool:
+    """Return whether the time limit ended a run, whose results then depend on the machine."""
+    return run.status == Status.LIMIT and not (run.reason or "").startswith(COUNTED_LIMIT)
 
 
 def comparable(run: RunResult) -> RunResult:

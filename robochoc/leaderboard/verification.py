@@ -6,12 +6,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from itertools import groupby
 
+import msgspec
+
 from robochoc.leaderboard.certificates import Certificate, published
 from robochoc.leaderboard.claims import claims_proof, wrong_claims
 from robochoc.leaderboard.export import checked_team
 from robochoc.leaderboard.instances import instance_named
 from robochoc.leaderboard.results import Entrant, LeaderboardResults, RunResult
-from robochoc.leaderboard.running import comparable, entrants, run_leaderboard
+from robochoc.leaderboard.running import comparable, entrants, met_time_limit, run_leaderboard
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
@@ -20,6 +22,8 @@ from robochoc.run.registry import UnknownProtocolError, protocol_named
 from robochoc.system.plain_text import counted
 from robochoc.verification.checker import RefutedError, check_user_cost, violations
 
+REPETITION_S = 60.0
+"""The default time limit of a repeated run, in seconds: results of other people may state any limit."""
 _ANSWERS = {Verdict.SOLUTION, Verdict.OPTIMAL}
 
 
@@ -79,11 +83,15 @@ class Repetition:
         results: The results.
         number: The number of repeated runs, at equal distances. None: all. Proofs that an incomplete protocol claims
             are also repeated, since its traits do not decide whether it can prove them.
+        limit_s: The maximum number of seconds of each repeated run, whatever limit the results state.
     """
 
-    def __init__(self, results: LeaderboardResults, number: int | None) -> None:
+    def __init__(self, results: LeaderboardResults, number: int | None, limit_s: float = REPETITION_S) -> None:
         self._results = results
+        time_s = min(results.budget.time_s, limit_s)
+        self._budget = msgspec.structs.replace(results.budget, time_s=time_s)
         self.remarks: list[str] = []
+        self.unfinished = 0
         self.faults: list[str] = []
         names = {one.name for one in results.entrants if self._can_be_repeated(one)}
         here = [run for run in results.runs if run.protocol in names]
@@ -109,17 +117,24 @@ class Repetition:
         return True
 
     def changed_runs(self, jobs: int = 1) -> Iterator[str]:
-        """Repeat the runs, and yield a sentence for each one with another result."""
+        """Repeat the runs, and yield a sentence for each one with another result.
+
+        A repeated run that meets the time limit is not compared, but noted in the remarks.
+        """
         yield from self.faults
         by_instance: dict[str, list[RunResult]] = {}
         for run in self.runs:
             by_instance.setdefault(run.instance, []).append(run)
         for name, own in by_instance.items():
             named = entrants([run.protocol for run in own])
-            budget, seed = self._results.budget, self._results.seed
-            repeated = run_leaderboard(named, [instance_named(name)], budget, seed=seed, jobs=jobs)
+            seed = self._results.seed
+            repeated = run_leaderboard(named, [instance_named(name)], self._budget, seed=seed, jobs=jobs)
             for before, now in zip(own, repeated.runs, strict=True):
-                if fields := _differences(comparable(before), comparable(now)):
+                if met_time_limit(now):
+                    self.unfinished += 1
+                    limit = f"{self._budget.time_s:g} s: increase --timeout"
+                    self.remarks.append(f"{before.protocol} on {name} not compared: it met the time limit of {limit}")
+                elif fields := _differences(comparable(before), comparable(now)):
                     yield f"{before.protocol} on {name}: another {', '.join(fields)}"
 
 

@@ -25,6 +25,8 @@ from robochoc.solver.compile import TeamCompileTimeoutError
 from robochoc.solver.errors import UnsupportedError
 from robochoc.system.stopping import stop_requested
 
+COUNTED_LIMIT = "the limit of"
+"""The first words of the reason for a run that ended at a limit of messages, checks or cycles."""
 GAVE_UP = "gave up, as its protocol has it"
 STOPPED = "somebody has asked to stop"
 NOTHING_SPENT = Metrics()
@@ -189,11 +191,11 @@ class Deployment(ABC):
             return STOPPED
         if self.left_s() != 0:
             if options.messages is not None and sum(spent.messages.values()) >= options.messages:
-                return f"the limit of messages was reached (--messages {options.messages})"
+                return f"{COUNTED_LIMIT} messages was reached (--messages {options.messages})"
             if options.ncccs is not None and spent.ncccs >= options.ncccs:
-                return f"the limit of non-concurrent constraint checks was reached (--ncccs {options.ncccs})"
+                return f"{COUNTED_LIMIT} non-concurrent constraint checks was reached (--ncccs {options.ncccs})"
             if options.cycles is not None and spent.cycles >= options.cycles:
-                return f"the limit of cycles was reached (--cycles {options.cycles})"
+                return f"{COUNTED_LIMIT} cycles was reached (--cycles {options.cycles})"
         if options.deadline is not None:
             improve = "" if options.improve is None else f", --improve {options.improve:g}"
             by = f"by the deadline (--deadline {options.deadline:g}{improve})"

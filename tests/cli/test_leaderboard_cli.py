@@ -95,8 +95,8 @@ def test_a_protocol_of_a_module_enters(tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_names_without_modules_need_no_package() -> None:
-    with named_protocols(["dpop"]) as names:
-        assert names == ["dpop"]
+    with named_protocols(["dpop", "robochoc.protocols.local_search.mgm:MGM"]) as names:
+        assert names == ["dpop", "mgm"]
 
 
 def test_wrong_usage() -> None:
@@ -107,8 +107,14 @@ def test_wrong_usage() -> None:
                 ["run", "nope:Nope"],
                 "nope:Nope cannot be imported: ModuleNotFoundError: No module named 'nope'",
             ),
-            (["run", "fake:MGM"], "fake:MGM: another protocol is called 'mgm': rename the class"),
-            (["run", "one:Mine", "other:Mine"], "other:Mine: another protocol is called 'mine': rename the class"),
+            (
+                ["run", "fake:MGM"],
+                "fake:MGM would be called 'mgm', as robochoc.protocols.local_search.mgm:MGM (robochoc ",
+            ),
+            (
+                ["run", "one:Mine", "other:Mine"],
+                "other:Mine would be called 'mine', as one:Mine already is: rename the class",
+            ),
             (["run", "evil:"], "'evil:' is not of the form MODULE:CLASS"),
             (["run", "json:JSONDecoder"], "json:JSONDecoder is not a subclass of Protocol"),
             (["run", "dpop", "--budget", "hours=3"], "'hours=3' is not one of messages, ncccs, cycles, time"),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.paths import InputPath, OutputFile
-from robochoc.cli.options.value_types import Seed, WholeNumber
+from robochoc.cli.options.value_types import Number, Seed, WholeNumber
 from robochoc.cli.reports.failures import LOST, USAGE, Failure, errors_as_failures, invalid_input_fails
 from robochoc.system.plain_text import counted, on_one_line
 
@@ -45,7 +45,11 @@ def _repetition_options(command: Callable[..., None]) -> Callable[..., None]:
         "--protocol", "protocols", multiple=True, metavar="MODULE:CLASS",
         help="Protocol that is not installed, to be imported and run. Repeatable.",
     )  # fmt: skip
-    return rerun(everything(protocol(jobs_option(command))))
+    timeout = click.option(
+        "--timeout", "limit_s", type=Number(0, min_open=True), default=60.0, show_default=True, metavar="SECONDS",
+        help="Time limit of each repeated run; the limit of the file applies if it is lower.",
+    )  # fmt: skip
+    return rerun(everything(timeout(protocol(jobs_option(command)))))
 
 
 @click.group()
@@ -191,7 +195,9 @@ def run(  # noqa: PLR0913 - options
 @click.argument("results", type=InputPath(), metavar="RESULTS.json")
 @_repetition_options
 @invalid_input_fails
-def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | None, *, everything: bool) -> None:
+def verify(
+    results: Path, rerun: int, limit_s: float, protocols: tuple[str, ...], jobs: int | None, *, everything: bool
+) -> None:
     """Check the results in a file: answers, claimed proofs, curves and counts of all runs; repeat some runs.
 
     Faults are printed, with exit status 4. Modules that the file names are not imported: to repeat runs of a protocol
@@ -204,7 +210,7 @@ def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | No
     from robochoc.leaderboard.results import read_results
 
     found = read_results(results)
-    with _verified(found, results, None if everything else rerun, protocols, jobs) as checked:
+    with _verified(found, results, None if everything else rerun, limit_s, protocols, jobs) as checked:
         click.echo(f"{results}: {checked}")
 
 
@@ -214,7 +220,14 @@ def verify(results: Path, rerun: int, protocols: tuple[str, ...], jobs: int | No
 @_repetition_options
 @invalid_input_fails
 def submit(
-    results: Path, board: Path, rerun: int, protocols: tuple[str, ...], jobs: int | None, *, everything: bool
+    results: Path,
+    board: Path,
+    rerun: int,
+    limit_s: float,
+    protocols: tuple[str, ...],
+    jobs: int | None,
+    *,
+    everything: bool,
 ) -> None:
     """Verify the results in a file as `verify` does, and add the file to a board, which is a folder.
 
@@ -226,7 +239,7 @@ def submit(
     from robochoc.leaderboard.results import read_results
 
     found = read_results(results)
-    with _verified(found, results, None if everything else rerun, protocols, jobs) as checked:
+    with _verified(found, results, None if everything else rerun, limit_s, protocols, jobs) as checked:
         from robochoc.leaderboard.board import submit as submit_results
 
         path = submit_results(found, results.name, board)
@@ -267,7 +280,12 @@ def show(paths: tuple[Path, ...], site: Path | None, markdown: Path | None) -> N
 
 @contextmanager
 def _verified(
-    found: LeaderboardResults, path: Path, number: int | None, protocols: tuple[str, ...], jobs: int | None
+    found: LeaderboardResults,
+    path: Path,
+    number: int | None,
+    limit_s: float,
+    protocols: tuple[str, ...],
+    jobs: int | None,
 ) -> Iterator[str]:
     """Verify results, with the named protocols available, and provide a summary.
 
@@ -282,11 +300,12 @@ def _verified(
         from robochoc.system.posix import usable_processors
 
         entrants(names)  # a protocol that cannot be used is an error
-        repetition = Repetition(found, number)
+        repetition = Repetition(found, number, limit_s)
+        faults = [*wrong_answers(found), *repetition.changed_runs(jobs or usable_processors())]
         for remark in repetition.remarks:
             click.echo(f"{path}: {on_one_line(remark)}", err=True)
-        _fail(path, [*wrong_answers(found), *repetition.changed_runs(jobs or usable_processors())])
-        answers, many = len(found.runs), len(repetition.runs)
+        _fail(path, faults)
+        answers, many = len(found.runs), len(repetition.runs) - repetition.unfinished
         summary = f"{counted(answers, 'answer')} {'is' if answers == 1 else 'are'} right"
         repeated = f"; {counted(many, 'repeated run')} gave the same result{'' if many == 1 else 's'}"
         yield summary + (repeated if many else "")

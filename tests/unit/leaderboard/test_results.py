@@ -89,6 +89,16 @@ def test_other_results_of_a_repeated_run_are_found(results: LeaderboardResults) 
     assert list(Repetition(altered, None).changed_runs()) == ["mgm on random-small-0: another messages"]
 
 
+def test_repeated_runs_have_a_time_limit_of_their_own(results: LeaderboardResults) -> None:
+    budget = Budget(messages=BUDGET.messages, time_s=1e6)
+    for_days = msgspec.structs.replace(changed(results, "random-small-0", "mgm", messages=3), budget=budget)
+    short = Repetition(for_days, None, limit_s=1e-6)
+    assert list(short.changed_runs()) == []
+    assert short.unfinished == sum(run.status != Status.REFUSED for run in for_days.runs)
+    assert "mgm on random-small-0 not compared: it met the time limit of 1e-06 s: increase --timeout" in short.remarks
+    assert list(Repetition(for_days, None).changed_runs()) == ["mgm on random-small-0: another messages"]
+
+
 def curve_of(results: LeaderboardResults, protocol: str) -> list[tuple[int, int]]:
     return next(run.curve for run in results.runs if (run.instance, run.protocol) == ("random-small-0", protocol))
 
