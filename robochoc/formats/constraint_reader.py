@@ -14,6 +14,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.global_constraints import is_global, read_global, variables_of
 from robochoc.formats.names import is_name
 from robochoc.formats.objectives import check_objective
+from robochoc.formats.random_variables import check_uncertain
 from robochoc.formats.robot_rules import (
     check_constraint,
     check_private,
@@ -29,6 +30,7 @@ from robochoc.model.problem import (
     CostUnits,
     Definition,
     ProblemKind,
+    RandomVariable,
     Term,
     WhenAbsent,
 )
@@ -53,6 +55,13 @@ class ConstraintContext:
     kinds: Mapping[str, str]
     """For each variable of the robot, the kind of its values (`formats/symbols.py`)."""
     objectives: tuple[str, ...] = ()
+    random: tuple[RandomVariable, ...] = ()
+    """The random variables in the file."""
+
+    def decisions(self, constraint: Constraint) -> Constraint:
+        """Return `constraint` without random variables, for the checks of its scope."""
+        chance = {one.name for one in self.random}
+        return replace(constraint, scope=tuple(term for term in constraint.scope if term not in chance))
 
 
 def read_private(element: etree._Element, context: ConstraintContext) -> Constraint | None:
@@ -60,7 +69,7 @@ def read_private(element: etree._Element, context: ConstraintContext) -> Constra
     model = attribute(element, "model")
     refuse_private_part(ConstraintModel(model) if model else None)
     constraint = _read(element, context, ConstraintModel(model) if model else None)
-    checked = constraint or _scope_only(element)
+    checked = context.decisions(constraint or _scope_only(element))
     if checked.variables:
         check_private(checked, context.own)
     return constraint
@@ -70,7 +79,7 @@ def read_shared(element: etree._Element, context: ConstraintContext) -> Constrai
     """Return a constraint over variables of this robot and its neighbours. For None and errors see `_read`."""
     model = attribute(element, "model")
     constraint = _read(element, context, ConstraintModel(model) if model else context.model)
-    checked = constraint or _scope_only(element)
+    checked = context.decisions(constraint or _scope_only(element))
     if checked.variables:
         check_shared(checked, context.own)
     return constraint
@@ -115,6 +124,7 @@ def _read(element: etree._Element, context: ConstraintContext, model: Constraint
     check_constraint(constraint, context.kind, context.units)
     check_objective(constraint, context.objectives)
     check_argument_types(constraint, context.kinds)
+    check_uncertain(constraint, context.random)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint
 

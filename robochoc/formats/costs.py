@@ -115,7 +115,8 @@ class CostConversion:
         constant = int(self.cost(robot.costs.constant))
         places = robot.costs.places + len(str(self._factor)) - 1
         costs = replace(robot.costs, places=places, constant=constant)
-        return replace(robot.with_constraints(self.constraint), costs=costs)
+        declared = robot.declared and self.robot(robot.declared)
+        return replace(robot.with_constraints(self.constraint), costs=costs, declared=declared)
 
     def cost(self, cost: float) -> float:
         """Return `cost` in the finer unit. Raises `MistakeError`."""

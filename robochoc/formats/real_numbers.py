@@ -15,6 +15,7 @@ from robochoc.formats.definitions import check_domain
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import check_integer
 from robochoc.formats.xml import attribute
+from robochoc.model.cost_units import MAX_PLACES
 from robochoc.model.expression import Expression, Type
 from robochoc.model.expression.fixed_point import VALUE_PLACES, fixed_point
 from robochoc.model.problem import CostUnits, Domain, Function, Predicate
@@ -96,8 +97,9 @@ def read_value_places(function: etree._Element) -> int:
     if not given:
         return VALUE_PLACES if "real" in words[::2] else 0
     places = places_of_scale(given)
-    if places is None or places > VALUE_PLACES:
-        hint = f"expected a power of ten of at most {VALUE_PLACES} places: 1, 0.1, 0.01, ..."
+    most = VALUE_PLACES if "real" in words[::2] else MAX_PLACES
+    if places is None or places > most:
+        hint = f"expected a power of ten of at most {most} places: 1, 0.1, 0.01, ..."
         raise MistakeError(f"invalid scale '{shortened(given)}'", hint)
     return places
 

@@ -14,7 +14,7 @@ from typing import TypeVar, cast
 from lxml import etree
 
 from robochoc.formats.constraint_reader import ConstraintContext, read_private, read_shared
-from robochoc.formats.costs import CostConversion, places_used, read_units
+from robochoc.formats.costs import CostConversion, check_units, places_used, read_units
 from robochoc.formats.definition_reader import (
     check_count,
     read_domain,
@@ -37,6 +37,7 @@ from robochoc.formats.diagnostics import (
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
 from robochoc.formats.objectives import check_objectives
+from robochoc.formats.random_variables import check_random, read_random
 from robochoc.formats.real_numbers import check_function_places, read_precision
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
@@ -45,7 +46,7 @@ from robochoc.formats.robot_rules import (
     repeated_neighbours,
 )
 from robochoc.formats.schema import SchemaError, schema_for, without_schema_errors
-from robochoc.formats.symbols import SYMBOL, SymbolTable, kind_of
+from robochoc.formats.symbols import INTEGER, SYMBOL, SymbolTable, kind_of
 from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
@@ -58,6 +59,7 @@ from robochoc.model.problem import (
     Function,
     Parent,
     ProblemKind,
+    RandomVariable,
     Robot,
     Semantics,
     Topic,
@@ -65,6 +67,7 @@ from robochoc.model.problem import (
 )
 from robochoc.model.real import DEFAULT_PLACES
 from robochoc.model.symbols import with_table
+from robochoc.model.uncertainty import UncertaintyError, expected_copies, expected_robot
 from robochoc.system.lazy_dataclass import dataclass
 
 _Part = TypeVar("_Part", Domain, Definition)
@@ -211,7 +214,9 @@ class _RobotReader:
         units = self._units(presentation, kind)
         objectives = self._objectives(presentation, kind, units)
         definitions = self._definitions(kind, units)
-        context = ConstraintContext(kind, units, model, self._own, definitions, kinds, objectives)
+        random = self._random_variables()
+        kinds |= {one.name: INTEGER for one in random}
+        context = ConstraintContext(kind, units, model, self._own, definitions, kinds, objectives, random)
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         implied: set[str] = set()
@@ -223,10 +228,30 @@ class _RobotReader:
         file = self._report.file
         robot = Robot(
             self._name, variables, kind, private, parents, children, topics, file,
-            weight=weight, costs=units, objectives=objectives,
+            weight=weight, costs=units, objectives=objectives, random=random,
         )  # fmt: skip
-        places = FileLocations(file, line(presentation), self._own)
-        return RobotFile(robot, places, copies, frozenset(implied), context=context)
+        lines = self._own | {one.name: one.line for one in random}
+        places = FileLocations(file, line(presentation), lines)
+        return self._expected(RobotFile(robot, places, copies, frozenset(implied), context=context))
+
+    def _expected(self, file: RobotFile) -> RobotFile:
+        """Return the deterministic equivalent of a file with random variables."""
+        declared = file.robot
+        if not declared.random:
+            return file
+        try:
+            robot = expected_robot(declared)
+            check_units(robot.costs, robot.kind)
+            copies = {name: expected_copies(declared, copied) for name, copied in file.copies.items()}
+            conversion = CostConversion(10 ** (robot.costs.places - declared.costs.places))
+            definitions = conversion.definitions(file.context.definitions)
+        except UncertaintyError as error:
+            line_number = error.line or file.places.robot().line
+            raise InvalidInputError([Diagnostic(declared.file, line_number, error.message, error.hint)]) from None
+        except MistakeError as mistake:
+            raise InvalidInputError([file.places.robot().mistake(mistake.message, mistake.hint)]) from None
+        context = replace(file.context, units=robot.costs, definitions=definitions)
+        return replace(file, robot=robot, copies=copies, context=context)
 
     def _elements(self, section: str, tag: str, count: str) -> Iterator[etree._Element]:
         """Yield the elements in a section of the instance, and check their number."""
@@ -272,6 +297,15 @@ class _RobotReader:
                 refuse_no_variables(self._own)
             self._report.finish()  # further errors may be consequences of this one
         return tuple(variables)
+
+    def _random_variables(self) -> tuple[RandomVariable, ...]:
+        found: dict[str, RandomVariable] = {}
+        for element in self._elements("random_variables", "random", "nbRandom"):
+            with self._report.at(line(element)):
+                one = read_random(element)
+                check_random(one, self._own, found)
+                found[one.name] = one
+        return tuple(found.values())
 
     def _topics(self, symbolic: Sequence[str]) -> tuple[Topic, ...]:
         topics: dict[str, Topic] = {}

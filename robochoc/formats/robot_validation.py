@@ -22,6 +22,7 @@ from robochoc.formats.global_constraints import check_global
 from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
 from robochoc.formats.objectives import check_objective, check_objectives
+from robochoc.formats.random_variables import check_random
 from robochoc.formats.real_numbers import check_function_places, check_real_domain
 from robochoc.formats.robot_rules import (
     NEIGHBOURS_ONCE,
@@ -108,6 +109,7 @@ class RobotValidator:
             check_one_table(robot)
             check_objectives(robot.objectives, robot.kind, robot.costs)
         self._table = robot.symbol_table
+        self._random_variables(robot, places)
         yield from self._variables(robot, places)
         if not own:
             return  # further errors may be consequences of this one
@@ -125,6 +127,18 @@ class RobotValidator:
         for neighbour, message in repeated_neighbours(robot.name, robot.parents, robot.children):
             self._add(places.neighbour(neighbour), message, NEIGHBOURS_ONCE)
             yield
+
+    def _random_variables(self, robot: Robot, places: ObjectLocations) -> None:
+        declared = robot.declared
+        if declared is None and robot.random:
+            message = "the robot has random variables, which runs do not know"
+            self._add(places.robot(), message, "use robochoc.model.uncertainty.expected_robot(robot)")
+        elif declared is not None:
+            seen: list[str] = []
+            for one in robot.random:
+                with self._at(places.part, "random variable", one.name):
+                    check_random(one, [variable.name for variable in declared.variables], seen)
+                seen.append(one.name)
 
     def _variables(self, robot: Robot, places: ObjectLocations) -> Iterator[None]:
         with self._at(places.robot):

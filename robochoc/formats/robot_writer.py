@@ -13,6 +13,7 @@ from lxml import etree
 from robochoc.formats.costs import cost_text, scale_text
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.global_constraints import write_global
+from robochoc.formats.random_variables import write_random
 from robochoc.formats.real_numbers import real_domain_text, source_of
 from robochoc.model.expression import text
 from robochoc.model.problem import (
@@ -31,6 +32,7 @@ from robochoc.model.problem import (
     Topic,
 )
 from robochoc.model.real import DEFAULT_PLACES
+from robochoc.model.uncertainty import as_declared
 
 _Named = TypeVar("_Named", Domain, Definition)
 _TABLE = "symbols"
@@ -45,7 +47,7 @@ def robot_xml(robot: Robot) -> bytes:
     Raises:
         ValueError: if a cost is not an integer, or a name contains characters that XML does not allow.
     """
-    robot = with_distinct_names(robot)
+    robot = with_distinct_names(as_declared(robot))
     instance = etree.Element("instance")
     presentation = etree.SubElement(instance, "presentation", type=robot.kind)
     if robot.weight != Robot.weight:
@@ -58,6 +60,7 @@ def robot_xml(robot: Robot) -> bytes:
     variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
     for variable in robot.variables:
         etree.SubElement(variables, "variable", name=variable.name, domain=variable.domain.name)
+    write_random(instance, robot)
     _write_topics(instance, robot)
     _write_definitions(instance, robot)
     _write_constraints(instance, robot.private, robot.costs)

@@ -14,6 +14,7 @@ from robochoc.formats.constraint_reader import ConstraintContext, read_shared
 from robochoc.formats.costs import places_used
 from robochoc.formats.definition_reader import read_integer
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
+from robochoc.formats.random_variables import refuse_uncertain
 from robochoc.formats.real_numbers import read_steps
 from robochoc.formats.robot_reader import RobotFile, read_robot_file
 from robochoc.formats.robot_rules import (
@@ -151,6 +152,8 @@ class _ScenarioReader:
     def _value(self, element: etree._Element) -> int:
         """Return an integer, the code of a symbol, or the steps of a real number. Raises `MistakeError`."""
         variable, word = attribute(element, "variable"), attribute(element, "value")
+        for context in self._contexts.values():
+            refuse_uncertain([variable], context.random)
         if self._team is None:
             return 0  # the variable's domain is unknown
         known = self._team.variables.get(variable)
@@ -195,6 +198,7 @@ class _ScenarioReader:
                 self._not_added.add(attribute(child, "name"))
                 constraint = read_shared(child, context)
                 if constraint:
+                    refuse_uncertain(constraint.variables, context.random)
                     check_added_constraint(constraint)
                     self._not_added.discard(constraint.name)
                     yield line(child), AddConstraint(agent, parent, constraint)

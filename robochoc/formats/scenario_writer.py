@@ -20,6 +20,7 @@ from robochoc.model.problem import (
     Robot,
     Team,
 )
+from robochoc.model.uncertainty import is_uncertain, without_random
 
 
 def team_files(team: Team) -> dict[str, bytes]:
@@ -30,6 +31,8 @@ def team_files(team: Team) -> dict[str, bytes]:
     Raises:
         ValueError: if a robot cannot be written (`robot_xml`).
     """
+    if not is_uncertain(team) or any(isinstance(c, AddConstraint) for event in team.scenario for c in event.changes):
+        team = without_random(team)  # all files must declare the same random variables, or none
     files = {f"{robot.name}.xml": _File(robot) for robot in team.robots}
     present = {robot.name: files[f"{robot.name}.xml"] for robot in team.robots}
     texts = _ValueTexts(team)

@@ -21,7 +21,7 @@ libxml2 initialises the types of all schemas while it compiles the first schema,
 memory. Besides, in lxml a schema has a single error log for all threads.
 """
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
-_OPTIONAL = {"topics", "relations", "predicates", "functions", "constraints"}
+_OPTIONAL = {"random_variables", "topics", "relations", "predicates", "functions", "constraints"}
 """The optional elements among those that libxml2 lists when an element is missing."""
 
 _PARTS = (

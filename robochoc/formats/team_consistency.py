@@ -11,6 +11,7 @@ from itertools import islice
 
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
 from robochoc.formats.objectives import mixed_objectives
+from robochoc.formats.random_variables import differing_random_variables
 from robochoc.formats.symbols import different_tables, mistyped_constraints
 from robochoc.formats.team_members import TeamMembers
 from robochoc.formats.tkc_copies import differing_copies
@@ -36,6 +37,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from mixed_costs(members)
     yield from mixed_objectives(members)
     yield from shared_variables(members)
+    yield from differing_random_variables(members)
     yield from different_tables(members)
     yield from mistyped_constraints(members)
     scopes = list(misplaced_constraints(members))

@@ -17,6 +17,7 @@ from robochoc.formats.validation import note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.model.symbols import with_table_everywhere
+from robochoc.model.uncertainty import Outcomes, expected_robot
 from robochoc.system.garbage import collection_paused
 
 GROUND_FILE = "map.json"
@@ -117,13 +118,17 @@ def _with_implied_variables(members: TeamMembers, name: str) -> Robot:
     file = members.files[name]
     if not file.implied_children:
         return file.robot
+    robot = file.robot.declared or file.robot
+    outcomes = Outcomes(robot.random)
     children = []
-    for child in file.robot.children:
+    for child in robot.children:
         variables = child.variables
         if child.name in file.implied_children:
-            variables = tuple(dict.fromkeys([*variables, *members.needed(name, child.name)]))
+            needed = members.needed(name, child.name).keys()
+            implied = (one.name for one in robot.variables if not needed.isdisjoint(outcomes.decisions(one.name)))
+            variables = tuple(dict.fromkeys([*variables, *implied]))
         children.append(replace(child, variables=variables))
-    return replace(file.robot, children=tuple(children))
+    return expected_robot(replace(robot, children=tuple(children)))
 
 
 def _teams(top: Path) -> Iterator[Path]:

@@ -6,6 +6,7 @@ The lowest robot in a constraint's scope holds the constraint, and all other rob
 
 from __future__ import annotations
 
+import itertools
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import field, replace
@@ -22,9 +23,11 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Apply, Name
+from robochoc.model.finer_units import robot_in_places
 from robochoc.model.priorities import priority_order
-from robochoc.model.problem import Child, Parent, ProblemKind, Robot, Team, Topic
+from robochoc.model.problem import Child, Parent, ProblemKind, RandomVariable, Robot, Team, Topic
 from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
+from robochoc.model.uncertainty import Outcomes, expected_robot
 from robochoc.system.lazy_dataclass import dataclass
 
 
@@ -36,6 +39,7 @@ class Extras:
         links: Pairs of robots that are neighbours without a shared constraint. The higher robot is the parent.
         topics: The topics of robots.
         weights: The weights of robots; the default is 1.
+        random: Random variables, which constraints may contain.
         parts: The parts of partially known constraints (PKC), by the robot that knows them. Each part is over variables
             of that robot and of one other robot. If the other robot has no part, it gets a part that allows everything.
         objectives: The first objectives of the team, followed by those that only constraints name.
@@ -44,6 +48,7 @@ class Extras:
     links: Sequence[tuple[str, str]] = ()
     topics: Mapping[str, Sequence[Topic]] = field(default_factory=dict)
     weights: Mapping[str, int] = field(default_factory=dict)
+    random: Sequence[RandomVariable] = ()
     parts: Mapping[str, Sequence[Constraint]] = field(default_factory=dict)
     objectives: Sequence[str] = ()
 
@@ -76,7 +81,8 @@ def assemble(
         ValueError: if a constraint contains a variable that no robot owns.
     """
     symbolic = {one.name: one.domain.symbols for own in variables.values() for one in own if one.domain.symbols}
-    links = _LinkBuilder(variables)
+    outcomes = Outcomes(extras.random)
+    links = _LinkBuilder(variables, outcomes)
     with_variables, costs = _without_constants(constraints, variables, costs)
     for constraint in with_marked_symbols(with_variables, symbolic):
         links.add(constraint)
@@ -105,7 +111,19 @@ def assemble(
         )
         for number, (robot, own) in enumerate(variables.items())
     )
+    if extras.random:
+        robots = tuple(expected_robot(replace(one, random=_affecting(one, outcomes))) for one in robots)
+        places = max(one.costs.places for one in robots)
+        robots = tuple(robot_in_places(one, places) for one in robots)
     return with_table_everywhere(Team(name, robots), next(iter(symbolic.values()), ()))
+
+
+def _affecting(robot: Robot, outcomes: Outcomes) -> tuple[RandomVariable, ...]:
+    """Return the random variables on which the variables and constraints of `robot` depend."""
+    terms = itertools.chain(
+        (one.name for one in robot.variables), *(constraint.scope for constraint in robot.constraints())
+    )
+    return outcomes.on_which(terms)
 
 
 def _without_constants(
@@ -134,7 +152,8 @@ _NEVER = Predicate("never", ("X",), Apply("ne", (Name("X"), Name("X"))))
 class _LinkBuilder:
     """Collects the constraints that robots hold, and the resulting links."""
 
-    def __init__(self, variables: Mapping[str, Sequence[Variable]]) -> None:
+    def __init__(self, variables: Mapping[str, Sequence[Variable]], outcomes: Outcomes) -> None:
+        self._outcomes = outcomes
         self._variables = variables
         self._owner = {variable.name: robot for robot, own in variables.items() for variable in own}
         self._rank = {robot: place for place, robot in enumerate(variables)}
@@ -211,10 +230,12 @@ class _LinkBuilder:
 
     def _show(self, constraint: Constraint, lowest: str) -> None:
         for variable in constraint.variables:
-            self._shown[self._owner[variable], lowest].add(variable)
+            if variable in self._owner:
+                self._shown[self._owner[variable], lowest].add(variable)
 
     def _owners(self, constraint: Constraint) -> set[str]:
-        unknown = [name for name in constraint.variables if name not in self._owner]
+        known = self._owner.keys() | self._outcomes.by_name.keys()
+        unknown = [name for name in constraint.variables if name not in known]
         if unknown:
             raise ValueError(f"constraint {constraint.name} has a variable {unknown[0]!r}, which no robot owns")
-        return {self._owner[name] for name in constraint.variables}
+        return {self._owner[name] for name in constraint.variables if name in self._owner}

@@ -10,6 +10,7 @@ from typing import Any
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Answer, EpochOutcome, Improvement, Outcome, PseudoTreeNode, Violations
+from robochoc.model.policies import PolicyReport
 from robochoc.model.problem import Team
 
 _NAME = re.compile(r"[A-Za-z0-9_.]+")
@@ -28,7 +29,18 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
         epochs=tuple(_epoch(epoch, names) for epoch in outcome.epochs),
         symbolic=_all(outcome.symbolic, names),
         real_places={names.get(name, name): places for name, places in outcome.real_places.items()},
+        uncertainty=_uncertainty(outcome.uncertainty, names),
     )
+
+
+def _uncertainty(report: PolicyReport | None, names: Mapping[str, str]) -> PolicyReport | None:
+    if report is None:
+        return None
+    policies = {
+        names.get(variable, variable): tuple(replace(one, when=_by(one.when, names)) for one in choices)
+        for variable, choices in report.policies.items()
+    }
+    return replace(report, worst_scenario=_by(report.worst_scenario, names), policies=policies)
 
 
 def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:

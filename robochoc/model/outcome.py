@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from robochoc.model.absence import DroppedConstraint
 from robochoc.model.cost_units import Cost
+from robochoc.model.policies import PolicyReport
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
@@ -329,6 +330,7 @@ class Outcome(Answer):
         real_places: The decimal places of variables whose values are real numbers: an integer 1500 with 3 is 1.5.
         chosen: The reasons for the choice of `protocol` and `order`, if they were not specified.
         stages: The stages of the run, if several protocols have searched in turn.
+        uncertainty: The policy and its costs, if the problem has random variables.
     """
 
     team: str
@@ -348,6 +350,7 @@ class Outcome(Answer):
     real_places: dict[str, int] = field(default_factory=dict)
     chosen: dict[str, str] = field(default_factory=dict)
     stages: tuple[SearchStage, ...] = ()
+    uncertainty: PolicyReport | None = None
 
     def __hash__(self) -> int:
         return hash((self.team, self.protocol, self.seed, self.verdict, frozenset(self.assignment.items())))

@@ -36,6 +36,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits, common_units
 from robochoc.model.expression import Expression
+from robochoc.model.random_variable import RandomVariable
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.plain_text import counted
 
@@ -57,6 +58,7 @@ __all__ = [
     "Parent",
     "Predicate",
     "ProblemKind",
+    "RandomVariable",
     "Relation",
     "RemoveAgent",
     "RemoveConstraint",
@@ -148,6 +150,8 @@ class Robot:
         symbols: The names of the team's symbols, if none of the robot's domains is symbolic.
         user_units: The user's units of costs, if the robot's costs are normalised (`model/costs.py`).
         objectives: The names of the team's objectives, if there are several (`model/objectives.py`).
+        random: The random variables in the robot's file.
+        declared: The robot as in its file, if this robot is its deterministic equivalent (`model/uncertainty.py`).
     """
 
     name: str
@@ -164,6 +168,8 @@ class Robot:
     symbols: tuple[str, ...] = ()
     user_units: CostUnits = PLAIN_COSTS
     objectives: tuple[str, ...] = ()
+    random: tuple[RandomVariable, ...] = ()
+    declared: Robot | None = field(default=None, compare=False, repr=False)
 
     def constraints(self) -> Iterator[Constraint]:
         """Yield every constraint in the robot's file: private and shared ones, and parts of partially known ones."""

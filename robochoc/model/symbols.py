@@ -65,7 +65,8 @@ def with_table(robot: Robot, names: tuple[str, ...]) -> Robot:
         if variable.domain.symbols and id(variable.domain) not in domains:
             domains[id(variable.domain)] = replace(variable.domain, symbols=names)
     variables = tuple(replace(one, domain=domains.get(id(one.domain), one.domain)) for one in robot.variables)
-    return replace(robot, variables=variables, symbols=() if domains else names)
+    declared = robot.declared and with_table(robot.declared, names)
+    return replace(robot, variables=variables, symbols=() if domains else names, declared=declared)
 
 
 def with_table_everywhere(team: Team, names: tuple[str, ...]) -> Team:

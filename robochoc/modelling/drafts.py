@@ -302,8 +302,8 @@ def _called(definition: Definition, name: str) -> Definition:
             return Relation(name, arity, semantics, tuples, costs, default)
         case Predicate(parameters=parameters, body=body):
             return Predicate(name, parameters, body)
-        case Function(parameters=parameters, body=body):
-            return Function(name, parameters, body)
+        case Function():
+            return replace(definition, name=name)
 
 
 def _relation(draft: Draft, unit: int, sign: int) -> Relation:

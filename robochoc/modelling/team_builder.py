@@ -12,6 +12,7 @@ from robochoc.formats import InvalidInputError, check_team
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import Constraint, Domain, Variable
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.finer_units import in_finer_units
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import (
     AddAgent,
@@ -30,7 +31,7 @@ from robochoc.modelling.errors import ModelError, SourceLine
 from robochoc.modelling.events import ModelEvent, Removal
 from robochoc.modelling.numbers import places_of
 from robochoc.modelling.robots import ModelRobot
-from robochoc.modelling.team_contents import changes_in_finer_units, in_finer_units
+from robochoc.modelling.team_contents import changes_in_finer_units
 from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:

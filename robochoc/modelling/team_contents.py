@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
-from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation, Variable
+from robochoc.model.constraint import Constraint, Variable
 from robochoc.model.cost_units import CostUnits, common_units
+from robochoc.model.finer_units import in_finer_units
 from robochoc.model.problem import AddConstraint, Change, ConstraintModel, ProblemKind, ScenarioEvent, Team
 from robochoc.modelling.codes import NUMBER, DomainCodes, Symbols, kind_of
 from robochoc.modelling.errors import SourceLine
@@ -87,21 +88,6 @@ def model_variable(variable: Variable, owner: str, symbols: Symbols, place: Sour
     return made
 
 
-def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
-    """Return `constraint` with its costs in a unit that is smaller by `factor`."""
-    if factor == 1:
-        return constraint
-    match constraint.definition:
-        case Relation() as relation:
-            costs = tuple(_times(cost, factor) for cost in relation.costs)
-            finer = replace(relation, costs=costs, default_cost=_times(relation.default_cost, factor))
-            return replace(constraint, definition=finer)
-        case Predicate():
-            return replace(constraint, cost=_times(constraint.cost, factor))
-        case Function():
-            return constraint
-
-
 def changes_in_finer_units(changes: Iterable[Change], factor: int) -> tuple[Change, ...]:
     """Return `changes` with the costs of added constraints in a smaller unit. Added robots declare their own unit."""
     return tuple(
@@ -110,7 +96,3 @@ def changes_in_finer_units(changes: Iterable[Change], factor: int) -> tuple[Chan
         else change
         for change in changes
     )
-
-
-def _times(cost: float, factor: int) -> float:
-    return cost if cost == INFINITE else cost * factor

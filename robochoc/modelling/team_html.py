@@ -84,7 +84,8 @@ def _with_actual(expression: Expression, actual: Mapping[str, str | int]) -> Exp
 def _cost(constraint: Constraint, units: CostUnits) -> str:
     definition = constraint.definition
     if isinstance(definition, Function):
-        return "its value"
+        unit = CostUnits(places=definition.places).in_user_units(1)
+        return "its value" if unit == 1 else f"{unit} x its value"
     if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
         return "in the table"
     if constraint.cost == INFINITE:

@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.orders import Order
+from robochoc.model.policies import Risk
 from robochoc.run.defaults import AUTO
 from robochoc.run.option_values import (
     channel_model,
@@ -173,6 +174,7 @@ class Options:
             knowledge in any case.
         stages: The protocols that search in turn until the deadline, of which `protocol` is the last (empty: only
             `protocol` searches). They are chosen, not given.
+        risk: The optimised cost of a problem with random variables.
         bounds: True if events report lower bounds of the cost that robots have proven (processes and simulator).
     """
 
@@ -212,6 +214,7 @@ class Options:
     start: Mapping[str, int | None] = field(default_factory=dict)
     cold: bool = False
     stages: tuple[Stage, ...] = ()
+    risk: Risk = Risk.EXPECTED
 
     def __post_init__(self) -> None:
         for name, given in vars(self).copy().items():
@@ -292,6 +295,7 @@ _CONVERTERS = MappingProxyType(
         "cluster": optional(text),
         "start": start_values,
         "cold": flag,
+        "risk": one_of(Risk),
         "stages": items_of(instance_of(Stage), "objects of the class Stage"),
     }
 )

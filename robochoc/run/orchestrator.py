@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,11 @@ from robochoc.model.change import team_after_events
 from robochoc.model.costs import NormalizationError, normalized
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.policies import Risk
 from robochoc.model.problem import Team
 from robochoc.model.symbols import real_places, symbol_table, symbolic_variables
+from robochoc.model.uncertainty import UncertaintyError, is_uncertain
+from robochoc.model.worst_case import worst_case
 from robochoc.run.choice import ProtocolChoice, choose, choose_without_analysis
 from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.setting_rules import refuse_settings
@@ -34,6 +38,7 @@ from robochoc.solver.errors import TooLargeError, UnsupportedError
 from robochoc.system.lazy_dataclass import dataclass
 from robochoc.system.time_limit import TimeLimitError, computed_by
 from robochoc.verification.checker import check_user_cost
+from robochoc.verification.policies import policy_report
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -90,11 +95,13 @@ class PreparedRun:
         team: The team with its scenario.
         choice: The options with a protocol and an order, and the reasons for them.
         spent_s: The seconds spent on the choice. They count towards the time of the run.
+        uncertain: The team with expected costs, if the problem has random variables.
     """
 
     team: Team
     choice: ProtocolChoice
     spent_s: float
+    uncertain: Team | None = None
 
     def solve(
         self,
@@ -119,6 +126,8 @@ class PreparedRun:
             raise UnsupportedError(str(refused)) from None
         if counted is not team and environment is None:
             _check_costs(team, outcome)
+        if self.uncertain and outcome.assignment and not outcome.epochs:
+            return replace(outcome, uncertainty=policy_report(self.uncertain, outcome, options.risk))
         return outcome
 
 
@@ -136,13 +145,28 @@ def prepare(team: Team, options: Options, *, environment: bool = False, ordered:
         InvalidInputError: if the team is not valid.
     """
     check_team(team)
+    uncertain = team if is_uncertain(team) else None
     began = time.monotonic()
+    if options.risk == Risk.WORST:
+        team = _worst_case(team)
     deadline = None if options.limit_s is None else began + options.limit_s
     try:
         choice = computed_by(deadline, choose, team, options, environment=environment, ordered=ordered)
     except TimeLimitError:
         choice = choose_without_analysis(team, options)
-    return PreparedRun(team, choice, time.monotonic() - began)
+    return PreparedRun(team, choice, time.monotonic() - began, uncertain)
+
+
+def _worst_case(team: Team) -> Team:
+    """Return the team whose costs are those of the worst scenario. Raises `UnsupportedError`."""
+    if not is_uncertain(team) or team.scenario or any(robot.objectives for robot in team.robots):
+        uncertain = "has a scenario.xml" if team.scenario else "has several objectives"
+        what = uncertain if is_uncertain(team) else "has no random variables"
+        raise UnsupportedError(f"{team.name} {what}, so that the worst case cannot be minimised: use --risk expected")
+    try:
+        return worst_case(team)
+    except UncertaintyError as refused:
+        raise UnsupportedError(str(refused)) from None
 
 
 def _check_costs(team: Team, outcome: Outcome) -> None:

@@ -42,6 +42,7 @@ from robochoc.cli.options.solve import (
     preprocess_option,
     protocol_option,
     repair_option,
+    risk_option,
     settings_option,
     standby_option,
     start_option,
@@ -58,8 +59,8 @@ _SECTIONS: Sections = {
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": (
-        "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--no-repair", "--messages", "--ncccs",
-        "--cycles", "--count", "--with", "--cluster",
+        "--order", "--set", "--start", "--cold", "--preprocess", "--answer", "--risk", "--no-repair", "--messages",
+        "--ncccs", "--cycles", "--count", "--with", "--cluster",
     ),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill", "--standby"),
     "Delivery of messages": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
@@ -145,6 +146,7 @@ _SECTIONS: Sections = {
 @cold_option
 @preprocess_option
 @answer_option
+@risk_option
 @repair_option
 @messages_option
 @click.option(
@@ -203,7 +205,7 @@ _SECTIONS: Sections = {
 @click.option(
     "--sniff",
     metavar="[=ROBOTS]",
-    help="Show all messages live on a page of this machine; ROBOTS: robots shown first, such as Robot3.1,Robot2.*.",
+    help="Show messages live on a page; ROBOTS (A,B.*) come first.",
 )
 @click.option("--open", "open_browser", is_flag=True, help="With --sniff: open the page in a browser before the run.")
 @click.pass_context

@@ -125,7 +125,7 @@ def _solve(
     from robochoc.run.recording import journal_header, objective_to_record
 
     run = prepare(team, options, environment=bool(request.ros.situation), ordered=not problem.foreign)
-    options = run.choice.options
+    options, team = run.choice.options, run.team
     header = partial(journal_header, team, options)
 
     objective = None if request.ros.situation else objective_to_record(team, options)

@@ -79,6 +79,13 @@ answer_option = click.option(
     metavar="KIND",
     help="Answer without a proof: best (default) or final values.",
 )
+risk_option = click.option(
+    "--risk",
+    type=click.Choice(["expected", "worst"]),
+    default="expected",
+    metavar="KIND",
+    help="Random variables: expected (default) or worst costs.",
+)
 repair_option = click.option(
     "--no-repair",
     "repair",
@@ -154,7 +161,7 @@ filter_option = click.option(
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
     "kill", "standby", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss",
-    "preprocess", "central_with", "cluster", "answer", "cold", "repair",
+    "preprocess", "central_with", "cluster", "answer", "risk", "cold", "repair",
 )  # fmt: skip
 """The arguments of `robochoc solve` that have the same name in `robochoc.run.Options`."""
 

@@ -44,7 +44,7 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     places = MapPlaces(team, ground)
     if outcome.assignment:
         lines += _values(team, outcome.labelled(outcome.assignment), places.places_of(outcome.assignment))
-    lines += _listed(team, outcome, places)
+    lines += [*_listed(team, outcome, places), *_uncertainty(outcome)]
     if outcome.withdrawn_alive:
         lines += [
             f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
@@ -57,6 +57,19 @@ def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
+
+
+def _uncertainty(outcome: Outcome) -> list[str]:
+    """Return a line with the expected and the worst cost, if the problem has random variables and costs."""
+    report = outcome.uncertainty
+    if report is None or report.expected is None:
+        return []
+    scenarios = counted(report.scenarios, "scenario")
+    worst = f"unknown: there are {scenarios}"
+    if report.worst is not None:
+        case = ", ".join(f"{shortened(name)} = {value}" for name, value in report.worst_scenario.items())
+        worst = f"{cost_shown(report.worst)} ({case or 'the same'}), of {scenarios}"
+    return [f"  expected cost {cost_shown(report.expected)}; worst case {worst}"]
 
 
 def _dropped(outcome: Outcome) -> list[str]:
