@@ -34,6 +34,7 @@ _WORDS = {
     "on-loss": "fail|withdraw",
     "preprocess": "ac",
     "answer": "best|final",
+    "risk": "expected|worst",
     "order": "dom-deg|max-degree|dfs|given",
     "with": "ace|ortools",
     "protocol": r"[a-z][a-z0-9-]*",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Never
 
 from robochoc.journal.events import Observer, combined
 from robochoc.model.outcome import Answer, Outcome
+from robochoc.model.policies import Risk
 from robochoc.model.problem import Team
 from robochoc.modelling.option_names import errors_in_python, in_python
 from robochoc.modelling.solution import Solution
@@ -93,6 +94,7 @@ class Solvable(ABC):
         preprocess: str | None = None,
         answer: str = AnswerRule.BEST,
         repair: bool = True,
+        risk: str = Risk.EXPECTED,
         cluster: str | None = None,
         journal: Path | str | None = None,
         html: Path | str | None = None,
@@ -154,6 +156,7 @@ class Solvable(ABC):
                 robots' last values.
             repair: True if a local search repairs the assignment of an incomplete protocol that has ended with violated
                 hard constraints, unless the answer is `final` or there are limits other than on time.
+            risk: The minimised cost of a problem with random variables: `expected`, or `worst` of all scenarios.
             cluster: With arrays: the address of a Dask scheduler, or the path of its file. Its workers compute the run.
                 None: this process does.
             journal: The file to which the journal of the run is written: all messages and decisions.
