@@ -19,7 +19,7 @@ from robochoc.system.plain_text import LONGEST_REASON, on_one_line, printable
 VERSION = 1
 """The version of the protocol. It is increased if something is removed or changes its meaning."""
 MAX_TOKENS = 1 << 53
-Labelled = dict[str, float | str]
+Labelled = dict[str, int | float | str]
 """The values of a robot's variables, in the user's notation."""
 
 
