@@ -31,6 +31,9 @@ def test_a_game_by_keyboard_on_a_narrow_screen(browser: Browser, application: Ap
         page.keyboard.press("Enter")
         page.wait_for_selector("h2:has-text('Round 2 of 2')")
         page.wait_for_selector("li:has-text('East: ')")
+        page.reload()
+        page.wait_for_selector("h2:has-text('Round 2 of 2')")
+        page.wait_for_selector("li:has-text('East: ')")
         assert page.evaluate("document.documentElement.scrollWidth") <= NARROW["width"]
         assert [text for impact, text in axe_findings(page) if impact in {"serious", "critical"}] == []
         page.focus("button:has-text('End my turn')")

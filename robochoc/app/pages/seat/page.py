@@ -8,7 +8,6 @@ from importlib.resources import files
 from nicegui import ui
 
 from robochoc.app.pages.background_query import ErrorText, run_query
-from robochoc.app.pages.shell import on_leave
 from robochoc.app.pages.widgets import bounded_integer
 from robochoc.app.projects import Project
 from robochoc.app.sketch.building import saved_team
@@ -49,12 +48,32 @@ def _robots(project: Project) -> list[str]:
     return [robot.name for robot in project.sketch.robots] if project.sketch.decisions else []
 
 
+class RunningGame:
+    """The game of a team. It continues when its page is closed or loaded again, until a new one is started.
+
+    Attributes:
+        game: The game; None before the first one.
+        playing: True while a round is played.
+    """
+
+    def __init__(self, _: Project) -> None:
+        self.game: SeatGame | None = None
+        self.playing = False
+
+    def replace(self, game: SeatGame | None) -> None:
+        """End the game, and continue with another one."""
+        if self.game is not None and not self.playing:
+            self.game.close()
+        self.game = game
+
+
 class SeatPage:
-    """The page in one browser tab. The game ends when the tab is closed or loaded again."""
+    """The page in one browser tab. All pages of a team show the same game."""
 
     def __init__(self, project: Project, names: list[str]) -> None:
         self._project = project
-        self._game: SeatGame | None = None
+        self._running = project.part(RunningGame)
+        self._shown: tuple[SeatGame, int] | None = None
         self._client = ui.context.client
         label = f'aria-label="{say("seat.title")}"'
         with ui.element("div").classes("seat"), ui.element("section").classes("panel wide").props(label):
@@ -71,17 +90,17 @@ class SeatPage:
             self._message = ui.label().props("role=status")
             self._error = ui.label().classes("error").props("role=alert")
         self._board = ui.element("div").classes("seat")
-        on_leave(self._close)
-
-    def _close(self) -> None:
-        if self._game is not None:
-            self._game.close()
-            self._game = None
+        game = self._running.game
+        if game is not None:
+            if game.robot in names:
+                self._robot.set_value(game.robot)
+            self._rounds.set_value(game.rounds)
+            self._show(())
 
     # Events
 
     async def _begin(self) -> None:
-        self._close()
+        self._running.replace(None)
         self._error.set_text("")
         self._message.set_text(say("seat.starting"))
         self._start.set_enabled(False)
@@ -96,19 +115,24 @@ class SeatPage:
             self._error.set_text(str(game))
             self._board.clear()
             return
-        self._game = game
-        self._start.set_text(say("seat.again"))
+        self._running.replace(game)
         self._show(())
 
     async def _end_turn(self) -> None:
-        game = self._game
-        if game is None or not self._turn.enabled:
+        running, game = self._running, self._running.game
+        if game is None or running.playing or not self._turn.enabled:
+            return
+        if self._shown != (game, game.round) or game.report is not None:
+            self._show(())
+            self._error.set_text(say("seat.elsewhere"))
             return
         self._turn.set_enabled(False)
         text = str(self._text.value or "").strip()
         texts = [(str(self._to.value), text)] if text and self._to.value else []
+        running.playing = True
         broken = await run_query(game.play, self._value.value, None, texts)
-        if broken is None or game is not self._game:
+        running.playing = False
+        if broken is None or game is not running.game:
             return
         if isinstance(broken, ErrorText):
             self._error.set_text(str(broken))
@@ -118,9 +142,11 @@ class SeatPage:
     # Content
 
     def _show(self, broken: tuple[Breach, ...]) -> None:
-        game = self._game
+        game = self._running.game
         if game is None:
             return
+        self._shown = game, game.round
+        self._start.set_text(say("seat.again"))
         self._error.set_text(" ".join(say("seat.broken", rule=one.rule, details=one.details) for one in broken))
         self._board.clear()
         with self._board:
