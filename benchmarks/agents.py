@@ -2,7 +2,8 @@
 
 `python benchmarks/agents.py [--agents N] [--seeds N]` prints two tables for docs/guides/agent-benchmarks.md: how many
 runs end with a feasible answer and the mean score of AgentsNet, and the regret of the players of `robochoc play`. The
-graphs are small worlds (4 neighbours) and scale-free graphs (2 links). Everything runs in the simulator.
+graphs are small worlds (4 neighbours), scale-free graphs (2 links) and Delaunay triangulations. Everything runs in the
+simulator.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.seats import GameOptions, play
 
-GRAPHS = ("small-world", "scale-free")
+GRAPHS = ("small-world", "scale-free", "delaunay")
 COMPLETE = ("abt", "abt-do-retro", "agile-abt", "awc", "afc-ng", "afc-tree")
 LOCAL = ("dsa", "dsa-sdp", "mgm", "mgm2", "gdba", "lamdls")
 PLAYERS = ("random", "greedy", "dsa", "mgm", "optimal")

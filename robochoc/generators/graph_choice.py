@@ -15,6 +15,7 @@ from pathlib import Path
 
 from robochoc.formats import Diagnostic, InvalidInputError
 from robochoc.generators import graphs
+from robochoc.generators.delaunay import delaunay
 from robochoc.generators.draws import MAX_NODES
 from robochoc.generators.graphs import Edge, Graph, GraphKind
 from robochoc.system.lazy_dataclass import dataclass
@@ -110,6 +111,8 @@ class GraphChoice:
                     change = f"change {dashes}agents or {dashes}rows"
                     raise ValueError(f"{agents} robots do not fill {rows} rows; {change}")
                 return graphs.grid(rows, agents // rows, torus=self.torus)
+            case GraphKind.DELAUNAY:
+                return delaunay(agents)
             case _:
                 return graphs.tree(agents)
 

@@ -6,6 +6,7 @@ networkx is not used, since its random graphs may differ between versions.
 * `scale_free`: Barabasi and Albert, "Emergence of scaling in random networks", Science 286 (1999).
 * `small_world`: Watts and Strogatz, "Collective dynamics of 'small-world' networks", Nature 393 (1998).
 * `grid`: four neighbours each; in a torus, opposite borders are joined. Used by Ising models (`generators/ising.py`).
+* `delaunay`: triangulations of random points (`generators/delaunay.py`).
 * `tree`: all trees with numbered nodes are equally likely, by Pruefer sequences (Cayley's n**(n-2) trees).
 """
 
@@ -35,6 +36,7 @@ class GraphKind(StrEnum):
     SMALL_WORLD = "small-world"
     GRID = "grid"
     TREE = "tree"
+    DELAUNAY = "delaunay"
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,15 @@ The three models of the paper, with the same maximum:
 * `tsav` (time slots as variables): a robot is a person, with a variable for each slot: 0 if the slot is free, or a part
   of one of its meetings. A part is as long as a slot, and parts follow each other.
 
+The model `words` is `peav` with names (`generators/meetings_in_words.py`).
+
 Without preferences, all meetings must take place, and the problem is a DisCSP.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import StrEnum
 from random import Random
 from typing import assert_never
@@ -38,6 +40,7 @@ from robochoc.generators.draws import (
     sample,
     seeded,
 )
+from robochoc.generators.meetings_in_words import meetings_in_words
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Type, parse
@@ -72,6 +75,7 @@ class MeetingsModel(StrEnum):
     PEAV = "peav"
     EAV = "eav"
     TSAV = "tsav"
+    WORDS = "words"
 
 
 @dataclass(frozen=True)
@@ -106,6 +110,13 @@ class Meetings:
         lost = sum(self.free[person][start - 1 : start - 1 + meeting.length])
         return meeting.worth[person] * meeting.length - lost
 
+    def rivals(self) -> Iterator[tuple[Meeting, Meeting, list[int]]]:
+        """Yield all pairs of meetings with common participants, and these participants."""
+        for one, other in itertools.combinations(self.meetings, 2):
+            shared = [person for person in one.worth if person in other.worth]
+            if shared:
+                yield one, other, shared
+
 
 def meetings(
     agents: int,
@@ -122,7 +133,8 @@ def meetings(
 
     In `peav`, `Robot3` is a person, and `V3.2` is the start of meeting 2 for this person; there are no robots for
     persons without meetings. In `eav`, `Meeting2` owns `V2`. In `tsav`, `V3.2` is the part of a meeting in slot 2 of
-    `Robot3`, where the parts of all meetings are numbered consecutively from 1.
+    `Robot3`, where the parts of all meetings are numbered consecutively from 1. In `words`, `Ada.budget` is the time of
+    a meeting for the robot `Ada`.
 
     Args:
         agents: The number of persons.
@@ -152,6 +164,8 @@ def meetings(
             variables, constraints = _eav(problem, preferences=preferences)
         case MeetingsModel.TSAV:
             variables, constraints = _tsav(problem, preferences=preferences)
+        case MeetingsModel.WORDS:
+            variables, constraints = meetings_in_words(problem, preferences=preferences)
         case never:
             assert_never(never)
     label = f"-{max_length}-{max_value}" if preferences else f"-{max_length}-required"
@@ -176,7 +190,7 @@ def drawn_meetings(chance: Random, sizes: tuple[int, int, int, int], max_length:
     return Meetings(slots, free, found)
 
 
-_Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
+_Parts = tuple[dict[str, list[Variable]], Iterable[Constraint]]
 """The variables of each robot, and the constraints."""
 
 
@@ -198,7 +212,7 @@ def _peav(problem: Meetings, *, preferences: bool) -> _Parts:
             for pair in itertools.combinations(meeting.worth, 2):
                 scope = tuple(f"V{person}.{meeting.number}" for person in pair)
                 yield Constraint(f"M{meeting.number}", PREDEFINED["eq"], scope, scope)
-        for one, other, shared in _rivals(problem):
+        for one, other, shared in problem.rivals():
             for person in shared:
                 yield _apart((f"V{person}.{one.number}", f"V{person}.{other.number}"), one, other)
 
@@ -217,7 +231,7 @@ def _eav(problem: Meetings, *, preferences: bool) -> _Parts:
                 starts = problem.starts(meeting)
                 worth = {at: sum(problem.worth(meeting, one, at) for one in meeting.worth) for at in starts}
                 yield _worth(str(meeting.number), worth)
-        for one, other, _ in _rivals(problem):
+        for one, other, _ in problem.rivals():
             yield _apart((f"V{one.number}", f"V{other.number}"), one, other)
 
     return variables, constraints()
@@ -297,14 +311,6 @@ def _starts(problem: Meetings, meeting: Meeting, *, preferences: bool) -> Domain
     """Return the slots in which `meeting` can start, and 0 if the meeting need not take place."""
     starts = problem.starts(meeting)
     return Domain(f"Length{meeting.length}", (range(0 if preferences else 1, starts.stop),))
-
-
-def _rivals(problem: Meetings) -> Iterator[tuple[Meeting, Meeting, list[int]]]:
-    """Yield all pairs of meetings with common participants, and these participants."""
-    for one, other in itertools.combinations(problem.meetings, 2):
-        shared = [person for person in one.worth if person in other.worth]
-        if shared:
-            yield one, other, shared
 
 
 def _worth(name: str, worth: Mapping[int, int]) -> Constraint:

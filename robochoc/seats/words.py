@@ -28,7 +28,7 @@ def problem_in_words(team: Team, name: str) -> str:
     lines += [f"{one.name} is one of: {domain_text(one.domain)}." for one in robot.variables]
     for constraint in _known(team, robot):
         lines += _rule(team, constraint, robot)
-    lines.append(f"Rules must hold. The sum of all costs of the whole team should be {aim}.")
+    lines.append(f"Rules must hold. The sum of all {_noun(robot).lower()}s of the whole team should be {aim}.")
     return "\n".join(map(printable, lines))
 
 
@@ -43,23 +43,28 @@ def _known(team: Team, robot: Robot) -> Iterator[Constraint]:
                     yield constraint
 
 
+def _noun(robot: Robot) -> str:
+    return "Gain" if robot.costs.maximize else "Cost"
+
+
 def _rule(team: Team, constraint: Constraint, robot: Robot) -> Iterator[str]:
     """Yield the lines about one constraint."""
+    noun = _noun(robot)
     definition = constraint.definition
     if not isinstance(definition, Relation):
         given = dict(zip(definition.parameters, constraint.parameters, strict=True))
         text = Infix(given, definition.symbolic, robot.symbol_table).text(definition.body)
         if isinstance(definition, Function):
-            yield f"Cost {constraint.name}: {text}."
+            yield f"{noun} {constraint.name}: {text}."
         elif constraint.cost == INFINITE:
             yield f"Rule {constraint.name}: {text}."
         else:
-            yield f"Cost {constraint.name}: {_price(constraint.cost, robot)} unless {text}."
+            yield f"{noun} {constraint.name}: {_price(constraint.cost, robot)} unless {text}."
         return
     heads = {
         Semantics.SUPPORTS: f"Rule {constraint.name}: only these values are allowed",
         Semantics.CONFLICTS: f"Rule {constraint.name}: these values are forbidden",
-        Semantics.SOFT: f"Cost {constraint.name}: a cost for each combination of values",
+        Semantics.SOFT: f"{noun} {constraint.name}: a {noun.lower()} for each combination of values",
     }
     yield f"{heads[definition.semantics]} for {', '.join(map(str, constraint.parameters))}."
     soft = definition.semantics == Semantics.SOFT

@@ -127,7 +127,7 @@ OUTPUT = ("--seed", "-o", "--force", "--help")
 GRAPH = ("--connected", "--links", "--neighbours", "--rewiring", "--rows", "--torus")
 """The options in the section on graphs."""
 
-KINDS = ("random", "scale-free", "small-world", "grid", "tree")
+KINDS = ("random", "scale-free", "small-world", "grid", "tree", "delaunay")
 
 
 _GRAPH_PARAMETERS = ("links", "neighbours", "rewiring", "rows", "torus", "connected")

@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 
 from robochoc.formats import check_team
 from robochoc.generators.coloring import coloring_of
+from robochoc.generators.delaunay import SIDE, Point, delaunay, triangulated
+from robochoc.generators.draws import random_integer
 from robochoc.generators.graphs import (
     Edge,
     Graph,
@@ -44,6 +46,43 @@ def drawn(graph: Graph, seed: int) -> list[Edge]:
 
 def degrees(edges: list[Edge]) -> Counter[int]:
     return Counter(itertools.chain.from_iterable(edges))
+
+
+@given(st.integers(1, 9), SEEDS)
+@examples(60)
+def test_delaunay_links_points_with_an_empty_circle_through_both(agents: int, seed: int) -> None:
+    """All triples of points are tried: a triangle is drawn if no other point is inside its circle."""
+    edges = drawn(delaunay(agents), seed)
+    assert links_all(edges, agents)
+    assert len(edges) <= max(agents - 1, 3 * agents - 6)
+    chance = Random(seed)
+    points = [(random_integer(chance, 0, SIDE), random_integer(chance, 0, SIDE)) for _ in range(agents)]
+    if agents > 2:
+        expected = set()
+        for triple in itertools.combinations(range(agents), 3):
+            centre, radius = circle(*[points[one] for one in triple])
+            if all(distance(centre, point) >= radius for point in points):
+                expected |= {(one + 1, other + 1) for one, other in itertools.combinations(triple, 2)}
+        assert set(edges) == expected
+
+
+def circle(a: Point, b: Point, c: Point) -> tuple[tuple[Fraction, Fraction], Fraction]:
+    """Return the centre and the squared radius of the circle through three points."""
+    (x, y), (p, q), (r, s) = a, (b[0] - a[0], b[1] - a[1]), (c[0] - a[0], c[1] - a[1])
+    twice = 2 * (p * s - q * r)
+    right = Fraction(s * (p * p + q * q) - q * (r * r + s * s), twice)
+    up = Fraction(p * (r * r + s * s) - r * (p * p + q * q), twice)
+    return (x + right, y + up), right * right + up * up
+
+
+def distance(centre: tuple[Fraction, Fraction], point: Point) -> Fraction:
+    return (centre[0] - point[0]) ** 2 + (centre[1] - point[1]) ** 2
+
+
+def test_points_without_a_unique_triangulation() -> None:
+    for points in ([(0, 0), (0, 1), (1, 0), (1, 1)], [(0, 0), (1, 1), (2, 2)], [(0, 0), (0, 0), (1, 2)]):
+        assert triangulated(points) is None
+    assert triangulated([(0, 0), (1, 0), (2, 0), (1, 2)]) == [(1, 2), (1, 4), (2, 3), (2, 4), (3, 4)]
 
 
 @given(st.integers(2, 25), st.integers(1, 24), SEEDS)

@@ -38,9 +38,9 @@ def model_option(name: str, choices: list[str], text: str) -> Callable[..., Any]
 )
 @model_option(
     "--model",
-    ["peav", "eav", "tsav"],
+    ["peav", "eav", "tsav", "words"],
     "peav: a robot is a person, with a variable for each of its meetings; eav: a robot is a meeting; tsav: a robot is a"
-    " person, with a variable for each slot.",
+    " person, with a variable for each slot; words: peav with names of persons, meetings and times.",
 )
 @click.option("--required", is_flag=True, help="All meetings must take place, without preferences: a DisCSP.")
 @seed_option
