@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,9 @@ from typing import NamedTuple
 from measure import ROBOCHOC
 from peer_problems import COLOURING, COSTS, FILES, LOCAL, RAVEN, TABLES, TEAM, Family
 from peer_runs import Run
+
+from robochoc.leaderboard.peers.frodo import described
+from robochoc.leaderboard.peers.peer import SCRIPTS
 
 PYTHON_OF_RAVEN = "ROBOCHOC_BENCH_RAVEN"
 PYTHON_OF_PYDCOP = "ROBOCHOC_BENCH_PYDCOP"
@@ -139,7 +141,7 @@ _FRODOS = {
     "Max-Sum": ("MaxSum/MaxSumAgent", "maxsum.MaxSumSolver"),
 }
 """Of each algorithm, FRODO's description of its agents and the class that runs it."""
-_COUNTED = {"threads": "false", "threads, counting": "true"}
+_COUNTED = {"threads": False, "threads, counting": True}
 
 
 def _frodos(family: Family) -> list[Contestant]:
@@ -157,7 +159,7 @@ def _frodo(algorithm: str, way: str, family: Family) -> Contestant:
 
     def command(folder: Path) -> list[str]:
         description, results = folder / "agents.xml", folder / "frodo.csv"
-        description.write_text(described(source.read_text(), counted=_COUNTED[way]))
+        description.write_text(described(source.read_text(), simulates_time=False, counts=_COUNTED[way]))
         results.unlink(missing_ok=True)
         classes = f"{home}/*:{home}/lib/*"
         words = [algorithm, f"frodo2.algorithms.{solver}", str(description), str(folder / FILES["frodo"])]
@@ -168,18 +170,6 @@ def _frodo(algorithm: str, way: str, family: Family) -> Contestant:
     if not missing and not source.exists():
         missing = f"{FRODO}: no agents/{agents}.xml there"
     return Contestant("FRODO", algorithm, way, command, _of_frodo, missing)
-
-
-def described(text: str, *, counted: str) -> str:
-    """FRODO's description of agents, set to real threads (not simulated time), with or without counting."""
-    for name, value in (
-        ("measureTime", "false"),
-        ("measureMsgs", counted),
-        ("countNCCCs", counted),
-        ("displayGraph", "false"),
-    ):
-        text = re.sub(rf'\b{name}(\s*)=(\s*)"\w+"', rf'{name}\1=\2"{value}"', text)
-    return text
 
 
 def _of_frodo(folder: Path, _run: Run) -> Answer:
@@ -221,7 +211,7 @@ def _pydcop(algorithm: str, family: Family, *parameters: str) -> Contestant:
     ended = ("FINISHED", "TIMEOUT") if algorithm in _ENDLESS else ("FINISHED",)
 
     def command(folder: Path) -> list[str]:
-        once = str(HERE / "pydcop_once.py")
+        once = str(SCRIPTS / "pydcop_once.py")
         return [python, once, "--timeout", limit, "solve", *algo, str(folder / FILES["pydcop"])]
 
     missing = "" if python else f"{PYTHON_OF_PYDCOP} names no Python"
@@ -271,7 +261,7 @@ def _propflows(family: Family) -> list[Contestant]:
         return []
     python = os.environ.get(PYTHON_OF_PROPFLOW, "")
     missing = "" if python else f"{PYTHON_OF_PROPFLOW} names no Python"
-    words = [str(HERE / "propflow_once.py"), str(CYCLES)]
+    words = [str(SCRIPTS / "propflow_once.py"), str(CYCLES)]
     return [
         Contestant(
             "PropFlow",

@@ -30,7 +30,7 @@ def wrong_claims(run: RunResult, team: Team, best: Certificate, traits: Traits |
     """
     if traits is not None:
         yield from _proof_faults(run, traits)
-    if run.verdict is not None and None in {run.messages, run.bytes, run.ncccs}:
+    if not run.is_by_peer and run.verdict is not None and None in {run.messages, run.bytes, run.ncccs}:
         yield "has a verdict, but not all of messages, bytes and ncccs"
     if not best.scenario:
         yield from _curve_faults(run, best, is_maximised=any(robot.costs.maximize for robot in team.robots))

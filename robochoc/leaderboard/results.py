@@ -19,6 +19,10 @@ from robochoc.system.files import write_atomically
 LARGEST_FILE = 256 * 2**20
 """The maximum size of a file with results, in bytes."""
 FORMAT = 1
+PEER_NAMES = ("frodo", "pydcop", "propflow")
+"""The names of peers, which are other tools."""
+PEER_SEPARATOR = ":"
+"""It separates the name of a peer from its algorithm; names of protocols do not contain it."""
 Count = Annotated[int, msgspec.Meta(ge=0, le=2**53)]
 Cost = Annotated[int, msgspec.Meta(ge=-(2**53), le=2**53)]
 Name = Annotated[str, msgspec.Meta(max_length=200, pattern=r"^[A-Za-z0-9][A-Za-z0-9 .,_+:-]*\Z")]
@@ -75,6 +79,8 @@ class RunResult(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
         curve: The number of messages sent until each improvement, and the cost after it.
         privacy: The mean loss by EntropyTS, over the kinds of secrets. None: not measured, or not known.
         cpu_s: The seconds of processor time, if times are recorded.
+        claimed_verdict: The verdict that a peer states. It is not the verdict if the checks contradict it.
+        claimed_cost: The cost that a peer states; `cost` is computed here.
     """
 
     instance: Name
@@ -90,6 +96,13 @@ class RunResult(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
     curve: list[tuple[Count, Cost]] = []
     privacy: Annotated[float, msgspec.Meta(ge=0, le=1)] | None = None
     cpu_s: Annotated[float, msgspec.Meta(ge=0)] | None = None
+    claimed_verdict: Name | None = None
+    claimed_cost: float | None = None
+
+    @property
+    def is_by_peer(self) -> bool:
+        """True if another tool solved the problem."""
+        return is_peer_name(self.protocol)
 
 
 class LeaderboardResults(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -112,6 +125,12 @@ class LeaderboardResults(msgspec.Struct, frozen=True, kw_only=True, forbid_unkno
     budget: Budget
     entrants: list[Entrant]
     runs: list[RunResult]
+
+
+def is_peer_name(name: str) -> bool:
+    """Return whether a name is that of a peer's algorithm, as in `pydcop:dpop`."""
+    peer, separator, _ = name.partition(PEER_SEPARATOR)
+    return bool(separator) and peer in PEER_NAMES
 
 
 def write_results(results: LeaderboardResults, path: Path) -> None:

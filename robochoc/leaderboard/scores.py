@@ -9,7 +9,6 @@ verdict is 0, and of none 1. The area is the mean gap of the best assignment so 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from robochoc.experiments.statistics import MeanInterval, holm_corrected, mean_interval, paired_p_value
 from robochoc.experiments.task import Status
@@ -88,8 +87,11 @@ def gap(run: RunResult, best: Certificate, cost: int | None = None) -> float:
 
 
 def area(run: RunResult, best: Certificate, budget: Budget) -> float | None:
-    """Return the mean gap of the best assignment so far over the budget of messages; None if the problem changes."""
-    if best.scenario:
+    """Return the mean gap of the best assignment so far over the budget of messages; None if it is not known.
+
+    It is not known for problems that change, and for peers, which report no curve.
+    """
+    if best.scenario or run.is_by_peer:
         return None
     end = budget.messages
     if best.cost is None:
@@ -179,17 +181,24 @@ def _score(
         runs=len(runs),
         gap=mean_interval(gaps),
         area=_mean(areas),
-        messages=_mean_of_counted([run.messages for run in runs]),
-        bytes=_mean_of_counted([run.bytes for run in runs]),
-        ncccs=_mean_of_counted([run.ncccs for run in runs]),
+        messages=_mean_of_counted(runs, "messages"),
+        bytes=_mean_of_counted(runs, "bytes"),
+        ncccs=_mean_of_counted(runs, "ncccs"),
         privacy=_mean([run.privacy for run in runs]),
         cpu_s=_mean([run.cpu_s for run in runs]),
     )
 
 
-def _mean_of_counted(values: Sequence[Any]) -> float | None:
-    """Return the mean of the values that are not None; refused runs have no counts."""
-    return _mean([value for value in values if value is not None])
+def _mean_of_counted(runs: Sequence[RunResult], name: str) -> float | None:
+    """Return the mean of a count over the runs that have it; refused runs have no counts.
+
+    Peers may count only some runs, such as those that end: then the mean is not known.
+    """
+    return _mean([count for run in runs if (count := getattr(run, name)) is not None or _is_uncounted(run)])
+
+
+def _is_uncounted(run: RunResult) -> bool:
+    return run.is_by_peer and run.status != Status.REFUSED
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -13,7 +13,7 @@ from robochoc.leaderboard.certificates import Certificate, published
 from robochoc.leaderboard.instances import DPOP, FAMILIES
 from robochoc.leaderboard.results import LeaderboardResults, RunResult
 from robochoc.leaderboard.scores import gap
-from robochoc.leaderboard.tables import answer_text, family_tables, holders, overall
+from robochoc.leaderboard.tables import answer_text, family_tables, holders, overall, peer_remarks
 from robochoc.system.files import write_atomically
 
 INDEX = "index.html"
@@ -48,6 +48,7 @@ def _index(results: LeaderboardResults) -> Iterator[str]:
     yield _paragraph(EXPLANATION)
     yield "<h2>All families</h2>"
     yield table(*overall(results))
+    yield from map(_paragraph, peer_remarks(results))
     for one in family_tables(results):
         family = FAMILIES[one.family]
         yield f"<h2>{html.escape(family.title)}</h2>"

@@ -9,8 +9,10 @@ from robochoc.experiments.statistics import MeanInterval
 from robochoc.experiments.summary import number
 from robochoc.leaderboard.certificates import Certificate, published
 from robochoc.leaderboard.instances import FAMILIES
-from robochoc.leaderboard.results import LeaderboardResults, RunResult
+from robochoc.leaderboard.peers.claims import wrong_claims_of_peers
+from robochoc.leaderboard.results import LeaderboardResults, RunResult, is_peer_name
 from robochoc.leaderboard.scores import FamilyScores, Score, family_scores, gap
+from robochoc.system.plain_text import listed
 
 HEADINGS = (
     "protocol", "rank", "gap", "area", "best", "proved", "messages", "bytes", "NCCCs", "privacy loss", "CPU s",
@@ -98,6 +100,19 @@ def overall(results: LeaderboardResults) -> tuple[list[str], list[list[str]]]:
             lines.append([name, str(len(own)), *(str(count) for count in counts), str(runs), f"{gaps:.3f}"])
     lines.sort(key=lambda line: (-int(line[1]), float(line[-1])))
     return ["protocol", "families", "best in", "best answers", "proofs", "instances", "mean gap"], lines
+
+
+def peer_remarks(results: LeaderboardResults) -> Iterator[str]:
+    """Yield sentences about the peers in the results: what their figures mean, and which of their claims are wrong."""
+    peers = [one for one in results.entrants if is_peer_name(one.name)]
+    if not peers:
+        return
+    tools = listed(dict.fromkeys(one.package for one in peers))
+    yield (
+        f"Peers ({tools}) run as programs of their own. Only the time limit binds them; their messages, bytes and NCCCs"
+        " are as they count them, and a dash is a figure that they do not give. Costs are computed by robochoc."
+    )
+    yield from (f"Wrong claim: {wrong}." for wrong in wrong_claims_of_peers(results.runs))
 
 
 def holders(runs: Sequence[RunResult]) -> Mapping[str, list[RunResult]]:

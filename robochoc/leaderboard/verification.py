@@ -12,7 +12,7 @@ from robochoc.leaderboard.certificates import Certificate, published
 from robochoc.leaderboard.claims import claims_proof, wrong_claims
 from robochoc.leaderboard.export import checked_team
 from robochoc.leaderboard.instances import instance_named
-from robochoc.leaderboard.results import Entrant, LeaderboardResults, RunResult
+from robochoc.leaderboard.results import Entrant, LeaderboardResults, RunResult, is_peer_name
 from robochoc.leaderboard.running import comparable, entrants, met_time_limit, run_leaderboard
 from robochoc.model.change import team_after_events
 from robochoc.model.outcome import Verdict
@@ -103,6 +103,9 @@ class Repetition:
     def _can_be_repeated(self, before: Entrant) -> bool:
         """Return whether the protocol is here, with the same source files. Otherwise note the reason."""
         runs = counted(sum(run.protocol == before.name for run in self._results.runs), "run")
+        if is_peer_name(before.name):
+            self.remarks.append(f"{runs} of {before.name} not repeated: only the answers of peers are checked")
+            return False
         try:
             (now,) = entrants([before.name])
         except UnknownProtocolError as unknown:

@@ -177,7 +177,7 @@ def test_frodo_is_set_and_read(load: Any, tmp_path: Path) -> None:  # noqa: ANN4
     contestants = load("contestants")
     text = '<agent measureTime = "true" measureMsgs="true"> displayGraph = "true" countNCCCs = "true"'
     expected = '<agent measureTime = "false" measureMsgs="true"> displayGraph = "false" countNCCCs = "true"'
-    assert contestants.described(text, counted="true") == expected
+    assert contestants.described(text, simulates_time=False, counts=True) == expected
     frodo = next(one for one in contestants.contestants(load("peer_problems").TIGHT) if one.library == "FRODO")
     table = tmp_path / "frodo.csv"
     head = "timed out;number of messages;true cost\n1;2147483647;NaN\n"

@@ -14,7 +14,6 @@ from tests.support.program import ROOT
 
 ONLY_STARTED_BY_OTHERS = {
     Path("benchmarks/peer_runs.py"),  # what it imports would count as memory of who is measured
-    Path("benchmarks/pydcop_once.py"),  # its words are those of pyDCOP
     Path("tests/support/debian_ros.py"),
     Path("tests/support/faulty_protocols.py"),
     Path("tests/support/toulbar2_once.py"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 import click
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
     from robochoc.leaderboard.instances import Instance
+    from robochoc.leaderboard.peers.running import PeerEntrant
     from robochoc.leaderboard.results import Budget, LeaderboardResults
 
 SIZES = ("small",)
@@ -120,7 +121,11 @@ def export(instance: str, kind: str, output: Path | None, *, force: bool) -> Non
 
 
 @leaderboard.command(short_help="Run protocols on the set under a budget.")
-@click.argument("protocols", nargs=-1, required=True, metavar="PROTOCOL|MODULE:CLASS ...")
+@click.argument("protocols", nargs=-1, required=True, metavar="PROTOCOL|MODULE:CLASS|PEER:NAME ...")
+@click.option(
+    "--peer", "peer_words", multiple=True, metavar="NAME=PATH",
+    help="Program of a peer: pydcop or propflow and a Python, or frodo and its jar. Repeatable.",
+)  # fmt: skip
 @family_option
 @size_option
 @click.option(
@@ -148,8 +153,9 @@ def export(instance: str, kind: str, output: Path | None, *, force: bool) -> Non
 )
 @jobs_option
 @invalid_input_fails
-def run(  # noqa: PLR0913 - options
+def run(  # noqa: PLR0913, PLR0917 - options
     protocols: tuple[str, ...],
+    peer_words: tuple[str, ...],
     families: tuple[str, ...],
     sizes: tuple[str, ...],
     seeds: int,
@@ -165,29 +171,42 @@ def run(  # noqa: PLR0913 - options
     A protocol of an outside package is named as it is installed, or as MODULE:CLASS, also in the current folder. The
     same command writes the same bytes, unless --times is given or a run meets its time limit.
 
+    Peers are other tools: FRODO, pyDCOP and PropFlow, which --peer names. Only the time limit binds them, and their
+    results may differ from run to run.
+
     \b
     robochoc leaderboard run dpop mgm dsa maxsum --size small
+    robochoc leaderboard run dpop pydcop:dpop --peer pydcop=pydcop-env/bin/python
     robochoc leaderboard run my_package.protocol:MyProtocol --budget messages=5000,cycles=200
     """  # noqa: D301 - \\b keeps click from wrapping the lines
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.search_result import Progress
     from robochoc.leaderboard.outside import named_protocols
-    from robochoc.leaderboard.results import write_results
+    from robochoc.leaderboard.results import is_peer_name, write_results
     from robochoc.leaderboard.running import entrants, run_leaderboard
     from robochoc.system.posix import usable_processors
 
     chosen, budget = list(_instances(families, sizes, range(seeds))), _budget(budget_words)
-    with errors_as_failures("leaderboard"), named_protocols(protocols) as names, progress_line("leaderboard") as show:
-        results = run_leaderboard(
-            entrants(names),
-            chosen,
-            budget,
-            seed=seed,
+    peers = [word for word in protocols if is_peer_name(word)]
+    own = [word for word in protocols if not is_peer_name(word)]
+    with errors_as_failures("leaderboard"), named_protocols(own) as names, progress_line("leaderboard") as show:
+        entered = _peers(peers, peer_words)
+        common = _Common(
             jobs=jobs or usable_processors(),
             times=times,
             progress=show and (lambda done, planned: show(Progress(0, 0, f"{done:,} of {planned:,} runs"))),
         )
+        results = run_leaderboard(entrants(names), chosen, budget, seed=seed, **common)
+        if entered:
+            from robochoc.leaderboard.peers.running import with_peers
+
+            results = with_peers(results, entered, chosen, **common)
         write_results(results, output)
+    if entered:
+        from robochoc.leaderboard.peers.claims import wrong_claims_of_peers
+
+        for wrong in wrong_claims_of_peers(results.runs):
+            click.echo(on_one_line(wrong), err=True)
     click.echo(f"{output}: {counted(len(results.runs), 'run')}; next: robochoc leaderboard show {output}")
 
 
@@ -326,6 +345,29 @@ def _instances(families: tuple[str, ...], sizes: tuple[str, ...], seeds: Sequenc
         yield from instances(families, sizes, seeds)
     except UnknownInstanceError as unknown:
         raise Failure(USAGE, str(unknown)) from None
+
+
+class _Common(TypedDict):
+    """The arguments shared by the runs of protocols and peers."""
+
+    jobs: int
+    times: bool
+    progress: Callable[[int, int], None] | None
+
+
+def _peers(words: Sequence[str], places: Sequence[str]) -> list[PeerEntrant]:
+    """Return the peers' algorithms named by words, with the programs given as NAME=PATH."""
+    given: dict[str, Path] = {}
+    for place in places:
+        name, equals, path = place.partition("=")
+        if not equals or not path or name in given:
+            raise click.UsageError(f"--peer: {place!r} is not of the form NAME=PATH, with each name once.")
+        given[name] = Path(path).expanduser()
+    if not words and not given:
+        return []
+    from robochoc.leaderboard.peers.running import peer_entrants
+
+    return peer_entrants(words, given)
 
 
 def _budget(words: str) -> Budget:

@@ -11,8 +11,9 @@ from robochoc.cli.reports.table import print_table
 from robochoc.leaderboard.instances import FAMILIES
 from robochoc.leaderboard.results import LeaderboardResults
 from robochoc.leaderboard.site import EXPLANATION, budget_text
-from robochoc.leaderboard.tables import family_tables, overall
+from robochoc.leaderboard.tables import family_tables, overall, peer_remarks
 from robochoc.system.files import write_atomically
+from robochoc.system.plain_text import on_one_line
 
 
 def print_board(results: LeaderboardResults) -> None:
@@ -21,6 +22,8 @@ def print_board(results: LeaderboardResults) -> None:
     headings, lines = overall(results)
     click.echo()
     print_table(headings, lines, right=headings[1:])
+    for remark in peer_remarks(results):
+        click.echo(on_one_line(remark))
     for one in family_tables(results):
         click.echo(f"\n{one.family}: {FAMILIES[one.family].title}")
         print_table(one.headings, one.lines, right=one.headings[1:])
@@ -36,6 +39,7 @@ def write_markdown(results: LeaderboardResults, path: Path) -> None:
 def _markdown(results: LeaderboardResults) -> Iterator[str]:
     yield from (budget_text(results), "", EXPLANATION, "")
     yield from _table(*overall(results))
+    yield from (line for remark in peer_remarks(results) for line in ("", remark))
     for one in family_tables(results):
         yield from ("", f"### {FAMILIES[one.family].title}", "")
         yield from _table(one.headings, one.lines)

@@ -27,6 +27,9 @@ from robochoc.system.lazy_dataclass import dataclass
 CONSTANT = "constant"
 """The name of the constraint that contains the constant cost."""
 
+LEAST_FORBIDDEN_COST = 10_000
+"""The minimum cost of a forbidden tuple for tools without hard constraints: pyDCOP's convention."""
+
 
 class OwnedConstraint(NamedTuple):
     """A constraint, the robot whose file contains it, and whether only this robot knows it."""
@@ -146,6 +149,11 @@ def finite_cost_bound(tables: Sequence[TabulatedConstraint], constant: Fraction)
         for key, table in distinct.items()
     }
     return math.floor(sum((most[id(one.table)] for one in tables), abs(constant))) + 1
+
+
+def forbidden_cost(tables: Sequence[TabulatedConstraint], constant: Fraction) -> int:
+    """Return the cost of a forbidden tuple for tools without hard constraints: it exceeds every sum of finite costs."""
+    return max(LEAST_FORBIDDEN_COST, 10 * finite_cost_bound(tables, constant))
 
 
 def amounts(tables: Sequence[TabulatedConstraint]) -> set[Amount]:

@@ -22,6 +22,7 @@ from robochoc.formats.dialects.tabulation import (
     constant_table,
     decimal,
     finite_cost_bound,
+    forbidden_cost,
     is_maximised,
     tabulate,
 )
@@ -33,8 +34,6 @@ CAPACITY = 1000
 """The capacity of an agent per variable, constraint and value. It exceeds the needs of all algorithms in pyDCOP."""
 LIMIT = 2**31 - 1
 """The worst cost in pyDCOP's DPOP."""
-LEAST_INFINITY = 10_000
-"""The minimum cost of a forbidden tuple: pyDCOP's own convention."""
 
 
 def write(team: Team, options: ExportOptions) -> ExportResult:
@@ -61,7 +60,7 @@ def _problem(team: Team) -> Iterator[str]:
     tables, constant = tabulate(team)
     maximize = is_maximised(team)
     most, forbids = finite_cost_bound(tables, constant), INFINITE in amounts(tables)
-    infinity = max(LEAST_INFINITY, 10 * most)
+    infinity = forbidden_cost(tables, constant)
     if (infinity if forbids else most) >= LIMIT:
         more = ", and forbidden tuples cost ten times as much" if forbids else ""
         what = f"costs may add up to {most - 1:,}{more}"
@@ -79,10 +78,10 @@ def _problem(team: Team) -> Iterator[str]:
         yield f"  {_quoted(name)}: {{domain: {_quoted(f'd_{name}')}}}"
     if constant:
         tables.append(constant_table(team, constant))
-    forbidden_cost = str(-infinity if maximize else infinity)
+    forbidden = str(-infinity if maximize else infinity)
     yield "constraints:" if tables else "constraints: {}"
     for one in tables:
-        yield from _constraint(one, team, forbidden_cost)
+        yield from _constraint(one, team, forbidden)
     sizes = {name: len(variable.domain) for name, variable in team.variables.items()}
     capacity = CAPACITY * sum(1 + sizes[name] for name in [*sizes, *(name for one in tables for name in one.scope)])
     yield "agents:"
@@ -100,24 +99,24 @@ def _owners(team: Team) -> Iterator[str]:
         yield f"  {_quoted(robot.name)}: {_list(one.name for one in robot.variables)}"
 
 
-def _constraint(one: TabulatedConstraint, team: Team, forbidden_cost: str) -> Iterator[str]:
+def _constraint(one: TabulatedConstraint, team: Team, forbidden: str) -> Iterator[str]:
     domains = [team.variables[name].domain for name in one.scope]
     by_cost: dict[str, list[str]] = defaultdict(list)
     for values, cost in one.table.rows.items():
         words = [str(domain.label(value)) for domain, value in zip(domains, values, strict=True)]
-        by_cost[_cost(cost, forbidden_cost)].append(" ".join(words))
+        by_cost[_cost(cost, forbidden)].append(" ".join(words))
     yield f"  {_quoted(one.name)}:"
     yield "    type: extensional"
     yield f"    variables: {_list(one.scope)}"
     if len(one.table.rows) < one.table.size:
-        yield f"    default: {_cost(one.table.default, forbidden_cost)}"
+        yield f"    default: {_cost(one.table.default, forbidden)}"
     yield "    values:" if by_cost else "    values: {}"
     for cost_text, tuples in by_cost.items():
         yield f"      {cost_text}: {_quoted(' | '.join(tuples))}"
 
 
-def _cost(cost: Amount, forbidden_cost: str) -> str:
-    return forbidden_cost if cost == INFINITE else decimal(cost)
+def _cost(cost: Amount, forbidden: str) -> str:
+    return forbidden if cost == INFINITE else decimal(cost)
 
 
 def _values(domain: Domain) -> str:
